@@ -19,13 +19,14 @@ from benchmarks import (
     real_time,
     report,
     round_trip,
+    startup,
     step_costs,
     three_processes,
     transfers,
 )
 from benchmarks.measure import OtherLoad
 
-SECTIONS = ("steps", "flights", "emulated", "multibody", "realtime", "load", "transfers", "start")
+SECTIONS = ("steps", "flights", "emulated", "multibody", "realtime", "load", "transfers", "start", "startup")
 
 
 def _arguments() -> argparse.Namespace:
@@ -87,6 +88,8 @@ def main() -> int:
         results["start"] = _measured(
             "the start of each process", lambda: three_processes.start_ups(1 if quick else 5)
         )
+    if "startup" in wanted:
+        results["startup"] = _measured("commands of gcs", lambda: startup.startup(3 if quick else 20))
     machine = {
         "system": f"{platform.system()} {platform.machine()}",
         "cores": os.cpu_count(),

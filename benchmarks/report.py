@@ -12,6 +12,7 @@ from benchmarks.measure import Figure, short
 from benchmarks.plants import PlantCost
 from benchmarks.real_time import PERCENTILES
 from benchmarks.round_trip import WAYS
+from benchmarks.startup import Startup
 from benchmarks.step_costs import Part
 from benchmarks.table import Row, table
 from benchmarks.three_processes import Flights
@@ -49,6 +50,8 @@ def texts(results: dict[str, Any], machine: dict[str, Any]) -> Iterator[str]:
         yield _transfers(results["transfers"]) + "\n"
     if "start" in results:
         yield _start(results) + "\n"
+    if "startup" in results:
+        yield _startup(results["startup"]) + "\n"
 
 
 def _flights(results: dict[str, Any]) -> str:
@@ -193,6 +196,17 @@ def _start(results: dict[str, Any]) -> str:
         command_s = results["three_processes"][500.0].command_s
         rows.append(("gcs fly missions/square.plan (make fly), all of it", command_s.text()))
     return table("START", ("", "s"), rows)
+
+
+def _startup(taken: Startup) -> str:
+    rows: list[Row] = [("python -c pass", taken.python_cpu_s.text(), "", "")]
+    rows += [(f"gcs {name}", cpu_s.text(), "", "") for name, cpu_s in taken.help_cpu_s.items()]
+    rows += [
+        (f"gcs {name}", cpu_s.text(), taken.answer_s[name].text(), taken.all_s[name].text())
+        for name, cpu_s in taken.answer_cpu_s.items()
+    ]
+    head = ("", "processor time, s", "after the heartbeat, s", "all of it, s")
+    return table("COMMANDS OF GCS: processor time, and time of an answer", head, rows)
 
 
 def plain(results: dict[str, Any]) -> dict[str, Any]:

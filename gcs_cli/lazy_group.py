@@ -13,8 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
-EXAMPLES = "Examples:\n"
-"""First line of the paragraph of a docstring that lists command lines."""
+from gcs_cli.commands.examples import epilog
 
 
 class LazyCommand(NamedTuple):
@@ -26,17 +25,12 @@ class LazyCommand(NamedTuple):
     hidden: bool = False
     """True for a former name, which the list leaves out."""
 
-    def load(self, name: str) -> Any:
-        """Import the module and return the Click command."""
+    def load(self, words: str) -> Any:
+        """Import the module and return the Click command, named by its ``words``, such as ``mission upload``."""
         loaded = get_command(import_module(self.module).app)
-        command = loaded.commands[name] if isinstance(loaded, TyperGroup) else loaded
-        command.help = _with_lines_kept(command.help)
+        command = loaded.commands[words.rsplit(maxsplit=1)[-1]] if isinstance(loaded, TyperGroup) else loaded
+        command.epilog = epilog(words)
         return command
-
-
-def _with_lines_kept(text: str | None) -> str | None:
-    """Return a help text whose examples keep their lines: Click wraps paragraphs without its mark."""
-    return text and text.replace(f"\n\n{EXAMPLES}", f"\n\n\b\n{EXAMPLES}")
 
 
 class LazyGroup(TyperGroup):
@@ -56,5 +50,6 @@ class LazyGroup(TyperGroup):
         """Return name, command and remaining arguments; import the command's module."""
         name, command, rest = super().resolve_command(ctx, args)
         if name is not None and name in self.lazy:
-            command = self.lazy[name].load(name)
+            group = ctx.command_path.split()[1:]
+            command = self.lazy[name].load(" ".join((*group, name)))
         return name, command, rest

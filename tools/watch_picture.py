@@ -22,15 +22,19 @@ SIZE = (120, 35)
 WAIT_S = 8.0
 
 
+def picture_of(app: WatchApp) -> str:
+    """Return the screen as SVG, without references to fonts on the network."""
+    return re.sub(r"@font-face \{.*?\}\s*", "", app.export_screenshot(), flags=re.DOTALL)
+
+
 def main() -> None:
-    """Watch for some seconds, then write the picture without references to fonts on the network."""
+    """Watch for some seconds, then write the picture."""
     with Connection(parse_endpoint(sys.argv[1])) as connection:
         app = WatchApp(Feed(connection))
 
         async def take(_pilot: Pilot[object]) -> None:
             await asyncio.sleep(WAIT_S)
-            svg = app.export_screenshot()
-            PICTURE.write_text(re.sub(r"@font-face \{.*?\}\s*", "", svg, flags=re.DOTALL), encoding="utf-8")
+            PICTURE.write_text(picture_of(app), encoding="utf-8")
             app.exit()
 
         app.run(headless=True, size=SIZE, auto_pilot=take)

@@ -8,12 +8,13 @@ Each type has an array form, its fields in order as float64, in which Python, ke
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
-import numpy as np
+if TYPE_CHECKING:
+    import numpy as np  # takes 0.1 s, and a command that only talks to a vehicle has no arrays
 
-FloatArray: TypeAlias = np.ndarray[Any, np.dtype[np.float64]]
-RecordArray: TypeAlias = np.ndarray[Any, np.dtype[np.void]]
+FloatArray: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
+RecordArray: TypeAlias = "np.ndarray[Any, np.dtype[np.void]]"
 Record: TypeAlias = Any
 """One element of a ``RecordArray``, indexed by the names of its fields."""
 

@@ -16,7 +16,9 @@ from flightstack.core.compiled import compiled
 from flightstack.core.contract import STATE_SIZE, FloatArray, Record, RecordArray
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.portable_math import distance
-from flightstack.plan import FenceShape, MissionItem, fence_shape
+from flightstack.plan import MissionItem
+from flightstack.plan.fence import fence_shape
+from flightstack.plan.fence_shape import FenceShape
 
 HYSTERESIS_M = 1.0
 """Margin at which a breach of a limit ends, so that the breach does not chatter."""

@@ -11,15 +11,9 @@ from flightstack.core.portable_math import distance
 from flightstack.guidance.fence import NO_FENCE, Fence
 from flightstack.guidance.rally import HOME, NEAREST, RALLY_FIRST, ReturnPlace, choose, rally_points
 from flightstack.params.behaviour import Behaviour
-from flightstack.plan import (
-    DEFAULT_LIMITS,
-    Limits,
-    MissionItem,
-    Rejection,
-    check_fence,
-    check_mission,
-    check_rally,
-)
+from flightstack.plan import DEFAULT_LIMITS, Limits, MissionItem, Rejection, check_mission
+from flightstack.plan.fence import check_fence
+from flightstack.plan.rally import check_rally
 
 
 def plan_limits(b: Behaviour) -> Limits:

@@ -1,11 +1,12 @@
-"""Plans: missions, geofences and rally points, their files (``.plan``, ``.waypoints``) and their validation."""
+"""Plans: missions, geofences and rally points, their files (``.plan``, ``.waypoints``) and their validation.
+
+The checks of geofences (``plan.fence``) and rally points (``plan.rally``) are not imported here: they need NumPy, and
+a ground station that only sends a plan does not.
+"""
 
 from flightstack.plan.check import DEFAULT_LIMITS, Limits, check_mission, mission_rejections
-from flightstack.plan.fence import check_fence, fence_shape
-from flightstack.plan.fence_shape import FenceShape
 from flightstack.plan.files import load_plan, save_plan
 from flightstack.plan.item import MissionItem, Plan
-from flightstack.plan.rally import check_rally
 from flightstack.plan.rejection import Rejection
 from flightstack.plan.vocabulary import (
     MAX_FENCE_ITEMS,
@@ -37,7 +38,6 @@ __all__ = [
     "UNSET_E7",
     "Command",
     "FenceCommand",
-    "FenceShape",
     "Frame",
     "Limits",
     "MissionItem",
@@ -45,11 +45,8 @@ __all__ = [
     "MissionType",
     "Plan",
     "Rejection",
-    "check_fence",
     "check_mission",
-    "check_rally",
     "command_name",
-    "fence_shape",
     "load_plan",
     "mission_rejections",
     "result_name",

@@ -7,13 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
-
-import numpy as np
+from typing import TYPE_CHECKING, NamedTuple
 
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.portable_math import distance
-from flightstack.plan.fence_shape import FenceShape
 from flightstack.plan.item import MissionItem
 from flightstack.plan.jumps import find_idle_loop
 from flightstack.plan.parameter_rules import parameter_fault
@@ -28,6 +25,9 @@ from flightstack.plan.vocabulary import (
     Frame,
     MissionResult,
 )
+
+if TYPE_CHECKING:
+    from flightstack.plan.fence_shape import FenceShape  # needs NumPy
 
 _ALTITUDE_TOLERANCE_M = 0.01  # a float32 altitude above sea level has a resolution of half a millimetre
 
@@ -209,10 +209,7 @@ def leg_rejections(
     legs = mission_legs(items, home_ne_m, fence)
     if not legs:
         return
-    outside = fence.segments_outside(
-        np.array([leg.begin for leg in legs]), np.array([leg.end for leg in legs])
-    )
-    for index, place in outside:
+    for index, place in fence.segments_outside([leg.begin for leg in legs], [leg.end for leg in legs]):
         leg = legs[index]
         if not fence.allows(*leg.end):
             reason = "is outside the geofence"

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from flightstack.core.contract import FloatArray, Record, RecordArray
 from flightstack.core.geodesy import GeoPoint, LocalFrame
+from flightstack.plan.fence_areas import Area
 
 AREA = np.dtype(
     [
@@ -26,20 +27,6 @@ AREA = np.dtype(
     ]
 )
 """An area of a geofence in kernels; vertices are in a separate array, shape (m, 2): north and east [m]."""
-
-
-class Area(NamedTuple):
-    """A polygon or circle of a geofence."""
-
-    seq: int
-    """Number of the first item."""
-    is_inclusion: bool
-    group: int
-    """Group of an inclusion area; 0 for exclusions."""
-    points_deg: tuple[tuple[float, float], ...]
-    """Latitude and longitude of the vertices, or of the circle's centre."""
-    radius_m: float = 0.0
-    """Radius of a circle; 0 for a polygon."""
 
 
 class FenceShape:
@@ -117,11 +104,12 @@ class FenceShape:
                 inside ^= spans & (north < n1 + (east - e1) * ((n2 - n1) / (e2 - e1)))
         return inside
 
-    def segments_outside(self, begins: FloatArray, ends: FloatArray) -> list[tuple[int, tuple[float, float]]]:
-        """Return the segments from ``begins`` to ``ends``, each of shape (n, 2), that leave the allowed region.
+    def segments_outside(self, starts: ArrayLike, stops: ArrayLike) -> list[tuple[int, tuple[float, float]]]:
+        """Return the segments from ``starts`` to ``stops``, each of shape (n, 2), that leave the allowed region.
 
         Each is given by its row and one place on it that is not allowed.
         """
+        begins, ends = np.asarray(starts, dtype=np.float64), np.asarray(stops, dtype=np.float64)
         suspects = ~(self.allowed(begins) & self.allowed(ends))
         for start in range(0, len(begins), 256):  # blocks bound the memory
             block = slice(start, start + 256)

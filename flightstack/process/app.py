@@ -46,6 +46,8 @@ GROUND_BUSY_NS = 50_000_000
 Mission items are requested one at a time: served every outer tick alone, a transfer of 1000 items takes 10 s. Not while
 ticks follow each other faster than GROUND_POLL_NS: then the outer ticks are frequent enough.
 """
+TRANSFER_MS = 1
+"""Interval of polling the ground links while files are sent and the simulator is waited for."""
 GROUND_SHARE = 0.4
 """Maximum share of a real-time tick for sending to ground stations; the rest is sent in the next ticks."""
 REPORT_S = 0.2
@@ -248,9 +250,13 @@ class App:
             fresh = self._wait_for_simulator(simulator) if data is None else link.receive(data)
 
     def _serve_while_idle(self, simulator: TcpClient, poller: select.poll) -> None:
-        """Serve the ground links as data arrives, until the simulator sends."""
+        """Serve the ground links as data arrives, and while files are sent, until the simulator sends."""
         number = simulator.fileno()
-        while (ready := poller.poll(20)) and all(descriptor != number for descriptor, _ in ready):
+        while True:
+            sends_files = self.stack.ground.sends_files
+            ready = poller.poll(TRANSFER_MS if sends_files else 20)
+            if any(descriptor == number for descriptor, _ in ready) or not (ready or sends_files):
+                return
             if self._serve_ground():
                 self._busy_until_ns = time.monotonic_ns() + GROUND_BUSY_NS
             self._check_stop()
@@ -304,7 +310,7 @@ class App:
             return
         if self._follower is not None:
             self._follower.update()
-        heard = self._serve_ground()
+        heard = self._serve_ground() or self.stack.ground.sends_files
         self._next_ground_ns = now_ns + (GROUND_POLL_NS if heard else GROUND_IDLE_NS)
         self._note_traffic(heard, now_ns, simulator)
         self._send_requests(simulator)

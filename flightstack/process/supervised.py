@@ -1,7 +1,7 @@
-"""Run a module as a program that ends with its parent: ``python -m flightstack.process.supervised MODULE …``.
+"""Run a module that ends with its parent: ``python -m flightstack.process.supervised DESCRIPTOR MODULE …``.
 
-The parent holds the other end of standard input. The kernel closes it when the parent ends, by whatever signal; the
-program then gets SIGTERM.
+The parent holds the other end of the pipe at the descriptor, usually standard input. The kernel closes it when the
+parent ends, by whatever signal; the program then gets SIGTERM.
 """
 
 from __future__ import annotations
@@ -12,15 +12,22 @@ import signal
 import sys
 import threading
 
+from flightstack.process.command_line import own_program
 
-def _end_with_parent() -> None:
-    """Send SIGTERM to this process when stdin closes. It is read without a buffer, whose lock blocks the exit."""
-    while os.read(0, 1):
+
+def supervised(module: str, *arguments: str, descriptor: int = 0) -> list[str]:
+    """Return the command that runs a module of this installation until the pipe at ``descriptor`` closes."""
+    return own_program("flightstack.process.supervised", str(descriptor), module, *arguments)
+
+
+def _end_with_parent(descriptor: int) -> None:
+    """Send SIGTERM to this process when the pipe closes. It is read without a buffer, whose lock blocks the exit."""
+    while os.read(descriptor, 1):
         pass
     os.kill(os.getpid(), signal.SIGTERM)
 
 
 if __name__ == "__main__":
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    module = sys.argv.pop(1)
-    runpy.run_module(module, run_name="__main__", alter_sys=True)
+    pipe, module_name = int(sys.argv.pop(1)), sys.argv.pop(1)
+    threading.Thread(target=_end_with_parent, args=(pipe,), daemon=True).start()
+    runpy.run_module(module_name, run_name="__main__", alter_sys=True)

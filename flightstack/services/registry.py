@@ -13,6 +13,7 @@ from flightstack.core.enums import Severity
 from flightstack.core.portable_math import yaw_angle
 from flightstack.mavlink.link import Address, Message
 from flightstack.mavlink.param_pack import pack_file
+from flightstack.mavlink.text_file import PastText, pack_texts
 from flightstack.params.metadata import parameters_json
 from flightstack.services.commands.command_server import CommandService
 from flightstack.services.commands.context import VehicleContext
@@ -62,19 +63,31 @@ class Service(Protocol):
         ...
 
 
+OWN_MESSAGES = frozenset({"MISSION_ITEM", "MISSION_ITEM_INT", "MISSION_REQUEST", "MISSION_REQUEST_INT"})
+"""Messages that come by the thousand in a transfer, and change no service but their own."""
+
+
 class Schedule:
     """Polls each service when it is due, and all of them after a message: in flight one of thirteen is due.
 
     A message for one service may change another: a command sets a parameter, which the parameter server announces.
+    After one of ``OWN_MESSAGES``, only its services are polled.
     """
 
     def __init__(self, services: Sequence[Service]) -> None:
         self._services = services
+        self._own: dict[str, list[int]] = {
+            kind: [index for index, service in enumerate(services) if kind in service.handles]
+            for kind in OWN_MESSAGES
+        }
         self._due_s: dict[int, float] = {}  # by the index of the service; not of those that are never due
         self.wake()
 
-    def wake(self) -> None:
-        """Poll all services at the next poll."""
+    def wake(self, message_type: str = "") -> None:
+        """Poll all services at the next poll, or those that a message of this type may change."""
+        if message_type in self._own:
+            self._due_s.update(dict.fromkeys(self._own[message_type], -math.inf))
+            return
         self._due_s = dict.fromkeys(range(len(self._services)), -math.inf)
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
@@ -158,7 +171,13 @@ def file_services(
     has_room: Callable[[Hashable], bool],
 ) -> tuple[Service, Service]:
     """Return the MAVLink FTP server and the log server."""
-    files = vehicle_files(metadata, lambda arguments: pack_file(vehicle.params, arguments), vehicle.logs)
+    texts = vehicle.journal.texts
+
+    def past_texts() -> bytes:
+        return pack_texts(PastText(1e-6 * text.time_us, text.severity, text.text) for text in texts)
+
+    pack = partial(pack_file, vehicle.params)
+    files = vehicle_files(metadata, pack, vehicle.logs, past_texts)
     return (
         FtpServer(own, files, has_room),
         LogServer(own, vehicle.logs, lambda: vehicle.now.status.armed, vehicle.journal.say, has_room),

@@ -45,7 +45,7 @@ class _Guard:
 
 def main(folder: Path, simulator: list[str], stack: list[str]) -> str:
     """Run both processes; return why they ended, empty if standard input was closed."""
-    with Children(folder, supervised=True) as children:
+    with Children(folder) as children:
         guard = _Guard(children)
         # the simulator's port is the lock of an instance: no flight stack may connect to the simulator of another test
         first = children.start(SIMULATOR, "sim_bridge", simulator)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import NamedTuple, TypeAlias
 
 from flightstack.commander.transitions import Status
@@ -28,6 +29,8 @@ class ItemReached(NamedTuple):
 
 
 Event: TypeAlias = Text | ItemReached
+KEPT_TEXTS = 100
+"""Texts kept for clients that connect later."""
 
 
 class Journal:
@@ -37,6 +40,8 @@ class Journal:
         self._now = now
         self._recorder = recorder
         self._events: list[Event] = []
+        self.texts: deque[Text] = deque(maxlen=KEPT_TEXTS)
+        """The newest texts, oldest first."""
         self.failsafe_acts = False
         """True from the action of a failsafe to its end, or until a user overrides it."""
 
@@ -49,7 +54,8 @@ class Journal:
 
     def say(self, severity: int, text: str) -> None:
         """Send a text to the operator and record it."""
-        self._events.append(Text(self._now.time_us, severity, text))
+        self.texts.append(Text(self._now.time_us, severity, text))
+        self._events.append(self.texts[-1])
         self._recorder.text(self._now.time_us, severity, text)
 
     def item_reached(self, seq: int, progress: MissionProgress, count: int) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -11,6 +10,8 @@ import typer
 from flightstack.process.command_line import IN_OUTPUT, expand_options, make_app
 from gcs_cli.actions import in_flight, on_vehicle
 from gcs_cli.actions.action import Action
+from gcs_cli.commands.asking import YesOption, confirm
+from gcs_cli.completion import mode_names
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.perform import ask_modes, perform
@@ -21,7 +22,6 @@ from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
 
-YesOption = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")]
 AltitudeOption = Annotated[
     float | None,
     typer.Option("--alt", metavar="METRES", min=0.1, max=10_000.0, help="Altitude above home."),
@@ -46,16 +46,6 @@ def run_action(context: typer.Context, link: LinkOptions, options: ActionOptions
         perform(connection, action, output_of(context, link), waits=not options.no_wait)
 
 
-def confirm(question: str, yes: bool) -> None:
-    """Ask on a terminal before a dangerous action; raise CliError if the answer is no or no one can be asked."""
-    if yes:
-        return
-    if not sys.stdin.isatty():
-        raise CliError(f"{question}: add --yes", USAGE)
-    if not typer.confirm(f"{question}. Continue?", err=True):
-        raise CliError("cancelled: nothing was sent")
-
-
 @app.command()
 @expand_options
 def arm(context: typer.Context, link: LinkOptions, options: ActionOptions) -> None:
@@ -77,7 +67,7 @@ def disarm(
     """Disarm the vehicle."""
     with connect_vehicle(context, link) as connection:
         if force and not yes and _may_fly(connection):
-            confirm("the vehicle may be in the air, and its rotors will stop", yes)
+            confirm("the vehicle may be in the air, and its rotors will stop", yes, connection)
         perform(
             connection, on_vehicle.disarm(force=force), output_of(context, link), waits=not options.no_wait
         )
@@ -188,7 +178,10 @@ def mode(
     link: LinkOptions,
     options: ActionOptions,
     name: Annotated[
-        str | None, typer.Argument(metavar="MODE", help="Name of the mode; without one, list the modes.")
+        str | None,
+        typer.Argument(
+            metavar="MODE", help="Name of the mode; without one, list the modes.", autocompletion=mode_names
+        ),
     ] = None,
 ) -> None:
     """Select a flight mode, or list the modes of the vehicle."""

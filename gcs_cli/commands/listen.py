@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Annotated
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
@@ -25,81 +25,101 @@ _LIST_S = 3.0
 _SET_INTERVAL = int(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL)
 
 
+MessageArgument = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="[MESSAGE]", help="Name or id; without it, list all messages.", autocompletion=message_names
+    ),
+]
+FieldOption = Annotated[
+    list[str] | None, typer.Option("--field", metavar="NAME", help="Print only this field; may be repeated.")
+]
+RateOption = Annotated[
+    float | None,
+    typer.Option("--rate", metavar="HZ", min=0.01, max=1000.0, help="Request this rate.", show_default=False),
+]
+CountOption = Annotated[
+    int | None, typer.Option("--count", metavar="N", min=1, help="End after N messages.", show_default=False)
+]
+
+
+class _Wanted(NamedTuple):
+    """What to print: a kind of message, some of its fields, at a requested rate, this many."""
+
+    kind: type
+    fields: tuple[str, ...]
+    rate_hz: float | None
+    most: int | None
+
+
 @app.command()
 @expand_options
 def listen(
     context: typer.Context,
     link: LinkOptions,
-    message: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="[MESSAGE]",
-            help="Name or id; without it, list all messages.",
-            autocompletion=message_names,
-        ),
-    ] = None,
-    field: Annotated[
-        list[str] | None,
-        typer.Option("--field", metavar="NAME", help="Print only this field; may be repeated."),
-    ] = None,
-    rate: Annotated[
-        float | None,
-        typer.Option(
-            "--rate", metavar="HZ", min=0.01, max=1000.0, help="Request this rate.", show_default=False
-        ),
-    ] = None,
-    count: Annotated[
-        int | None,
-        typer.Option("--count", metavar="N", min=1, help="End after N messages.", show_default=False),
-    ] = None,
+    message: MessageArgument = None,
+    field: FieldOption = None,
+    rate: RateOption = None,
+    count: CountOption = None,
     duration: DurationOption = None,
 ) -> None:
     """Print messages of the vehicle, one a line, until Ctrl-C.
 
     Without MESSAGE, list every message on the link with its rate and sender, counted for 3 s. Values are printed alone
     with one --field, and with tabs between several. A rate that was requested is set back at the end.
-
-    Examples:
-      gcs listen
-      gcs listen ATTITUDE --field roll --field pitch
-      gcs listen ESC_STATUS --rate 10 --count 5 --json
     """
     output = output_of(context, link)
-    fields = tuple(field or ())
-    if message is None and (fields or rate is not None or count is not None):
-        raise CliError("listen: --field, --rate and --count need a MESSAGE", USAGE)
-    try:
-        kind = None if message is None else message_class(message)
-        if kind is not None:
-            check_fields(kind, fields)
-    except FieldError as error:
-        raise CliError(f"listen: {error}", USAGE) from None
+    wanted = _wanted(message, tuple(field or ()), rate, count)
     timeout_s = link_options(context, link).timeout_s
     with connect_vehicle(
         context, link, takes_recording=True, in_real_time=False, shares=True, several=rate is None
     ) as connection:
-        if kind is None:
+        if wanted is None:
             _list(connection, output, _LIST_S if duration is None else duration)
-            return
-        printer = _Printer(connection, output, int(kind.id), fields, count)
-        _request(connection, kind, rate)
-        try:
-            _await_first(connection, printer, kind.msgname, timeout_s, rate, duration)
-            follow(connection, duration, lambda: printer.is_complete)
-        except KeyboardInterrupt:
-            return
-        finally:
-            connection.fleet.observe = None
-            if rate is not None:
-                connection.send(_interval(connection, int(kind.id), 0.0))
+        else:
+            _print(connection, output, wanted, timeout_s, duration)
 
 
-def _request(connection: Connection, kind: type, rate_hz: float | None) -> None:
+def _wanted(
+    message: str | None, fields: tuple[str, ...], rate_hz: float | None, count: int | None
+) -> _Wanted | None:
+    """Return what to print, None for the list of all messages; raise CliError (usage)."""
+    if message is None:
+        if fields or rate_hz is not None or count is not None:
+            raise CliError("listen: --field, --rate and --count need a MESSAGE", USAGE)
+        return None
+    try:
+        kind = message_class(message)
+        check_fields(kind, fields)
+    except FieldError as error:
+        raise CliError(f"listen: {error}", USAGE) from None
+    return _Wanted(kind, fields, rate_hz, count)
+
+
+def _print(
+    connection: Connection, output: Output, wanted: _Wanted, timeout_s: float, duration_s: float | None
+) -> None:
+    """Print the wanted messages as they are received."""
+    kind: Any = wanted.kind
+    printer = _Printer(connection, output, int(kind.id), wanted.fields, wanted.most)
+    _request(connection, kind, wanted.rate_hz)
+    try:
+        _await_first(connection, printer, kind.msgname, timeout_s, wanted.rate_hz, duration_s)
+        follow(connection, duration_s, lambda: printer.is_complete)
+    except KeyboardInterrupt:
+        return
+    finally:
+        connection.fleet.observe = None
+        if wanted.rate_hz is not None:
+            connection.send(_interval(connection, int(kind.id), 0.0))
+
+
+def _request(connection: Connection, kind: Any, rate_hz: float | None) -> None:
     if rate_hz is not None:
         if connection.is_recording:
             raise CliError("listen: a recording takes no --rate", USAGE)
-        number, interval_us = float(kind.id), 1e6 / rate_hz  # type: ignore[attr-defined]
-        name = f"listen: {kind.msgname} at {rate_hz:g} Hz"  # type: ignore[attr-defined]
+        number, interval_us = float(kind.id), 1e6 / rate_hz
+        name = f"listen: {kind.msgname} at {rate_hz:g} Hz"
         connection.command((_SET_INTERVAL, (number, interval_us)), name)
 
 

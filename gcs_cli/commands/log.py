@@ -14,12 +14,12 @@ from flightstack.mavlink.files import Entry
 from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.autopilots.registry import autopilot_of
 from gcs_cli.clients.log_client import LogEntry
+from gcs_cli.commands.asking import YesOption, confirm
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.output import Output
 from gcs_cli.settings import LinkOptions, OverwriteOption, output_of
 from gcs_cli.transfers import log_calls
-from gcs_cli.tui.transfer_bar import TransferBar
 from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
@@ -78,7 +78,8 @@ def download(
         else:
             log = _chosen(logs, number)
             file = log_calls.file_of(log, logs, files)
-            _download(out, connection, log, file, _path(connection, log, file, output, False), overwrite)
+            path = _path(connection, log, file, output, False)
+            _download(out, connection, log, logs, file, path, overwrite)
 
 
 @app.command()
@@ -86,7 +87,7 @@ def download(
 def erase(
     context: typer.Context,
     link: LinkOptions,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
+    yes: YesOption = False,
 ) -> None:
     """Erase all logs but the one that is being written.
 
@@ -99,8 +100,7 @@ def erase(
         if not before:
             raise CliError("the vehicle has no logs")
         size = size_text(sum(log.size for log in before))
-        if not yes:
-            typer.confirm(f"erase {len(before)} logs of {size} from the vehicle?", abort=True)
+        confirm(f"{len(before)} logs of {size} will be erased from the vehicle", yes, connection)
         left = log_calls.erase_logs(connection, len(before))
     if len(left) == len(before) and len(before) > 1:
         raise CliError(f"the vehicle still has all {len(left)} logs")
@@ -129,7 +129,7 @@ def _download_all(
         elif path.is_file() and not overwrite:
             refused.append(str(path))  # a log that has grown since, or another file
         else:
-            _download(out, connection, log, file, path, overwrite)
+            _download(out, connection, log, logs, file, path, overwrite)
     if refused:
         verb = "exists" if len(refused) == 1 else "exist"
         raise CliError(
@@ -139,8 +139,16 @@ def _download_all(
 
 
 def _download(
-    out: Output, connection: Connection, log: LogEntry, file: Entry | None, path: Path, overwrite: bool
+    out: Output,
+    connection: Connection,
+    log: LogEntry,
+    logs: tuple[LogEntry, ...],
+    file: Entry | None,
+    path: Path,
+    overwrite: bool,
 ) -> None:
+    from gcs_cli.tui.transfer_bar import TransferBar  # noqa: PLC0415  # rich
+
     check_new(path, overwrite)
     began_s = connection.now_s
     with TransferBar(f"log {log.log_id}") as bar:
@@ -150,8 +158,11 @@ def _download(
     write_bytes_atomically(path, content)
     rate = size_text(len(content) / took_s)
     sentence = f"log {log.log_id}: {size_text(len(content))} written to {path} ({rate}/s)"
+    is_growing = log_calls.is_growing(connection, log, logs)
+    if is_growing:
+        sentence += "; the vehicle is still writing this log: download it again after the flight"
     facts = {"id": log.log_id, "path": str(path), "size_bytes": len(content), "took_s": took_s}
-    out.say("downloaded", sentence, **facts)
+    out.say("downloaded", sentence, **facts, is_growing=is_growing)
 
 
 def _number(text: str) -> int | None:

@@ -11,8 +11,9 @@ from typing import Annotated
 import typer
 
 from flightstack.flight_log.poses_file import write_poses
-from flightstack.process.command_line import PictureOptions, expand_options, make_app, own_program
+from flightstack.process.command_line import PictureOptions, expand_options, make_app
 from flightstack.process.console import complain
+from flightstack.process.supervised import supervised
 from gcs_cli.errors import FAILED, CliError
 from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.poses import find_run, poses_of
@@ -53,10 +54,10 @@ def draw(
 def _render(arguments: list[str]) -> int:
     """Run ``sim-bridge render``, which reports its errors itself; return its exit code.
 
-    It runs in a session of its own, so that Ctrl-C sends it a single signal.
+    It runs in a session of its own, so that Ctrl-C sends it a single signal, and ends with this process.
     """
-    program = own_program("sim_bridge", "render", *arguments)
-    with subprocess.Popen(program, start_new_session=True) as child:
+    program = supervised("sim_bridge", "render", *arguments)
+    with subprocess.Popen(program, stdin=subprocess.PIPE, start_new_session=True) as child:
         try:
             code = child.wait()
         except KeyboardInterrupt:

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated
 
 import typer
 
 from flightstack.core.enums import Severity
+from flightstack.mavlink.text_file import PastText
 from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.commands.following import DurationOption, follow
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.output import Output
 from gcs_cli.settings import LinkOptions, output_of
+from gcs_cli.transfers.past_texts import fetch_past_texts
 from gcs_cli.vehicle.view_types import StatusText
 from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
 
+PAST = 10
+"""Past texts that are shown by default."""
 LEVELS = tuple(severity.name.lower() for severity in Severity)
 
 
@@ -39,14 +44,20 @@ def messages(
         int | None, typer.Option("--count", metavar="N", min=1, help="End after N texts.", show_default=False)
     ] = None,
     duration: DurationOption = None,
+    past: Annotated[
+        int,
+        typer.Option(
+            "--past",
+            metavar="N",
+            min=0,
+            help="Begin with the last N texts that the vehicle keeps; PX4 and ArduPilot keep none.",
+        ),
+    ] = PAST,
 ) -> None:
     """Print the status texts of the vehicle until Ctrl-C.
 
-    A recording's texts are printed at once.
-
-    Examples:
-      gcs messages --level warning
-      gcs --connect flight.tlog messages --json
+    First come those that were sent before the command began, which --count does not count. MAVLink repeats no text:
+    they are read from a file of the vehicle, which only this flight stack has. A recording's texts are printed at once.
     """
     if level.lower() not in LEVELS:
         raise CliError(f"messages: --level {level}: choose one of {', '.join(LEVELS)}", USAGE)
@@ -55,6 +66,8 @@ def messages(
         context, link, takes_recording=True, in_real_time=False, shares=True, several=True
     ) as connection:
         printer = _Printer(connection, output, LEVELS.index(level.lower()), count)
+        if past and not connection.is_recording and len(connection.fleet.sessions) == 1:
+            printer.print_past(fetch_past_texts(connection), past)
         follow(connection, duration, printer.print_new)
 
 
@@ -67,6 +80,17 @@ class _Printer:
         self._least_severe = worst
         self._left = count
         self._seen: dict[int, int] = {}
+        self._kept: set[tuple[int, str]] = set()
+        self._kept_until = 0
+
+    def print_past(self, texts: Sequence[PastText], most: int) -> None:
+        """Print the last ``most`` of the texts that the vehicle keeps."""
+        (number,) = self._connection.fleet.sessions
+        self._kept = {(text.severity, text.text) for text in texts}
+        self._kept_until = self._connection.session.view.text_count  # these came while the file was read
+        shown = [text for text in texts if text.severity <= self._least_severe]
+        for text in shown[-most:]:
+            self._say(number, text.time_s, text.severity, text.text, past=True)
 
     def print_new(self) -> bool:
         """Print the texts that are new; return True once enough are printed."""
@@ -77,21 +101,27 @@ class _Printer:
                 continue
             for entry in session.view.texts_since(self._seen.get(number, 0)):
                 if self._left != 0 and entry.severity <= self._least_severe:
-                    self._print(number, entry, names_system=len(fleet.sessions) > 1)
+                    self._print(number, entry)
             self._seen[number] = session.view.text_count
         return self._left == 0
 
-    def _print(self, system: int, entry: StatusText, names_system: bool) -> None:
-        severity = LEVELS[min(entry.severity, len(LEVELS) - 1)]
-        at = "" if entry.vehicle_time_s is None else f"{entry.vehicle_time_s:.1f} s  "
-        name = f"system {system}  " if names_system else ""
-        self._output.say(
-            "message",
-            f"{at}{name}{severity}: {entry.text}",
-            time_s=entry.vehicle_time_s,
-            system=system,
-            severity=severity,
-            text=entry.text,
-        )
+    def _print(self, system: int, entry: StatusText) -> None:
+        if entry.number < self._kept_until and (entry.severity, entry.text) in self._kept:
+            return
+        self._say(system, entry.vehicle_time_s, entry.severity, entry.text, past=False)
         if self._left is not None:
             self._left -= 1
+
+    def _say(self, system: int, time_s: float | None, severity: int, text: str, *, past: bool) -> None:
+        name = LEVELS[min(severity, len(LEVELS) - 1)]
+        at = "" if time_s is None else f"{time_s:.1f} s  "
+        sender = f"system {system}  " if len(self._connection.fleet.sessions) > 1 else ""
+        self._output.say(
+            "message",
+            f"{at}{sender}{name}: {text}",
+            time_s=time_s,
+            system=system,
+            severity=name,
+            text=text,
+            past=past,
+        )

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.core.errors import ConfigError
@@ -17,12 +16,11 @@ from flightstack.process.command_line import IN_OUTPUT, expand_options, make_app
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.output import Output
 from gcs_cli.plans.check import plan_problems
-from gcs_cli.plans.drawing import draw, places_of
 from gcs_cli.plans.formats.files import DEFAULT_ALTITUDE_M, SUFFIXES, check_suffix, load_any, save_any
 from gcs_cli.plans.itinerary import home_of_items, itinerary
-from gcs_cli.plans.page import plan_page
 from gcs_cli.plans.table import item_facts, itinerary_facts, mission_table, places_table, totals
 from gcs_cli.settings import JsonOption, LinkOptions, OverwriteOption, output_of
+from gcs_cli.tables import table_console
 from gcs_cli.transfers.plan_files import OPTIONAL_PLAN, AltitudeOption, AnyPlanArgument
 from gcs_cli.transfers.plan_parts import plan_parts
 from gcs_cli.transfers.plan_transfers import say_lost
@@ -32,7 +30,6 @@ from gcs_cli.vehicle_link import connect_vehicle
 app = make_app(add_completion=False)
 
 _DRAWING_ROWS = 20
-_WIDE = 150  # columns of a table in a pipe or file
 VehicleOption = Annotated[
     bool, typer.Option("--vehicle", help="Use the plan, geofence and parameters of the vehicle.")
 ]
@@ -137,6 +134,8 @@ def show(
     if html is None:
         _print_plan(plan, home, output_of(context, link))
         return
+    from gcs_cli.plans.page import plan_page  # noqa: PLC0415  # Jinja2
+
     problems = [f"{problem.part}: {problem.reason}" for problem in plan_problems(plan, home)]
     page = plan_page(name, plan, itinerary(plan.items, home), home, problems)
     try:
@@ -156,9 +155,7 @@ def _print_plan(plan: Plan, home: GeoPoint, output: Output) -> None:
                 output.say("item", "", part=part.name, **item_facts(seq, item, stop))
         output.say("plan", "", items=len(plan.items), **itinerary_facts(flight))
         return
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=_WIDE)
+    console = table_console()
     console.print(mission_table(plan.items, flight) if plan.items else "no mission")
     for part in plan_parts(plan)[1:]:
         if part.items:
@@ -168,4 +165,6 @@ def _print_plan(plan: Plan, home: GeoPoint, output: Output) -> None:
         console.print(f"\n{totals(flight)}\n", highlight=False)
     if plan.items or plan.fence or plan.rally:
         width = min(shutil.get_terminal_size((80, 24)).columns - 1, 100)
+        from gcs_cli.plans.drawing import draw, places_of  # noqa: PLC0415  # NumPy
+
         console.print(draw(places_of(plan, flight, home), width, _DRAWING_ROWS).text())

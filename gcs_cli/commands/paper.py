@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import webbrowser
 from pathlib import Path
 from typing import Annotated
@@ -46,6 +47,8 @@ def paper(
     A few minutes: report.html has verdicts, figures and tables, figures/ the figures as PDF and SVG, results.json the
     numbers, the same in each run.
     """
+    # a second thread of BLAS waits actively between the small matrices here; read at the first import of NumPy
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from gcs_cli.experiments.paper.printed import print_results
     from gcs_cli.experiments.paper.run import HTML_NAME, PaperOptions, run
     from gcs_cli.fly.fly_display import FlyConsole

@@ -8,25 +8,28 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.mavlink.param_values import Parameter
 from flightstack.params.param_file import is_parameter_name
 from flightstack.process.command_line import expand_options, make_app
-from gcs_cli.errors import USAGE, CliError
+from gcs_cli.commands.asking import YesOption, confirm_if_armed
+from gcs_cli.completion import parameter_names
+from gcs_cli.errors import FAILED, USAGE, CliError, VehicleLostError
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
 from gcs_cli.output import Output
 from gcs_cli.settings import LinkOptions, OverwriteOption, output_of
+from gcs_cli.tables import table_console
 from gcs_cli.transfers import param_calls
 from gcs_cli.vehicle.param_info import UNKNOWN, ParamInfo, load_parameters, render_parameters
-from gcs_cli.vehicle.param_search import search_parameters
+from gcs_cli.vehicle.param_search import near_names, search_parameters
 from gcs_cli.vehicle.param_table import (
     change_line,
     description,
     facts,
     is_changed,
+    is_pattern,
     matching,
     parameter_table,
 )
@@ -34,8 +37,10 @@ from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
 
-NameArgument = Annotated[str, typer.Argument(metavar="NAME", show_default=False)]
-_WIDE = 200  # columns of a pipe or file
+_MOST_NEAR = 3
+NameArgument = Annotated[
+    str, typer.Argument(metavar="NAME", show_default=False, autocompletion=parameter_names)
+]
 
 
 @app.command("list")
@@ -84,16 +89,51 @@ def search(
 def get(
     context: typer.Context,
     link: LinkOptions,
-    names: Annotated[list[str], typer.Argument(metavar="NAME...", show_default=False)],
+    names: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="NAME...",
+            help="Names or patterns: 'MPC_*'.",
+            show_default=False,
+            autocompletion=parameter_names,
+        ),
+    ],
 ) -> None:
     """Show parameters with their metadata."""
     with connect_vehicle(context, link) as connection:
-        parameters = [param_calls.fetch(connection, name.upper()) for name in names]
+        parameters = _fetch_matching(connection, names)
         infos = param_calls.fetch_metadata(connection)
     output = output_of(context, link)
     for parameter in parameters:
         info = infos.get(parameter.name, UNKNOWN)
         output.say("parameter", description(parameter, info), **facts(parameter, infos))
+
+
+def _fetch_matching(connection: Connection, names: Sequence[str]) -> list[Parameter]:
+    """Return the parameters with these names or patterns, each once; raise CliError."""
+    found: dict[str, Parameter] = {}
+    present = param_calls.fetch_all(connection) if any(map(is_pattern, names)) else ()
+    for name in names:
+        matches = matching(present, name) if is_pattern(name) else [_fetch(connection, name)]
+        if not matches:
+            raise CliError(f"no parameter matches {name}")
+        found.update({parameter.name: parameter for parameter in matches})
+    return list(found.values())
+
+
+def _fetch(connection: Connection, name: str) -> Parameter:
+    """Return one parameter; raise CliError that suggests similar names if the vehicle has no such parameter."""
+    try:
+        return param_calls.fetch(connection, name.upper())
+    except VehicleLostError:
+        raise
+    except CliError as error:
+        if error.exit_code != FAILED:
+            raise
+        near = near_names(name, param_calls.fetch_all(connection))[:_MOST_NEAR]
+        if not near:
+            raise
+        raise CliError(f"{error}; did you mean {' or '.join(near)}?") from None
 
 
 @app.command("set", context_settings={"ignore_unknown_options": True})  # a value may be negative
@@ -107,7 +147,7 @@ def set_parameter(
     """Set a parameter."""
     number = _number(value)
     with connect_vehicle(context, link) as connection:
-        before = param_calls.fetch(connection, name.upper())
+        before = _fetch(connection, name)
         after = param_calls.change(connection, name.upper(), number)
         infos = param_calls.fetch_metadata(connection)
     _say_change(output_of(context, link), before, after, infos)
@@ -130,14 +170,22 @@ def _say_change(output: Output, before: Parameter, after: Parameter, infos: dict
 def reset(
     context: typer.Context,
     link: LinkOptions,
-    names: Annotated[list[str] | None, typer.Argument(metavar="[NAME]...", show_default=False)] = None,
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NAME]...", show_default=False, autocompletion=parameter_names),
+    ] = None,
     everything: Annotated[bool, typer.Option("--all", help="All parameters.")] = False,
+    yes: YesOption = False,
 ) -> None:
-    """Reset parameters to their defaults."""
+    """Reset parameters to their defaults.
+
+    With --all, if the vehicle is armed, asks first on a terminal; elsewhere it needs --yes.
+    """
     if bool(names) == everything:
         raise CliError("reset: expected names of parameters, or --all", USAGE)
     with connect_vehicle(context, link) as connection:
         if everything:
+            confirm_if_armed(connection, "all its parameters will be reset", yes)
             connection.command(calls.RESET_PARAMETERS, "reset of all parameters")
             output_of(context, link).say("reset", "all parameters have their defaults")
         else:
@@ -173,10 +221,15 @@ def load(
     file: Annotated[
         Path, typer.Argument(help="A file of `gcs param save` or of QGroundControl.", show_default=False)
     ],
+    yes: YesOption = False,
 ) -> None:
-    """Set the parameters that a file has; the others stay as they are."""
+    """Set the parameters that a file has; the others stay as they are.
+
+    If the vehicle is armed, asks first on a terminal; elsewhere it needs --yes.
+    """
     wanted = load_parameters(file)
     with connect_vehicle(context, link) as connection:
+        confirm_if_armed(connection, f"its parameters will be those of {file}", yes)
         present = {parameter.name: parameter for parameter in param_calls.fetch_all(connection)}
         result = param_calls.change_all(connection, wanted, present)
     changed = len(result.changed)
@@ -224,7 +277,7 @@ def diff(
 def _reset_some(connection: Connection, names: Iterable[str], output: Output) -> None:
     infos = param_calls.fetch_metadata(connection)
     for name in names:
-        before = param_calls.fetch(connection, name)
+        before = _fetch(connection, name)
         info = infos.get(name, UNKNOWN)
         if info.default is None:
             raise CliError(f"{name}: the vehicle does not send its default: use `gcs param set {name} VALUE`")
@@ -239,10 +292,7 @@ def _show(
         for parameter in parameters:
             output.say("parameter", "", **facts(parameter, infos))
         return
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=_WIDE)
-    console.print(parameter_table(parameters, infos, compared))
+    table_console().print(parameter_table(parameters, infos, compared))
 
 
 def _number(text: str) -> float:

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import json
 import sys
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich import box
-from rich.console import Console
-from rich.table import Table
 
 from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.errors import NO_ANSWER, CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.subscription import LOOP_TIMING
 from gcs_cli.settings import JsonOption, LinkOptions, link_options
-from gcs_cli.tui.panels import number
+from gcs_cli.tables import new_table, table_console
+from gcs_cli.vehicle.numbers import number
 from gcs_cli.vehicle.view_types import LoopTiming
 from gcs_cli.vehicle_link import connect_vehicle
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 app = make_app(add_completion=False)
 
@@ -62,7 +63,7 @@ def _show(timing: LoopTiming, as_json: bool) -> None:
     if as_json:
         print(json.dumps(timing._asdict()), flush=True)
         return
-    Console().print(timing_table(timing))
+    table_console().print(timing_table(timing))
     sys.stdout.flush()
 
 
@@ -72,7 +73,7 @@ def timing_table(timing: LoopTiming) -> Table:
     factor = f", {timing.real_time_factor:.1f}× real time" if timing.real_time_factor else ""
     title = f"inner {number(timing.inner_hz, 0)} Hz, outer {number(timing.outer_hz, 0)} Hz, {clock}{factor}"
     period_us = 1e6 / timing.inner_hz if timing.inner_hz else None
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+    table = new_table(title=title, title_justify="left")
     table.add_column("last 4096 ticks")
     for name in ("mean", "p99", "max"):
         table.add_column(f"{name} µs", justify="right")

@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from flightstack.plan import MissionType
-from gcs_cli.commands.plan_part import make_part_app
+from gcs_cli.commands.plan_commands import make_part_app
 
 app = make_part_app(MissionType.RALLY)

@@ -33,10 +33,6 @@ def record(
 
     The telemetry log holds both directions, those of other ground stations that share this link too. It is readable
     while it grows; QGroundControl, MAVProxy and `gcs --connect FILE.tlog` play it.
-
-    Examples:
-      gcs record flight.tlog
-      gcs --connect serial:/dev/ttyACM0 record bench.tlog --duration 60
     """
     output = output_of(context, link)
     if file.suffix.lower() != ".tlog":

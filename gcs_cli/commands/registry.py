@@ -146,7 +146,7 @@ class LogGroup(LazyGroup):
         "download": LazyCommand(_LOG, "Download a log, or all of them."),
         "erase": LazyCommand(_LOG, "Erase all logs but the one that is being written."),
         "info": LazyCommand(_LOG_FILE, "Show what a log holds."),
-        "plot": LazyCommand(_LOG_FILE, "Plot fields of a log."),
+        "plot": LazyCommand("gcs_cli.commands.log_plot", "Plot fields of a log."),
         "export": LazyCommand(_LOG_FILE, "Export a log as CSV, Parquet, MCAP or Rerun."),
         "draw": LazyCommand("gcs_cli.commands.log_draw", "Draw a flight: pictures, a film, or a window."),
     }

@@ -41,7 +41,8 @@ def replay(
 ) -> None:
     """Replay a log as a vehicle that any client can watch.
 
-    It sends heartbeats, attitude, position, battery, mode and texts to the ports of a vehicle, and refuses commands.
+    It sends heartbeats, attitude, position, battery, mode, mission and texts to the ports of a vehicle, and refuses
+    commands. The items of the mission are those in the tlog, or in the tlog of the flight's directory.
     With --instance it has the ports and the system id of that instance.
     Keys: space pauses, left and right seek by 10 s, up and down change the speed, home restarts, q ends.
     """

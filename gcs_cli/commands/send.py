@@ -45,11 +45,6 @@ def send(
 
     Enumerations may be given by name, flags joined by |, arrays with commas. A COMMAND_LONG or COMMAND_INT waits for
     the vehicle's answer. Put -- before the message if a value begins with a dash.
-
-    Examples:
-      gcs send COMMAND_LONG command=DO_SET_SERVO param1=9 param2=1500
-      gcs send STATUSTEXT severity=INFO text=hello
-      gcs send MANUAL_CONTROL z=500 --rate 20 --count 100
     """
     output = output_of(context, link)
     words = tuple(fields or ())

@@ -6,7 +6,6 @@ import contextlib
 import os
 import shlex
 import sys
-import threading
 from collections.abc import Iterable, Iterator
 from importlib import import_module
 from pathlib import Path
@@ -16,6 +15,7 @@ import typer
 
 from flightstack.process.command_line import UsageError, expand_options, make_app
 from flightstack.process.console import complain
+from gcs_cli.commands.asking import kept_alive
 from gcs_cli.ending import run_command
 from gcs_cli.errors import DONE, USAGE, CliError
 from gcs_cli.link.connection import Connection
@@ -26,7 +26,6 @@ app = make_app(add_completion=False)
 
 _ENDS = ("exit", "quit")
 _HISTORY_LINES = 1000
-_STEP_S = 0.1
 
 
 @app.command()
@@ -43,11 +42,6 @@ def shell(
 
     Each line is a command without `gcs`; # begins a comment. A script, -c, or standard input that is no terminal ends
     at the first command that fails, with its exit code. A terminal has history and completion; `exit` or Ctrl-D ends.
-
-    Examples:
-      gcs shell
-      gcs shell -c arm -c 'takeoff --alt 5'
-      gcs --system 2 shell checks.gcs
     """
     if script is not None and command:
         raise CliError("shell: give a SCRIPT or -c, not both", USAGE)
@@ -130,7 +124,7 @@ def _interact(runner: _Runner, connection: Connection) -> int:
     with _line_editing(runner.command):
         while True:
             try:
-                with _running(connection):
+                with kept_alive(connection):
                     line = input(_prompt(connection))
             except EOFError:
                 print()
@@ -153,24 +147,6 @@ def _prompt(connection: Connection) -> str:
         else f"{view.mode or ''} {'armed' if view.armed else 'disarmed'}"
     )
     return f"{view.identity.system_id} {state}> "
-
-
-@contextlib.contextmanager
-def _running(connection: Connection) -> Iterator[None]:
-    """Exchange messages in a thread while the user types: without heartbeats the vehicle would lose the link."""
-    stopped = threading.Event()
-
-    def run() -> None:
-        while not stopped.is_set():
-            connection.step(connection.now_s + _STEP_S)
-
-    thread = threading.Thread(target=run, daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        stopped.set()
-        thread.join()
 
 
 @contextlib.contextmanager

@@ -8,35 +8,39 @@ from typing import Any
 import typer
 
 from flightstack.process.command_line import expand_options, make_app
+from gcs_cli.link.perform import request_reached
 from gcs_cli.link.quality import LinkQuality
-from gcs_cli.link.subscription import ROTORS_AND_TIMING
+from gcs_cli.link.snapshot import Snapshot
 from gcs_cli.settings import LinkOptions, output_of
+from gcs_cli.vehicle.numbers import UNKNOWN, number
 from gcs_cli.vehicle.view_types import VehicleView
 from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
 
-GATHER_S = 0.5
-"""Longest wait for the values after the first heartbeat; a vehicle may not send all of them."""
+GATHER_S = 0.35
+"""Longest wait for the values after the 0.1 s in which other vehicles are noticed; a request may be lost."""
+_OF_RECORDING_S = 5.0
+"""The same for a recording, whose time does not pass; messages come every 2 s."""
+_LANDED = {1: "on ground", 2: "in air", 3: "taking off", 4: "landing"}
 
 
 @app.command()
 @expand_options
 def status(context: typer.Context, link: LinkOptions) -> None:
-    """Show the state of the vehicle.
-
-    Examples:
-      gcs status
-      gcs --connect tcp:127.0.0.1:5760 status --json
-    """
+    """Show the state of the vehicle."""
     with connect_vehicle(context, link, takes_recording=True, in_real_time=False) as connection:
         session = connection.session
-        session.subscribe(ROTORS_AND_TIMING)
-        # most messages come several times a second; values that the vehicle does not send stay unknown
-        connection.wait_for(lambda: _is_full(session.view), GATHER_S)
-        facts = {**status_facts(session.view), **_link_facts(session.quality)}
-    lines = [f"{name:<20} {_shown(value)}" for name, value in facts.items()]
-    output_of(context, link).say("status", "\n".join(lines), **facts)
+        snapshot = Snapshot(lambda: session.view)
+        session.attach(snapshot)
+        request_reached(connection)
+        connection.wait_for(
+            lambda: snapshot.complete, _OF_RECORDING_S if connection.is_recording else GATHER_S
+        )
+        session.detach(snapshot)
+        view, quality = session.view, session.quality
+    sentence = "\n".join(f"{name:<12}{text}" for name, text in status_lines(view, quality))
+    output_of(context, link).say("status", sentence, **status_facts(view), **_link_facts(quality))
 
 
 def _link_facts(quality: LinkQuality) -> dict[str, Any]:
@@ -45,18 +49,6 @@ def _link_facts(quality: LinkQuality) -> dict[str, Any]:
         "link_loss": None if loss is None else round(loss, 4),
         "round_trip_s": None if round_trip_s is None else round(round_trip_s, 6),
     }
-
-
-def _is_full(view: VehicleView) -> bool:
-    known = (
-        view.attitude,
-        view.position_ned_m,
-        view.geo,
-        view.mission.current,
-        view.timing,
-        view.rotor_rpm or None,
-    )
-    return all(part is not None for part in known) and view.landed_state != 0
 
 
 def status_facts(view: VehicleView) -> dict[str, Any]:
@@ -68,7 +60,7 @@ def status_facts(view: VehicleView) -> dict[str, Any]:
         "type": None if view.identity is None else view.identity.kind,
         "mode": view.mode,
         "armed": view.armed,
-        "landed": {1: "on ground", 2: "in air", 3: "taking off", 4: "landing"}.get(view.landed_state),
+        "landed": _LANDED.get(view.landed_state),
         "time_s": view.time_s,
         "euler_deg": None if attitude is None else [round(math.degrees(a), 3) for a in attitude],
         "pos_ned_m": _rounded(view.position_ned_m),
@@ -92,9 +84,58 @@ def _rounded(values: tuple[float, ...] | None) -> list[float] | None:
     return None if values is None else [round(value, 4) for value in values]
 
 
-def _shown(value: Any) -> str:
-    if value is None or value == []:
-        return "—"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return "  ".join(str(part) for part in value) if isinstance(value, list) else str(value)
+def status_lines(view: VehicleView, quality: LinkQuality) -> list[tuple[str, str]]:
+    """Return the values for people: names and texts with units, rounded; a dash for unknown values."""
+    identity, attitude, geo, timing = view.identity, view.attitude, view.geo, view.timing
+    angles = None if attitude is None else tuple(math.degrees(angle) for angle in attitude)
+    remaining = None if view.battery is None else view.battery.remaining
+    place = (
+        None
+        if geo is None
+        else f"{geo.latitude_deg:.7f}°, {geo.longitude_deg:.7f}°, {geo.altitude_m:.1f} m above sea level"
+    )
+    loops = None if timing is None else f"{number(timing.inner_hz, 0)} Hz, {timing.overruns} overruns"
+    lines = {
+        "vehicle": None if identity is None else f"{identity.kind}, system {identity.system_id}",
+        "mode": view.mode,
+        "armed": "yes" if view.armed else "no",
+        "landed": _LANDED.get(view.landed_state),
+        "time": None if view.time_s is None else f"{view.time_s:.1f} s",
+        "attitude": _parts(angles, ("roll", "pitch", "yaw"), 1, "°"),
+        "position": _parts(view.position_ned_m, ("north", "east", "down"), 2, " m"),
+        "velocity": _parts(view.velocity_ned_m_s, ("north", "east", "down"), 2, " m/s"),
+        "place": place,
+        "mission": _mission_text(view),
+        "battery": None if remaining is None else f"{100.0 * remaining:.0f} %",
+        "rotors": ", ".join(number(rpm, 0) for rpm in view.rotor_rpm) + " rpm" if view.rotor_rpm else None,
+        "inner loop": loops,
+        "link": _link_text(quality),
+    }
+    texts = [("text", entry.text) for entry in view.texts]
+    return [*((name, text or UNKNOWN) for name, text in lines.items()), *texts]
+
+
+def _parts(values: tuple[float, ...] | None, names: tuple[str, ...], digits: int, unit: str) -> str | None:
+    if values is None:
+        return None
+    return ", ".join(
+        f"{name} {number(value, digits, unit)}" for name, value in zip(names, values, strict=True)
+    )
+
+
+def _mission_text(view: VehicleView) -> str | None:
+    mission = view.mission
+    if mission.current is None:
+        return None
+    if not mission.total:
+        return "none"
+    reached = "" if mission.reached is None else f", item {mission.reached} reached"
+    return f"item {mission.current} of 0 to {mission.total - 1}{reached}" + (
+        ", complete" if mission.complete else ""
+    )
+
+
+def _link_text(quality: LinkQuality) -> str | None:
+    loss = None if quality.loss is None else f"loss {100.0 * quality.loss:.1f} %"
+    trip = None if quality.round_trip_s is None else f"round trip {1e3 * quality.round_trip_s:.1f} ms"
+    return ", ".join(text for text in (loss, trip) if text) or None

@@ -6,12 +6,21 @@ from typing import Annotated
 
 import typer
 
+from flightstack.mavlink.dialect import mavlink
 from flightstack.process.command_line import expand_options, make_app
-from gcs_cli.actions.conditions import ConditionError, ViewCondition, choices, parse_condition
+from gcs_cli.actions.conditions import (
+    COMPLETE,
+    Completion,
+    ConditionError,
+    ViewCondition,
+    choices,
+    parse_condition,
+)
 from gcs_cli.actions.on_vehicle import find_mode, mode_choices
 from gcs_cli.errors import NO_ANSWER, USAGE, CliError, VehicleLostError
+from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
-from gcs_cli.link.perform import ask_modes
+from gcs_cli.link.perform import ask_modes, request_reached
 from gcs_cli.output import Output
 from gcs_cli.settings import LinkOptions, link_options, output_of
 from gcs_cli.vehicle_link import connect_vehicle
@@ -19,6 +28,8 @@ from gcs_cli.vehicle_link import connect_vehicle
 app = make_app(add_completion=False)
 
 DEFAULT_TIMEOUT_S = 60.0
+_CURRENT_S = 2.0
+"""Longest wait for MISSION_CURRENT, which a vehicle without a mission may not send."""
 
 
 @app.command()
@@ -41,6 +52,8 @@ def wait(
     timeout_s = DEFAULT_TIMEOUT_S if given is None else given
     with connect_vehicle(context, link) as connection:
         _check_modes(connection, wanted)
+        request_reached(connection)
+        wanted = [_informed(connection, condition) for condition in wanted]
         wait_for(connection, wanted, timeout_s, output_of(context, link))
 
 
@@ -62,6 +75,19 @@ def _check_modes(connection: Connection, wanted: list[ViewCondition]) -> None:
                 raise CliError(
                     f"wait {condition.text}: the vehicle has no such mode; choose one of {names}", USAGE
                 )
+
+
+def _informed(connection: Connection, condition: ViewCondition) -> ViewCondition:
+    """Return ``complete`` with what it needs of a vehicle that does not report the state of its mission."""
+    if condition.text != COMPLETE:
+        return condition
+    session = connection.session
+    connection.wait_for(lambda: session.view.mission.current is not None, _CURRENT_S)
+    mission = session.view.mission
+    is_unknown = mission.state is None and mission.total is not None and not connection.is_recording
+    items = connection.complete(calls.download(session), "wait complete").items if is_unknown else ()
+    returns = bool(items) and items[-1].command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH
+    return condition._replace(holds=Completion(returns).holds)
 
 
 def wait_for(connection: Connection, wanted: list[ViewCondition], timeout_s: float, output: Output) -> None:

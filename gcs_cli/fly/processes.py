@@ -11,9 +11,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, Protocol, TypeVar
 
-from flightstack.process.command_line import own_program
+from flightstack.process.supervised import supervised
 
-_SUPERVISOR = "flightstack.process.supervised"
 _TAIL_BYTES = 4096
 _POLL_S = 0.02
 _NOTICE = re.compile(r"\S+: (warning: |compiling )|.*\wWarning: ")
@@ -64,19 +63,17 @@ def culprit(processes: Sequence[P]) -> P | None:
 class Child:
     """One child process, in a session of its own, which Ctrl-C on the terminal does not reach.
 
-    With ``supervised`` its standard input is a pipe that closes at the latest when this process ends.
+    Its standard input is a pipe that closes at the latest when this process ends.
     """
 
-    def __init__(
-        self, name: str, arguments: Sequence[str], log_path: Path, *, supervised: bool = False
-    ) -> None:
+    def __init__(self, name: str, arguments: Sequence[str], log_path: Path) -> None:
         self.name = name
         self._log_path = log_path
         self._read = 0
         with log_path.open("wb") as log:
             self._process = subprocess.Popen(
                 arguments,
-                stdin=subprocess.PIPE if supervised else subprocess.DEVNULL,
+                stdin=subprocess.PIPE,
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
@@ -131,27 +128,23 @@ class Child:
         """Send SIGKILL and wait."""
         self._process.kill()
         self._process.wait()
-        if self._process.stdin is not None:
-            self._process.stdin.close()
+        assert self._process.stdin is not None
+        self._process.stdin.close()
 
 
 class Children:
-    """The children of a run. Leaving the ``with`` block ends them all.
+    """The children of a run. Leaving the ``with`` block ends them all, and so does the end of this process.
 
     The last one started is stopped first: it depends on those before it.
     """
 
-    def __init__(self, folder: Path, *, supervised: bool = False) -> None:
-        """With ``supervised`` the children end with this process, also if it is killed."""
+    def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._supervised = supervised
         self._all: list[Child] = []
 
     def start(self, name: str, module: str, arguments: Sequence[str]) -> Child:
         """Start a Python module of this installation; its output goes to ``<name>.log``."""
-        command = (_SUPERVISOR, module) if self._supervised else (module,)
-        log = self._folder / f"{name}.log"
-        child = Child(name, own_program(*command, *arguments), log, supervised=self._supervised)
+        child = Child(name, supervised(module, *arguments), self._folder / f"{name}.log")
         self.add(child)
         return child
 

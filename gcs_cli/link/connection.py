@@ -15,10 +15,10 @@ from flightstack.transports.udp import Address
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError, VehicleLostError
 from gcs_cli.link import calls
 from gcs_cli.link.calls import Answer, Command, Request
-from gcs_cli.link.endpoint import RECORDING, VehicleEndpoint
+from gcs_cli.link.endpoint import LOOPBACK, RECORDING, VehicleEndpoint
 from gcs_cli.link.fleet import Fleet
 from gcs_cli.link.lines import Line
-from gcs_cli.link.opening import SeveralLines, open_line
+from gcs_cli.link.opening import SeveralLines, instances_text, open_line
 from gcs_cli.link.playback import PlaybackLine
 from gcs_cli.link.session import Service, Session
 from gcs_cli.link.share import ShareServer
@@ -238,10 +238,9 @@ class Connection:
                 f"system {foreign}: choose it with --system, or give another address with --connect"
             )
         reason = f" ({self._line.problem})" if self._line.problem else ""
-        return (
-            f"no vehicle {way} {self.endpoint} within {timeout_s:g} s{reason}: start one with `gcs sim`, "
-            "or give its address with --connect"
-        )
+        others = instances_text() if self.endpoint.host == LOOPBACK else ""
+        advice = others or "start one with `gcs sim`, or give its address with --connect"
+        return f"no vehicle {way} {self.endpoint} within {timeout_s:g} s{reason}: {advice}"
 
     def command(self, command: Command, name: str) -> None:
         """Send a command and wait for its answer; raise CliError with the vehicle's reason if it is refused."""

@@ -7,10 +7,12 @@ import socket
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+from flightstack.core.port_numbers import INSTANCES, vehicle_ground_port
 from flightstack.transports.byte_link import LineError
 from flightstack.transports.udp import Address, PortBusyError, UdpSocket, resolve
 from gcs_cli.errors import USAGE, CliError, PortInUseError
 from gcs_cli.link.endpoint import (
+    LOOPBACK,
     SERIAL,
     TCP,
     TCP_IN,
@@ -24,6 +26,7 @@ from gcs_cli.link.lines import Interest, Line, StreamLine, TcpInLine, UdpLine
 LATER_S = 1.2
 """Time in which a vehicle that sends heartbeats is heard."""
 _MOST_PEERS = 256
+_MOST_NAMED = 8
 
 
 def open_line(endpoint: VehicleEndpoint) -> Line:
@@ -65,6 +68,28 @@ def opened_lines(endpoints: Iterable[VehicleEndpoint]) -> dict[VehicleEndpoint, 
             else:
                 lines[endpoint] = line
     return lines
+
+
+def running_instances() -> list[int]:
+    """Return the instances of vehicles on this machine: those whose port for ground stations is in use."""
+    found = []
+    for instance in range(INSTANCES):
+        try:
+            UdpSocket(LOOPBACK, vehicle_ground_port(instance)).close()
+        except PortBusyError as error:
+            found += [instance] * error.is_in_use
+    return found
+
+
+def instances_text() -> str:
+    """Return the advice to use a vehicle that runs on this machine as another instance; empty without one."""
+    found = running_instances()
+    if not found:
+        return ""
+    numbers = ", ".join(map(str, found[:_MOST_NAMED])) + (" …" if len(found) > _MOST_NAMED else "")
+    if len(found) == 1:
+        return f"instance {numbers} runs on this machine: choose it with --instance {numbers}"
+    return f"instances {numbers} run on this machine: choose one with --instance"
 
 
 def _resolved(host: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from flightstack.mavlink.dialect import mavlink
 from gcs_cli.actions.action import Action
 from gcs_cli.actions.run import ActionRun, Outcome, Result
 from gcs_cli.clients.mode_client import ModeClient
@@ -62,3 +63,13 @@ def ask_modes(connection: Connection) -> bool:
     client = ModeClient(lambda: session.view, session.own, connection.now_s)
     connection.run(client, "list of modes")
     return bool(client.result)
+
+
+def request_reached(connection: Connection) -> None:
+    """Request MISSION_ITEM_REACHED, and do not wait for it: other vehicles than this project's send it once only."""
+    if not connection.is_recording:
+        number, rest = float(mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED), (0.0,) * 6
+        request = mavlink.MAV_CMD_REQUEST_MESSAGE
+        connection.send(
+            mavlink.MAVLink_command_long_message(*connection.session.target, request, 0, number, *rest)
+        )

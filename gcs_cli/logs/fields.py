@@ -41,11 +41,17 @@ def all_fields(recording: Recording) -> list[Field]:
 def find_fields(recording: Recording, wanted: str) -> list[Field]:
     """Return the fields that ``wanted`` names; raise CliError (usage) if none or too many.
 
-    In this order: ``topic.field``; all elements of ``topic.array``; a pattern with ``*`` or ``?``; the only field that
-    ends with the text; the only field that has its parts in this order. Case does not matter.
+    In this order: all fields of ``topic``; ``topic.field``; all elements of ``topic.array``; a pattern with ``*`` or
+    ``?``; the only field that ends with the text; the only field that has its parts in this order. Case does not
+    matter.
     """
     fields = all_fields(recording)
     text = wanted.strip().lower()
+    if of_topic := [field for field in fields if field.topic.name.lower() == text]:
+        if len(of_topic) <= MOST_FIELDS:
+            return of_topic
+        names = ", ".join(field.name for field in of_topic)
+        raise CliError(f"{wanted}: has {len(of_topic)} fields, give some of them: {names}", USAGE)
     for found in _matches(fields, text):
         is_unique = len({_base(field) for field in found}) == 1 or bool(_WILDCARDS & set(text))
         if is_unique and len(found) <= MOST_FIELDS:

@@ -8,8 +8,7 @@ from flightstack.core.contract import Vector3
 from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.plan import Plan, Rejection
-from flightstack.plan.fence import fence_areas
-from flightstack.plan.fence_shape import Area
+from flightstack.plan.fence_areas import Area, fence_areas
 
 _SIDES = 48
 Ring = tuple[tuple[float, float], ...]

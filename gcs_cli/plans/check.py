@@ -12,9 +12,6 @@ from flightstack.plan import (
     MissionItem,
     Plan,
     Rejection,
-    check_fence,
-    check_rally,
-    fence_shape,
     mission_rejections,
 )
 from flightstack.plan.check import leg_rejections
@@ -58,14 +55,20 @@ def plan_problems(
     that the flight stack does not, so that only the geofence is checked.
     """
     areas = plan.fence or tuple(fence or ())
-    shape = fence_shape(areas, home)
+    shape = None
+    if areas or plan.rally:
+        from flightstack.plan.fence import check_fence, fence_shape  # noqa: PLC0415  # NumPy
+        from flightstack.plan.rally import check_rally  # noqa: PLC0415
+
+        shape = fence_shape(areas, home)
     if plan.fence:
         yield from _problems("geofence", [check_fence(plan.fence, home)])
     if plan.items and is_foreign:
         yield from _problems("mission", leg_rejections(plan.items, home, shape))
     elif plan.items:
         yield from _problems("mission", mission_rejections(plan.items, home, limits, shape))
-    yield from _problems("list of rally points", [check_rally(plan.rally, home, limits, shape)])
+    if plan.rally:
+        yield from _problems("list of rally points", [check_rally(plan.rally, home, limits, shape)])
 
 
 def _problems(part: str, rejections: Iterator[Rejection] | list[Rejection | None]) -> Iterator[Problem]:

@@ -11,7 +11,7 @@ import numpy as np
 from flightstack.core.contract import FloatArray
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.plan import Plan, Rejection
-from flightstack.plan.fence import fence_areas
+from flightstack.plan.fence_areas import fence_areas
 from gcs_cli.plans.itinerary import Itinerary
 from gcs_cli.tui.canvas import DASHED, DOTS_X, DOTS_Y, Canvas, circle_vertices
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
-
-from rich import box
-from rich.table import Table
-from rich.text import Text
+from typing import TYPE_CHECKING, Any
 
 from flightstack.plan import Command, MissionItem
 from gcs_cli.plans.itinerary import Itinerary, Stop
 from gcs_cli.plans.names import any_command_name
+from gcs_cli.tables import new_table
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 
 def item_facts(seq: int, item: MissionItem, stop: Stop | None = None) -> dict[str, Any]:
@@ -49,12 +49,12 @@ def itinerary_facts(flight: Itinerary) -> dict[str, Any]:
 
 def mission_table(items: Sequence[MissionItem], flight: Itinerary) -> Table:
     """Return the table of a mission: number, command, position, altitude, leg, heading, time and parameters."""
-    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
+    table = new_table()
     for name in ("item", "command"):
         table.add_column(name, no_wrap=True, justify="right" if name == "item" else "left")
     for name in ("latitude", "longitude", "altitude", "leg", "heading", "time"):
         table.add_column(name, no_wrap=True, justify="right")
-    table.add_column("parameters", overflow="fold")
+    table.add_column("parameters", overflow="fold", style="bright_black")
     stops = {stop.seq: stop for stop in flight.stops}
     for seq, item in enumerate(items):
         stop = stops.get(seq)
@@ -72,14 +72,14 @@ def mission_table(items: Sequence[MissionItem], flight: Itinerary) -> Table:
             else ""
             if stop is None
             else clock(stop.time_s),
-            Text(parameters_text(item), style="bright_black"),
+            parameters_text(item),
         )
     return table
 
 
 def places_table(items: Sequence[MissionItem]) -> Table:
     """Return the table of a geofence or of rally points."""
-    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
+    table = new_table()
     for name in ("item", "command", "latitude", "longitude", "altitude", "parameters"):
         table.add_column(name, no_wrap=True, justify="left" if name == "command" else "right")
     for seq, item in enumerate(items):

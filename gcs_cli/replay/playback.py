@@ -11,6 +11,7 @@ import numpy as np
 from flightstack.mavlink.link import Address, Link, Message
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.logs.tlog_reader import dated_records
+from gcs_cli.replay.logged_plans import LoggedPlans
 
 REPLIES = frozenset({
     "COMMAND_ACK", "PARAM_VALUE", "PARAM_ERROR", "MISSION_COUNT", "MISSION_ITEM", "MISSION_ITEM_INT", "MISSION_REQUEST",
@@ -40,6 +41,9 @@ class Playback(Protocol):
     def version(self) -> Message | None:
         """Return the AUTOPILOT_VERSION, or None if it is unknown."""
 
+    def plan(self, kind: int, at_s: float) -> Sequence[Message]:
+        """Return the items of a MAV_MISSION_TYPE, as ``LoggedPlans.at`` does; none if the log has none."""
+
 
 class TlogPlayback:
     """The autopilot's messages of a tlog, unchanged."""
@@ -49,12 +53,15 @@ class TlogPlayback:
         self.vehicle = Address(*vehicle)
         link, found = Link(0, 0), []
         times = []
+        self._plans = LoggedPlans(vehicle[0])
         for record in dated_records(content):
             times.append(record.time_us)
             for message in link.decode(record.frame):
+                self._plans.take(message, 1e-6 * record.time_us)
                 if (message.get_srcSystem(), message.get_srcComponent()) == vehicle:
                     found.append((record.time_us, message))
         start_us = min(times)
+        self._start_s = 1e-6 * start_us
         self.duration_s = (max(times) - start_us) * 1e-6
         found.sort(key=lambda entry: entry[0])
         own = [(1e-6 * (time_us - start_us), message) for time_us, message in found]
@@ -93,6 +100,10 @@ class TlogPlayback:
     def version(self) -> Message | None:
         """Return the recorded AUTOPILOT_VERSION."""
         return self._newest("AUTOPILOT_VERSION", self.duration_s)
+
+    def plan(self, kind: int, at_s: float) -> Sequence[Message]:
+        """Return the items of the latest transfer in the log."""
+        return self._plans.at(kind, self._start_s + at_s)
 
     def _newest(self, kind: str, at_s: float) -> Message | None:
         entries = self._kinds.get(kind, [])

@@ -7,6 +7,7 @@ import sys
 import time
 from pathlib import Path
 
+from flightstack.mavlink.link import Link
 from flightstack.process.ports import ports_config
 from flightstack.transports.udp import PortBusyError
 from flightstack.transports.vehicle_ports import Place, VehiclePorts
@@ -14,11 +15,14 @@ from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly.processes import Interruption
 from gcs_cli.logs.reader import log_file, read_log
 from gcs_cli.logs.recording import ULOG
+from gcs_cli.logs.tlog_reader import dated_records
 from gcs_cli.output import Output
 from gcs_cli.replay.keys import Keys
+from gcs_cli.replay.logged_plans import LoggedPlans
 from gcs_cli.replay.playback import Playback, TlogPlayback
 from gcs_cli.replay.replay_vehicle import ReplayVehicle
 from gcs_cli.replay.ulog_playback import UlogPlayback
+from gcs_cli.report.run_directory import TLOG_NAME
 
 _STEP_S = 0.02
 _STATUS_S = 0.2
@@ -68,8 +72,20 @@ def playback_of(path: Path) -> Playback:
     """Return the messages of a log; raise CliError (usage)."""
     recording = read_log(path)
     if recording.form == ULOG:
-        return UlogPlayback(recording)
+        return UlogPlayback(recording, _plans_beside(path, recording.vehicle[0]))
     return TlogPlayback(log_file(path).read_bytes(), recording.vehicle)
+
+
+def _plans_beside(path: Path, vehicle: int) -> LoggedPlans | None:
+    """Return the plans in the telemetry log of a flight's directory, if there is one."""
+    tlog = path / TLOG_NAME
+    if not tlog.is_file():
+        return None
+    plans, link = LoggedPlans(vehicle), Link(0, 0)
+    for record in dated_records(tlog.read_bytes()):
+        for message in link.decode(record.frame):
+            plans.take(message, 1e-6 * record.time_us)
+    return plans
 
 
 def replay_log(

@@ -15,6 +15,7 @@ from flightstack.mavlink.fields import whole
 from flightstack.mavlink.ftp_messages import FtpError, FtpMessage, Opcode, Packet, next_sequence, read_packet
 from flightstack.mavlink.link import Link, Message, is_for
 from flightstack.transports.vehicle_ports import Place
+from gcs_cli.replay.logged_plans import item_message
 from gcs_cli.replay.playback import Playback
 
 HEARTBEAT_S = 1.0
@@ -222,7 +223,17 @@ class ReplayVehicle:
 
     def _on_mission_list(self, message: Message, peer: Place) -> None:
         target = message.get_srcSystem(), message.get_srcComponent()
-        self._say(peer, mavlink.MAVLink_mission_count_message(*target, 0, message.mission_type))
+        count = len(self._playback.plan(message.mission_type, self.at_s))
+        self._say(peer, mavlink.MAVLink_mission_count_message(*target, count, message.mission_type))
+
+    def _on_mission_request(self, message: Message, peer: Place) -> None:
+        target = message.get_srcSystem(), message.get_srcComponent()
+        items = self._playback.plan(message.mission_type, self.at_s)
+        if message.seq < len(items):
+            self._say(peer, item_message(items[message.seq], target))
+        else:
+            wrong = mavlink.MAV_MISSION_INVALID_SEQUENCE
+            self._say(peer, mavlink.MAVLink_mission_ack_message(*target, wrong, message.mission_type))
 
     def _on_mission_change(self, message: Message, peer: Place) -> None:
         target = message.get_srcSystem(), message.get_srcComponent()
@@ -253,6 +264,8 @@ _ANSWERS: dict[str, Callable[[ReplayVehicle, Message, Place], None]] = {
     "PARAM_REQUEST_READ": ReplayVehicle._on_parameter_read,
     "PARAM_SET": ReplayVehicle._on_parameter_set,
     "MISSION_REQUEST_LIST": ReplayVehicle._on_mission_list,
+    "MISSION_REQUEST_INT": ReplayVehicle._on_mission_request,
+    "MISSION_REQUEST": ReplayVehicle._on_mission_request,
     "MISSION_COUNT": ReplayVehicle._on_mission_change,
     "MISSION_CLEAR_ALL": ReplayVehicle._on_mission_change,
     "FILE_TRANSFER_PROTOCOL": ReplayVehicle._on_ftp,

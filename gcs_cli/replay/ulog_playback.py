@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,8 @@ from flightstack.mavlink.param_values import value_message
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.logs.motion import Motion, Samples, Source, elements, motion_of, samples
 from gcs_cli.logs.recording import Recording
+from gcs_cli.replay.logged_plans import LoggedPlans
+from gcs_cli.replay.throttle import throttle_of
 
 NAN = math.nan
 _AUTO, _POSITION = 4, 3
@@ -27,6 +30,9 @@ PX4_MODES: Mapping[int, tuple[int, int]] = {
 }  # fmt: skip
 """Main and sub mode of PX4's ``vehicle_status.nav_state``."""
 _ARMED = 2
+_MISSION = 3
+"""``vehicle_status.nav_state`` of a mission."""
+_NO_MISSION = 0xFFFF
 _HEALTH = (
     mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
     | mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG | mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
@@ -49,8 +55,11 @@ class Stream(NamedTuple):
 class UlogPlayback:
     """The flight of a ULog as telemetry: attitude, position, battery, mode, mission, texts, parameters."""
 
-    def __init__(self, recording: Recording) -> None:
-        """Raise CliError (usage) if the log has neither attitude nor position."""
+    def __init__(self, recording: Recording, plans: LoggedPlans | None = None) -> None:
+        """``plans``: those of a tlog of the same flight; a ULog has the progress of the mission, not its items.
+
+        Raise CliError (usage) if the log has neither attitude nor position.
+        """
         self._log = recording
         self._motion: Motion = motion_of(recording)
         if self._motion.attitude.is_empty and self._motion.position.is_empty:
@@ -64,12 +73,17 @@ class UlogPlayback:
         self._status = self._read("vehicle_status", "nav_state", "arming_state")
         self._type = self._read("vehicle_status", "system_type")
         self._landed = self._read("vehicle_land_detected", "landed")
-        self._mission = self._read("mission_result", "seq_current", "seq_total", "seq_reached")
+        self._plans = plans
+        self._mission = self._read("mission_result", "seq_current", "seq_total", "seq_reached", "finished")
+        self._throttle = throttle_of(recording)
         self._setpoint = self._read(
             "trajectory_setpoint", *elements("position", 3), *elements("velocity", 3), "yaw"
         )
         self._attitude_setpoint = self._read("vehicle_attitude_setpoint", *elements("q_d", 4))
-        self._rotors = self._read("rotor_speeds", *elements("speed_rad_s", _ROTORS))
+        self._rotors = [
+            self._read("rotor_speeds", *elements("speed_rad_s", first + _ROTORS)[first:])
+            for first in (0, _ROTORS)
+        ]
         self._streams = (
             Stream(0.04, self._attitude),
             Stream(0.04, self._quaternion),
@@ -77,7 +91,7 @@ class UlogPlayback:
             Stream(0.1, self._global_position),
             Stream(0.1, self._attitude_target),
             Stream(0.1, self._position_target),
-            Stream(0.2, self._rotor_speeds),
+            *(Stream(0.2, partial(self._rotor_speeds, index)) for index in range(len(self._rotors))),
             Stream(0.2, self._hud),
             Stream(0.2, self._satellites),
             Stream(0.5, self._extended_state),
@@ -87,6 +101,7 @@ class UlogPlayback:
             Stream(1.0, self._home),
             Stream(1.0, self._system_time),
         )
+        self._reached = self._reached_items()
         self._text_s = np.array([recording.since_start_s(text.time_us) for text in recording.texts])
         names = sorted(recording.parameters)
         self.parameters: Sequence[Message] = [
@@ -115,12 +130,14 @@ class UlogPlayback:
             content = text.text.encode("ascii", "replace")[:50]
             message = mavlink.MAVLink_statustext_message(text.severity, content)
             due.append((float(self._text_s[index]), len(self._streams) + index, message))
+        due += [(at_s, -1, message) for at_s, message in self._reached if begin_s < at_s <= end_s]
         return [message for *_, message in sorted(due, key=lambda entry: entry[:2])]
 
     def state(self, at_s: float) -> Sequence[Message]:
-        """Return the newest message of each stream."""
+        """Return the newest message of each stream, and of the last reached item."""
         made = (stream.make(at_s) for stream in self._streams)
-        return [message for message in made if message is not None]
+        reached = [message for reached_s, message in self._reached if reached_s <= at_s]
+        return [*(message for message in made if message is not None), *reached[-1:]]
 
     def heartbeat(self, at_s: float) -> Message:
         """Return HEARTBEAT with PX4's mode."""
@@ -151,6 +168,10 @@ class UlogPlayback:
         return mavlink.MAVLink_autopilot_version_message(
             capabilities, whole(release, 0, 0xFFFF_FFFF), 0, 0, 0, none, none, none, 0, 0, 0
         )
+
+    def plan(self, kind: int, at_s: float) -> Sequence[Message]:
+        """Return the items of the last transfer in the tlog of the flight."""
+        return () if self._plans is None else self._plans.at(kind, math.inf)
 
     # -- values
 
@@ -232,12 +253,12 @@ class UlogPlayback:
             self._boot_ms(at_s), frame, 0, *motion, NAN, NAN, NAN, yaw, NAN
         )
 
-    def _rotor_speeds(self, at_s: float) -> Message | None:
-        speeds = self._known(self._rotors, at_s)
+    def _rotor_speeds(self, index: int, at_s: float) -> Message | None:
+        speeds = self._known(self._rotors[index], at_s)
         if speeds is None:
             return None
         rpm = [int32(_RPM_PER_RAD_S * speed) for speed in speeds.tolist()]
-        return EscStatus(0, round(self._time_us(at_s)), rpm, [NAN] * _ROTORS, [NAN] * _ROTORS)
+        return EscStatus(_ROTORS * index, round(self._time_us(at_s)), rpm, [NAN] * _ROTORS, [NAN] * _ROTORS)
 
     def _hud(self, at_s: float) -> Message | None:
         velocity = self._known(self._motion.velocity, at_s)
@@ -246,7 +267,9 @@ class UlogPlayback:
         north, east, down = velocity.tolist()
         yaw, (above_sea_m, _) = self._yaw_deg(at_s), self._altitudes_m(at_s)
         heading = 0 if math.isnan(yaw) else whole(yaw, 0, 359)
-        return mavlink.MAVLink_vfr_hud_message(NAN, math.hypot(north, east), heading, 0, above_sea_m, -down)
+        throttle = whole(100.0 * self._at(self._throttle, at_s, (0.0,))[0], 0, 100)
+        speed = math.hypot(north, east)
+        return mavlink.MAVLink_vfr_hud_message(NAN, speed, heading, throttle, above_sea_m, -down)
 
     def _satellites(self, at_s: float) -> Message | None:
         place = self._known(self._motion.geodetic, at_s)
@@ -293,8 +316,31 @@ class UlogPlayback:
         mission = self._known(self._mission, at_s)
         if mission is None:
             return None
-        current, total, _ = mission.tolist()
-        return mavlink.MAVLink_mission_current_message(whole(current, 0, 0xFFFF), whole(total, 0, 0xFFFF))
+        current, total, reached, finished = mission.tolist()
+        nav_state, arming_state = self._at(self._status, at_s, (NAN, NAN))
+        if not total:
+            state = mavlink.MISSION_STATE_NO_MISSION
+        elif finished:
+            state = mavlink.MISSION_STATE_COMPLETE
+        elif nav_state == _MISSION and arming_state == _ARMED:
+            state = mavlink.MISSION_STATE_ACTIVE
+        else:
+            state = mavlink.MISSION_STATE_PAUSED if reached >= 0 else mavlink.MISSION_STATE_NOT_STARTED
+        return mavlink.MAVLink_mission_current_message(
+            whole(current, 0, 0xFFFF), whole(total, 0, 0xFFFF) or _NO_MISSION, state
+        )
+
+    def _reached_items(self) -> list[tuple[float, Message]]:
+        """Return time [s] and MISSION_ITEM_REACHED of each reached item."""
+        numbers = self._mission.values[:, 2] if not self._mission.is_empty else np.zeros(0)
+        changed = np.flatnonzero((numbers != np.append(-1.0, numbers[:-1])) & (numbers >= 0.0))
+        return [
+            (
+                self._log.since_start_s(int(self._mission.time_us[index])),
+                mavlink.MAVLink_mission_item_reached_message(whole(numbers[index], 0, 0xFFFF)),
+            )
+            for index in changed.tolist()
+        ]
 
     def _home(self, at_s: float) -> Message | None:
         home = self._motion.home or self._motion.origin

@@ -11,7 +11,7 @@ import numpy as np
 from flightstack.core.contract import FloatArray
 from flightstack.core.geodesy import LocalFrame
 from flightstack.plan import Command, MissionItem, Plan
-from flightstack.plan.fence import FenceAreas, fence_areas
+from flightstack.plan.fence_areas import FenceAreas, fence_areas
 from gcs_cli.report.flight_data import Flight
 from gcs_cli.report.summary import item_ned_m
 

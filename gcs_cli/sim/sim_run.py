@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import subprocess
 import tempfile
 import time
@@ -12,8 +13,8 @@ from pathlib import Path
 
 from flightstack.core.port_numbers import system_id, vehicle_ground_port
 from flightstack.mavlink.dialect import mavlink
-from flightstack.process.command_line import own_program
 from flightstack.process.console import complain
+from flightstack.process.supervised import supervised
 from flightstack.transports.udp import UdpSocket
 from gcs_cli.errors import FAILED, NO_ANSWER, CliError
 from gcs_cli.fly.fly_options import check_options, check_ports, simulator_arguments
@@ -197,13 +198,19 @@ def _ready_sentence(count: int) -> str:
 
 @contextlib.contextmanager
 def _view(vehicle: SimOptions, wanted: bool) -> Iterator[subprocess.Popen[bytes] | None]:
-    """Run ``gcs watch`` on this terminal; at the end terminate it, so that it restores the terminal."""
+    """Run ``gcs watch`` on this terminal; at the end terminate it, so that it restores the terminal.
+
+    It ends with this process, also if that is killed.
+    """
     if not wanted:
         yield None
         return
     signing = [] if vehicle.signing_key is None else ["--signing-key", str(vehicle.signing_key)]
     number = ["--instance", str(vehicle.instance)]
-    with subprocess.Popen(own_program("gcs_cli", *signing, *number, "watch")) as view:
+    inherited, own_end = os.pipe()
+    program = supervised("gcs_cli", *signing, *number, "watch", descriptor=inherited)
+    with subprocess.Popen(program, pass_fds=(inherited,)) as view:
+        os.close(inherited)
         try:
             yield view
         finally:
@@ -212,3 +219,4 @@ def _view(vehicle: SimOptions, wanted: bool) -> Iterator[subprocess.Popen[bytes]
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     view.wait(_END_TIMEOUT_S)
             view.kill()
+            os.close(own_end)

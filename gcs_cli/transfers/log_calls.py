@@ -53,11 +53,27 @@ def fetch_files(connection: Connection) -> tuple[Entry, ...]:
 
 
 def file_of(log: LogEntry, logs: tuple[LogEntry, ...], files: tuple[Entry, ...]) -> Entry | None:
-    """Return the file of ``log``, or None: numbers and names are matched by a size that is unique."""
-    if [entry.size for entry in logs].count(log.size) != 1:
+    """Return the file of ``log``, or None: numbers and names are matched by a size that is unique.
+
+    A log that is being written may have grown between the two lists: the only one without a file of its size has the
+    only file without a log.
+    """
+    log_sizes, file_sizes = [entry.size for entry in logs], [file.size for file in files]
+    if log_sizes.count(log.size) != 1:
         return None
     found = [file for file in files if file.size == log.size]
+    if not found and [size in file_sizes for size in log_sizes].count(False) == 1:
+        found = [file for file in files if file.size not in log_sizes and (file.size or 0) > log.size]
     return found[0] if len(found) == 1 else None
+
+
+def is_growing(connection: Connection, log: LogEntry, logs: tuple[LogEntry, ...]) -> bool:
+    """Return True if the vehicle still writes ``log``: the newest one of an armed vehicle, or one that has grown."""
+    if log != logs[-1]:
+        return False
+    now = fetch_list(connection)
+    grown = any(entry.log_id == log.log_id and entry.size > log.size for entry in now)
+    return grown or connection.session.view.armed
 
 
 def fetch_log(connection: Connection, log: LogEntry, file: Entry | None, show: Progress) -> bytes:

@@ -44,14 +44,15 @@ def plan_problem(plan: Plan, home: GeoPoint) -> str | None:
     return None if problem is None else f"{problem.part}: {problem.reason}"
 
 
-def parts_to_send(plan: Plan) -> list[PlanPart]:
-    """Return the parts of a plan in the order of their upload.
+def parts_to_send(plan: Plan, only: MissionType | None = None) -> list[PlanPart]:
+    """Return the parts of a plan, or the one of type ``only``, in the order of their upload.
 
     The vehicle checks mission and rally points against its geofence, so that the new geofence goes first. The mission
     goes last, even without items; other parts without items are not sent.
     """
     mission, *others = plan_parts(plan)
-    return [part for part in others if part.items] + [mission]
+    parts = [part for part in others if part.items] + [mission]
+    return [part for part in parts if only in (None, part.kind)]
 
 
 class Uploads:
@@ -72,7 +73,7 @@ class Uploads:
         only: MissionType | None = None,
     ) -> None:
         self._session = session
-        self._parts = [part for part in parts_to_send(plan) if only in (None, part.kind)]
+        self._parts = parts_to_send(plan, only)
         self._others = [part for part in plan_parts(plan) if part not in self._parts]
         self._clients: dict[MissionType, MissionClient] = {}
         self._restores = restores

@@ -10,11 +10,11 @@ from gcs_cli.errors import FAILED, CliError, VehicleLostError
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
 from gcs_cli.output import Output
-from gcs_cli.plans.compare import Difference, Tolerance, differences
+from gcs_cli.plans.compare import Difference, differences
 from gcs_cli.plans.formats.files import save_any
 from gcs_cli.plans.names import any_command_name
 from gcs_cli.plans.table import item_facts
-from gcs_cli.transfers.plan_parts import PlanPart, Uploads, parts_to_send, plan_parts
+from gcs_cli.transfers.plan_parts import PlanPart, Uploads, plan_parts
 from gcs_cli.transfers.vehicle_plans import download_plan
 
 
@@ -35,23 +35,13 @@ def complete_upload(connection: Connection, uploads: Uploads, file: Path | str) 
 
 
 def compare_with_vehicle(
-    connection: Connection, plan: Plan
-) -> tuple[list[tuple[PlanPart, Difference]], list[PlanPart]]:
-    """Read the vehicle's plan back; return the differences from ``plan``, and the parts without any.
-
-    Compares the mission, and geofence and rally points if the plan has any. Raise CliError.
-    """
-    parts = parts_to_send(plan)
+    connection: Connection, parts: Sequence[PlanPart]
+) -> list[tuple[PlanPart, list[Difference]]]:
+    """Read the vehicle's plan back; return each part with its differences. Raise CliError."""
     stored = download_plan(connection, with_home=False, kinds=tuple(part.kind for part in parts))
     held = {part.kind: part.items for part in plan_parts(stored)}
     tolerance = calls.storage_tolerance(connection.session)
-    found = [
-        (part, difference)
-        for part in parts
-        for difference in differences(part.items, held[part.kind], tolerance)
-    ]
-    differing = {part.kind for part, _ in found}
-    return found, [part for part in parts if part.kind not in differing]
+    return [(part, list(differences(part.items, held[part.kind], tolerance))) for part in parts]
 
 
 def say_uploaded(output: Output, parts: Sequence[PlanPart], uploads: Uploads) -> None:
@@ -92,15 +82,10 @@ def say_lost(output: Output, lost: str, file: Path) -> None:
         output.say("lost", f"lost in {file}: {lost}", file=str(file), lost=lost)
 
 
-def say_verified(
-    output: Output, parts: Sequence[PlanPart], stored: Plan, tolerance: Tolerance, file: Path
-) -> None:
+def say_verified(output: Output, compared: Sequence[tuple[PlanPart, list[Difference]]], file: Path) -> None:
     """Print the differences between the parts of a file and the vehicle's; raise CliError if there are any."""
-    held = {part.kind: part.items for part in plan_parts(stored)}
-    count = 0
-    for part in parts:
-        found = list(differences(part.items, held[part.kind], tolerance))
-        count += len(found)
+    count = sum(len(found) for _, found in compared)
+    for part, found in compared:
         for difference in found:
             output.say(
                 "difference",

@@ -11,15 +11,17 @@ from typing import Any, ClassVar, Literal
 from textual import work
 from textual.app import App, SystemCommand
 from textual.binding import Binding
+from textual.events import Event, Key
 from textual.screen import Screen
 
 from flightstack.core.enums import Severity
 from gcs_cli.actions.action import Action
 from gcs_cli.tui.confirm import Confirm
 from gcs_cli.tui.feed import Feed
+from gcs_cli.tui.key_queue import KeyQueue
 from gcs_cli.tui.order_form import OrderForm
 from gcs_cli.tui.orders import ORDERS, action_of, order_named, question_for
-from gcs_cli.tui.palette import Palette, palette_of
+from gcs_cli.tui.palette import Palette, monochrome, palette_of
 from gcs_cli.tui.plan_fetcher import PlanFetcher
 from gcs_cli.tui.plot_fields import PlotFields
 from gcs_cli.tui.screens import SCREENS
@@ -73,12 +75,15 @@ class WatchApp(App[None]):
         self.theme = THEMES[0].name
         self._palette: tuple[str, Palette] | None = None
         self._state: tuple[object, ...] = ()
+        self._keys = KeyQueue(self, super().on_event)
 
     @property
     def palette(self) -> Palette:
         """Colours of the current theme."""
         if self._palette is None or self._palette[0] != self.theme:
             colours = palette_of(self.theme_variables, self.current_theme.dark)
+            if self.no_color:
+                colours = monochrome(colours, self.current_theme.dark)
             self._palette = (self.theme, colours)
         return self._palette[1]
 
@@ -87,9 +92,17 @@ class WatchApp(App[None]):
         for number in _ENDING_SIGNALS:
             asyncio.get_running_loop().add_signal_handler(number, self.exit)
         self.app_resume_signal.subscribe(self, lambda _app: self.refresh())  # after Ctrl-Z and fg
+        self.run_worker(self._keys.run(), group="keys")
         self.feed.start()
         self.switch_mode(self._first_mode)
         self.set_interval(1 / REDRAWS_HZ, self.redraw)
+
+    async def on_event(self, event: Event) -> None:
+        """Handle an event; a key of the user waits for the effect of the one before."""
+        if isinstance(event, Key) and not event.is_forwarded:
+            self._keys.put(event)
+        else:
+            await super().on_event(event)
 
     def on_unmount(self) -> None:
         """End the thread of the link."""

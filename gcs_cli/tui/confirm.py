@@ -42,7 +42,7 @@ class Confirm(ModalScreen[bool]):
 
     def on_mount(self) -> None:
         """Select the harmless answer."""
-        self.query_one("#no").focus()
+        self.set_focus(self.query_one("#no"))
 
     def on_button_pressed(self, event: Button.Pressed) -> None:
         """End with the answer."""

@@ -91,7 +91,7 @@ class EntryForm(ModalScreen[Any]):
 
     def on_mount(self) -> None:
         """Put the cursor into a field."""
-        list(self.query(Input))[self._first].focus()
+        self.set_focus(list(self.query(Input))[self._first])
 
     def on_input_submitted(self) -> None:
         """End with the result, or show the problem."""

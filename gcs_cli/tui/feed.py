@@ -19,6 +19,7 @@ from gcs_cli.link.session import Session
 from gcs_cli.link.subscription import ROTORS_AND_TIMING
 from gcs_cli.tui.history import History
 from gcs_cli.tui.message_log import MessageLog
+from gcs_cli.tui.traffic import Traffic
 from gcs_cli.vehicle.view_types import VehicleView
 
 Value = TypeVar("Value")
@@ -41,6 +42,12 @@ class _Running(NamedTuple):
     is_announced: bool = False
 
 
+class _Job(NamedTuple):
+    run: Callable[[Connection], Any]
+    future: Future[Any]
+    ends_in_order: bool
+
+
 class Feed:
     """Runs ``connection`` in a thread between ``start`` and ``stop``.
 
@@ -51,6 +58,7 @@ class Feed:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
         self.history = History()
+        self.traffic = Traffic()
         self.messages = MessageLog()
         self.notices: deque[Notice] = deque(maxlen=20)
         """Lines for the user, which the application takes."""
@@ -58,7 +66,8 @@ class Feed:
         """True if actions go to all vehicles."""
         self.error: Exception | None = None
         """Error that ended the thread."""
-        self._jobs: deque[tuple[Callable[[Connection], Any], Future[Any]]] = deque()
+        self._jobs: deque[_Job] = deque()
+        self._job: _Job | None = None
         self._calls: deque[Callable[[], None]] = deque()
         """Short calls that run between two steps of the link, during a job too."""
         self._running: dict[int, _Running] = {}
@@ -103,10 +112,7 @@ class Feed:
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread after the current job; pending jobs are cancelled.
-
-        A job with progress ends early, and an interrupted upload restores the former plans first.
-        """
+        """End the thread: the current job fails at its next step, unless it ends in order; others are cancelled."""
         self._stopping.set()
         if self._thread is not None:
             self._thread.join()
@@ -116,14 +122,17 @@ class Feed:
         """True if the current job has to end."""
         return self._stopping.is_set()
 
-    def submit(self, job: Callable[[Connection], Value], system_id: int | None = None) -> Future[Value]:
+    def submit(
+        self, job: Callable[[Connection], Value], system_id: int | None = None, *, ends_in_order: bool = False
+    ) -> Future[Value]:
         """Run ``job`` in the thread of the link; messages are received while it waits on the connection.
 
         With ``system_id`` it fails with CliError if another vehicle is selected when it begins. The selection changes
-        only between jobs.
+        only between jobs. With ``ends_in_order`` it continues after ``stop``, for example until an interrupted upload
+        has restored the former plans.
         """
         future: Future[Value] = Future()
-        self._jobs.append((partial(_run_on, system_id, job), future))
+        self._jobs.append(_Job(partial(_run_on, system_id, job), future, ends_in_order))
         return future
 
     def select(self, system_id: int | None) -> None:
@@ -154,36 +163,46 @@ class Feed:
         self.submit(lambda connection: connection.fleet.subscribe(self._rates_hz))
 
     def _observe(self, message: Message) -> None:
-        self.history.record(message, self.now_s)
+        now_s = self.now_s
+        self.history.record(message, now_s)
+        self.traffic.record(message, now_s)
 
     def _run(self) -> None:
         try:
             while not self._stopping.wait(GATHER_S):
                 while self._jobs and not self.is_stopping:
-                    self._execute(*self._jobs.popleft())
+                    self._execute(self._jobs.popleft())
                 self._connection.step(self.now_s + _STEP_S)
         except Exception as error:
             self.error = error
         finally:
             while self._jobs:
-                self._jobs.popleft()[1].cancel()
+                self._jobs.popleft().future.cancel()
 
     def _serve(self) -> None:
-        """Begin the actions, and follow the messages and the effects; after every step of the link, in jobs too."""
+        """Begin the actions, and follow the messages and the effects; after every step of the link, in jobs too.
+
+        Raise CliError in a job that has to end.
+        """
         while self._calls:
             self._calls.popleft()()
         for view in self.views:
             self.messages.follow(view)
         for system_id in list(self._running):
             self._follow(system_id)
+        if self.is_stopping and self._job is not None and not self._job.ends_in_order:
+            raise CliError("interrupted")
 
-    def _execute(self, job: Callable[[Connection], Any], future: Future[Any]) -> None:
-        if not future.set_running_or_notify_cancel():
+    def _execute(self, job: _Job) -> None:
+        if not job.future.set_running_or_notify_cancel():
             return
+        self._job = job
         try:
-            future.set_result(job(self._connection))
+            job.future.set_result(job.run(self._connection))
         except Exception as error:
-            future.set_exception(error)
+            job.future.set_exception(error)
+        finally:
+            self._job = None
 
     def _begin(self, action: Action, system_id: int) -> None:
         session = self._connection.fleet.sessions[system_id]

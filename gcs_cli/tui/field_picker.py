@@ -64,7 +64,7 @@ class FieldPicker(ModalScreen[None]):
     def on_mount(self) -> None:
         """Show all names."""
         self.query_one(OptionList).can_focus = False
-        self.query_one(Input).focus()
+        self.set_focus(self.query_one(Input))
         self._search("")
 
     def on_input_changed(self, event: Input.Changed) -> None:

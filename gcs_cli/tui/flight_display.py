@@ -8,7 +8,8 @@ from rich.text import Text
 
 from gcs_cli.tui.horizon import heading_tape, horizon
 from gcs_cli.tui.palette import Palette
-from gcs_cli.tui.panels import UNKNOWN, ground_speed, height_m
+from gcs_cli.tui.panels import ground_speed, height_m
+from gcs_cli.vehicle.numbers import UNKNOWN
 from gcs_cli.vehicle.view_types import Euler, VehicleView
 
 _TAPE = 8

@@ -8,7 +8,8 @@ from rich.text import Text
 
 from flightstack.core.enums import Severity
 from gcs_cli.tui.palette import Palette
-from gcs_cli.tui.panels import UNKNOWN, number, row_of
+from gcs_cli.tui.panels import row_of
+from gcs_cli.vehicle.numbers import UNKNOWN, number
 from gcs_cli.vehicle.view_types import VehicleView
 
 _DOUBTFUL_RATIO = 0.5

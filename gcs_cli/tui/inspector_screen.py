@@ -17,6 +17,7 @@ from gcs_cli.tui.line_list import LineList
 from gcs_cli.tui.order_form import OrderForm
 from gcs_cli.tui.orders import Field, Order
 from gcs_cli.tui.plot_fields import MOST_FIELDS
+from gcs_cli.tui.search_field import SearchField
 from gcs_cli.tui.watch_screen import WatchScreen
 from gcs_cli.vehicle.view_types import VehicleView
 
@@ -29,7 +30,6 @@ class InspectorScreen(WatchScreen):
 
     CSS = """
     InspectorScreen #summary, InspectorScreen #header { height: 1; }
-    InspectorScreen #search { dock: bottom; }
     """
     BINDINGS: ClassVar = [
         Binding("enter", "expand", "Fields"),
@@ -59,9 +59,7 @@ class InspectorScreen(WatchScreen):
         yield Static(id="summary")
         yield Static(id="header")
         yield LineList(id="messages")
-        search = Input(placeholder="words of a message, field or source", id="search", compact=True)
-        search.display = False
-        yield search
+        yield SearchField("words of a message, field or source", id="search")
 
     @property
     def line_list(self) -> LineList:
@@ -161,15 +159,11 @@ class InspectorScreen(WatchScreen):
 
     def action_search(self) -> None:
         """Open the search field."""
-        search = self.query_one("#search", Input)
-        search.display = True
-        search.focus()
+        self.query_one(SearchField).open()
 
     def action_clear(self) -> None:
         """Close the search field and show all messages."""
-        search = self.query_one("#search", Input)
-        search.value = ""
-        search.display = False
+        self.query_one(SearchField).close()
         self.set_focus(None)
 
     @on(Input.Changed, "#search")

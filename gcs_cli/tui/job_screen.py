@@ -34,21 +34,29 @@ class JobScreen(WatchScreen):
         """Transferred units of the current job and their total; 0: unknown."""
 
     @property
+    def is_working(self) -> bool:
+        """Whether an action of this screen has not ended: a job, or a question that may begin one."""
+        return any(worker.node is self and not worker.is_finished for worker in self.workers)
+
+    @property
     def doing_text(self) -> str:
         """The current job with its progress."""
         done, total = self.progress
         return f"{self.doing}: {done} of {total}" if total else self.doing
 
     def show_progress(self, done: int, total: int) -> None:
-        """Store the progress of a job; raise CliError if the user quits. Called in the thread of the link."""
+        """Store the progress of a job. Called in the thread of the link."""
         self.progress = (done, total)
-        if watch_app(self).feed.is_stopping:
-            raise CliError(f"{self.doing}: interrupted")
 
     async def run_job(
-        self, doing: str, job: Callable[[Connection], Value], system_id: int | None
+        self,
+        doing: str,
+        job: Callable[[Connection], Value],
+        system_id: int | None,
+        *,
+        ends_in_order: bool = False,
     ) -> Value | None:
-        """Return the result of a job on the vehicle with this system id.
+        """Return the result of a job on the vehicle with this system id; see ``Feed.submit``.
 
         None if it failed, if another vehicle is selected, or if another job has not ended: the reason is shown.
         """
@@ -60,7 +68,7 @@ class JobScreen(WatchScreen):
         feed, unsaved = app.feed, f"{self.mode} job"
         app.unsaved[unsaved] = f"{doing.capitalize()} has not ended."
         try:
-            return await asyncio.wrap_future(feed.submit(job, system_id))
+            return await asyncio.wrap_future(feed.submit(job, system_id, ends_in_order=ends_in_order))
         except (CliError, ConfigError) as error:
             feed.tell(str(error), Severity.ERROR)
             return None

@@ -43,7 +43,7 @@ def draw_map(
     if cursor is not None:
         canvas.label(*cursor, _CURSOR_MARK, f"bold {colours.text}")
     for craft in scene.others:
-        _draw_craft(canvas, view, craft, colours.bad, colours)
+        _draw_craft(canvas, view, craft, colours.warning if craft.is_traffic else colours.bad, colours)
     if scene.vehicle is not None:
         _draw_craft(canvas, view, scene.vehicle, colours.text, colours)
     _draw_marks(canvas, view, scene, colours)
@@ -171,6 +171,7 @@ def legend(scene: MapScene, colours: Palette, width: int) -> Text:
         (f"{_RALLY_MARK} rally", colours.good, bool(scene.plan.rally)),
         (f"{_HOME_MARK} home", colours.accent, scene.home is not None),
         (f"{_TARGET_MARK} setpoint", colours.target, scene.target is not None),
+        ("traffic", colours.warning, any(craft.is_traffic for craft in scene.others)),
     ]
     text = Text(no_wrap=True, overflow="crop", end="")
     for name, style, is_shown in parts:

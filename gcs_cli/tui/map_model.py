@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from flightstack.core.geodesy import GeoPoint, LocalFrame
@@ -18,6 +20,7 @@ from gcs_cli.tui.map_scene import (
     place_of,
     vehicle_scene,
 )
+from gcs_cli.tui.traffic import Aircraft
 from gcs_cli.vehicle.view_types import VehicleView
 
 _POSITION = "GLOBAL_POSITION_INT"
@@ -41,14 +44,19 @@ class MapModel:
         """Drop the track up to now."""
         self._track = Track()
 
-    def scene(self, view: VehicleView, history: History, plan: Plan) -> MapScene:
+    def scene(
+        self, view: VehicleView, history: History, plan: Plan, aircraft: Iterable[Aircraft] = ()
+    ) -> MapScene:
         """Return the scene; the track also gets the positions that ``history`` received since the last call."""
         self._select(view)
         if self.frame is None:
             return MapScene()
         self._extend_track(history, self.frame)
         scene = vehicle_scene(view, self.frame)
-        others = tuple(_others(history, self._system_id, self.frame))
+        others = (
+            *_others(history, self._system_id, self.frame),
+            *(_craft_of(each, view, self.frame) for each in aircraft),
+        )
         if plan is not self._source or scene.home != self._home:
             self._source, self._home = plan, scene.home
             self._plan = map_plan(plan, self.frame, scene.home)
@@ -89,3 +97,12 @@ def _others(history: History, system_id: int | None, frame: LocalFrame) -> list[
         for stream in history.streams()
         if stream.name == _POSITION and stream.key.system_id != system_id and stream.last.lat
     ]
+
+
+def _craft_of(aircraft: Aircraft, view: VehicleView, frame: LocalFrame) -> Craft:
+    """Return an aircraft with its altitude above the vehicle."""
+    name = aircraft.name
+    if aircraft.altitude_m is not None and view.geo is not None:
+        name += f" {aircraft.altitude_m - view.geo.altitude_m:+.0f} m"
+    place = place_of(frame, aircraft.latitude_deg, aircraft.longitude_deg)
+    return Craft(place, aircraft.heading_deg, name, is_traffic=True)

@@ -12,7 +12,7 @@ from flightstack.core.contract import FloatArray
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.mavlink.dialect import mavlink
 from flightstack.plan import RALLY_POINT, Command, MissionItem, Plan, Rejection
-from flightstack.plan.fence import fence_areas
+from flightstack.plan.fence_areas import fence_areas
 from flightstack.plan.item import is_unset
 from gcs_cli.vehicle.view_types import GeoPosition, VehicleView
 
@@ -53,6 +53,8 @@ class Craft(NamedTuple):
     place: Place
     heading_deg: float | None = None
     name: str = ""
+    is_traffic: bool = False
+    """True for an aircraft that an ADS-B receiver reports."""
 
 
 class MapPlan(NamedTuple):
@@ -83,7 +85,7 @@ class MapScene(NamedTuple):
     def extent(self) -> FloatArray:
         """Return the places that a view of everything holds, shape (n, 2)."""
         places: list[Place] = [item.place for item in self.plan.path]
-        places += [*self.plan.rally, *(craft.place for craft in self.others)]
+        places += [*self.plan.rally, *(craft.place for craft in self.others if not craft.is_traffic)]
         places += [place for place in (self.home, self.target) if place is not None]
         if self.vehicle is not None:
             places.append(self.vehicle.place)

@@ -68,11 +68,13 @@ class MapScreen(WatchScreen):
         super().show(view, now_s)
         if watch_app(self).redraws % _EVERY:
             return
-        history = watch_app(self).feed.history
+        feed = watch_app(self).feed
+        history = feed.history
         system_id = None if view.identity is None else view.identity.system_id
         current = [stream.last for stream in history.streams(system_id) if stream.name == "MISSION_CURRENT"]
         self.plans.update(view, current[0] if current else None)
-        self.map.show_scene(self._model.scene(view, history, self.plans.plan))
+        aircraft = feed.traffic.aircraft(now_s)
+        self.map.show_scene(self._model.scene(view, history, self.plans.plan, aircraft))
         self._show_place()
 
     def on_map_widget_moved(self) -> None:

@@ -71,7 +71,7 @@ class MapWidget(CanvasWidget):
                 self.view.height,
                 self.scene.plan,
                 self.scene.home,
-                len(self.scene.others),
+                sum(not craft.is_traffic for craft in self.scene.others),
             )
             is_outside = vehicle is not None and not self.view.shows(vehicle.place, _FIT_MARGIN)
             if key != self._extent_key or is_outside:

@@ -15,6 +15,7 @@ from gcs_cli.tui.drawing import watch_app
 from gcs_cli.tui.message_log import ENTRIES_KEPT, Entry, selected
 from gcs_cli.tui.palette import Palette
 from gcs_cli.tui.panels import message_lines
+from gcs_cli.tui.search_field import SearchField
 from gcs_cli.tui.watch_screen import WatchScreen
 from gcs_cli.vehicle.view_types import VehicleView
 
@@ -46,9 +47,7 @@ class MessagesScreen(WatchScreen):
         """Yield the filter's state, the list, and the search field."""
         yield Static(id="filter")
         yield RichLog(id="texts", wrap=False, max_lines=ENTRIES_KEPT, auto_scroll=False, markup=False)
-        search = Input(placeholder="words to search", id="search", compact=True)
-        search.display = False
-        yield search
+        yield SearchField("words to search", id="search")
 
     def show(self, view: VehicleView, now_s: float) -> None:
         """Append the new lines."""
@@ -94,16 +93,12 @@ class MessagesScreen(WatchScreen):
 
     def action_search(self) -> None:
         """Open the search field."""
-        search = self.query_one("#search", Input)
-        search.display = True
-        search.focus()
+        self.query_one(SearchField).open()
 
     def action_clear(self) -> None:
         """Close the search field and show all lines."""
-        search = self.query_one("#search", Input)
-        search.value = ""
-        search.display = False
-        self.query_one("#texts").focus()
+        self.query_one(SearchField).close()
+        self.set_focus(self.query_one("#texts"))
 
     def action_end(self) -> None:
         """Scroll to the newest line."""
@@ -116,7 +111,7 @@ class MessagesScreen(WatchScreen):
 
     @on(Input.Submitted, "#search")
     def _chosen(self) -> None:
-        self.query_one("#texts").focus()
+        self.set_focus(self.query_one("#texts"))
 
 
 def _lines(entry: Entry, words: str, several: bool, width: int, colours: Palette) -> list[Text]:

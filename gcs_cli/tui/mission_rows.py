@@ -50,6 +50,8 @@ def mission_table(plan: Plan, home: GeoPoint | None) -> MissionTable:
 
 def mission_progress(table: MissionTable, view: VehicleView) -> Progress:
     """Return the progress that the vehicle reports, numbered as the items of the table."""
+    if view.mission.complete:
+        return Progress(reached=len(table.items) - 1)
     first = int(view.autopilot.mission_begins_with_home)
     current, reached = (
         None if number is None or not 0 <= number - first < len(table.items) else number - first

@@ -24,7 +24,7 @@ from gcs_cli.plans import edit
 from gcs_cli.plans.formats.files import SUFFIXES, load_any, save_any
 from gcs_cli.plans.names import any_command_name
 from gcs_cli.transfers import plan_transfers
-from gcs_cli.transfers.plan_parts import Uploads
+from gcs_cli.transfers.plan_parts import Uploads, parts_to_send
 from gcs_cli.transfers.vehicle_plans import problems_on_vehicle
 from gcs_cli.tui.drawing import watch_app
 from gcs_cli.tui.entry_form import EntryForm
@@ -84,7 +84,7 @@ class MissionScreen(JobScreen):
 
     def on_mount(self) -> None:
         """Put the cursor into the table."""
-        self.rows.focus()
+        self.set_focus(self.rows)
 
     @property
     def rows(self) -> RowList:
@@ -105,7 +105,7 @@ class MissionScreen(JobScreen):
         system_id = None if view.identity is None else view.identity.system_id
         streams = app.feed.history.streams(system_id)
         current = [stream.last for stream in streams if stream.name == "MISSION_CURRENT"]
-        if not self.doing:
+        if not self.is_working:
             app.plans.update(view, current[0] if current else None)
         if not app.plans.loading:
             self.draft = self.draft.followed(app.plans.plan, app.plans.system_id)
@@ -153,8 +153,8 @@ class MissionScreen(JobScreen):
             left.append(" NOT UPLOADED ", f"bold {colours.background} on {colours.warning}")
             left.append(" ")
         left.append(summary(self._table, self._progress), colours.text)
-        parts = [f"{len(draft.plan.fence)} fence items"] if draft.plan.fence else []
-        parts += [f"{len(draft.plan.rally)} rally points"] if draft.plan.rally else []
+        parts = [f"fence: {len(draft.plan.fence)}"] if draft.plan.fence else []
+        parts += [f"rally points: {len(draft.plan.rally)}"] if draft.plan.rally else []
         right = Text(", ".join(parts), colours.muted)
         if self.doing:
             right = Text(self.doing_text, colours.accent)
@@ -283,11 +283,16 @@ class MissionScreen(JobScreen):
         view = watch_app(self).feed.view
         if view.armed and not await self.ask("The vehicle is armed. Replace its mission?", "Replace"):
             return
-        said = await self.run_job("uploading", partial(self._upload, plan=plan), system_id)
+        uploaded = await self.run_job(
+            "uploading", partial(self._upload, plan=plan), system_id, ends_in_order=True
+        )
+        if uploaded is None:
+            return
+        said = await self.run_job("reading back", partial(self._compare, plan=plan), system_id)
         if said is not None:
             self.draft = self.draft.uploaded(system_id) if self.draft.to_upload() == plan else self.draft
             watch_app(self).plans.reload()
-            watch_app(self).feed.tell(said)
+            watch_app(self).feed.tell(f"uploaded: {said}")
             self._redraw()
 
     @property
@@ -295,11 +300,10 @@ class MissionScreen(JobScreen):
         identity = watch_app(self).feed.view.identity
         return None if identity is None else identity.system_id
 
-    def _upload(self, connection: Connection, plan: Plan) -> str:
+    def _upload(self, connection: Connection, plan: Plan) -> bool:
         uploads = Uploads(connection.session, plan, restores=True, interrupted=lambda: self._note(uploads))
         plan_transfers.complete_upload(connection, uploads, "the edited plan")
-        self.show_progress(0, 0)
-        return f"uploaded: {self._compare(connection, plan)}"
+        return True
 
     def _note(self, uploads: Uploads) -> str:
         self.progress = uploads.progress
@@ -307,11 +311,11 @@ class MissionScreen(JobScreen):
 
     def _compare(self, connection: Connection, plan: Plan) -> str:
         """Return the parts that are equal on the vehicle; raise CliError with the differences."""
-        differing, equal = plan_transfers.compare_with_vehicle(connection, plan)
-        if differing:
-            lines = [f"{part.name}: {difference.sentence}" for part, difference in differing]
+        compared = plan_transfers.compare_with_vehicle(connection, parts_to_send(plan))
+        lines = [f"{part.name}: {difference.sentence}" for part, found in compared for difference in found]
+        if lines:
             raise CliError(f"the vehicle's plan differs: {some_of(lines)}")
-        return ", ".join(f"{part.name} of {len(part.items)} items equal" for part in equal)
+        return ", ".join(f"{part.name} of {len(part.items)} items equal" for part, _ in compared)
 
     @work
     async def action_verify(self) -> None:

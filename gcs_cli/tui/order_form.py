@@ -23,6 +23,7 @@ class OrderForm(ModalScreen[list[Any] | None]):
     OrderForm > Vertical { width: 60; max-width: 90%; height: auto; border: round $accent; padding: 0 2;
                            background: $surface; }
     OrderForm Input { margin-bottom: 1; }
+    OrderForm Label { width: 100%; }
     OrderForm .title { text-style: bold; color: $accent; margin-bottom: 1; }
     OrderForm #problem { color: $error; }
     """
@@ -50,7 +51,7 @@ class OrderForm(ModalScreen[list[Any] | None]):
 
     def on_mount(self) -> None:
         """Put the cursor into the first field."""
-        self.query(Input).first().focus()
+        self.set_focus(self.query(Input).first())
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Go to the next field; after the last one end with the values, or show what is wrong."""
@@ -64,7 +65,7 @@ class OrderForm(ModalScreen[list[Any] | None]):
                 values.append(field.parse(entered.value, self._view))
             except FieldError as error:
                 self.query_one("#problem", Label).update(str(error))
-                entered.focus()
+                self.set_focus(entered)
                 return
         self.dismiss(values)
 

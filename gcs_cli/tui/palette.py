@@ -19,8 +19,9 @@ class Palette(NamedTuple):
     """Setpoints, beside the values."""
     background: str = "#11151c"
     surface: str = "#1a202b"
-    sky: str = "#1f5fa8"
-    ground: str = "#7a4a1e"
+    sky: str = "#2a6ab4"
+    ground: str = "#5f3a17"
+    """Darker than the sky: without colour only the brightness differs."""
 
 
 DARK = Palette()
@@ -34,9 +35,15 @@ LIGHT = Palette(
     target="#8839bf",
     background="#f6f8fa",
     surface="#e9edf2",
-    sky="#6fa8dc",
-    ground="#b98a5a",
+    sky="#3f7fc4",
+    ground="#6b4623",
 )
+
+
+def monochrome(colours: Palette, dark: bool) -> Palette:
+    """Return the palette for a screen without colour: warnings have the highest contrast, not the red's grey."""
+    alarm = "#ffffff" if dark else "#000000"
+    return colours._replace(warning=alarm, bad=alarm, good=colours.text)
 
 
 def palette_of(variables: Mapping[str, str], dark: bool) -> Palette:

@@ -9,23 +9,14 @@ from collections.abc import Sequence
 from rich.text import Text
 
 from gcs_cli.tui.palette import DARK, Palette
+from gcs_cli.vehicle.numbers import UNKNOWN, number
 from gcs_cli.vehicle.view_types import Setpoint, StatusText, Vector, VehicleView
 
-UNKNOWN = "—"
 SEVERITIES = ("EMERG", "ALERT", "CRIT", "ERROR", "WARN", "NOTE", "INFO", "DEBUG")
 _MISSION_STATES = {1: "no mission", 2: "not started", 3: "active", 4: "paused", 5: "complete"}
 _MESSAGE_INDENT = 14
 _BLOCKS = "·▏▎▍▌▋▊▉"
 _LOW_CHARGE, _CRITICAL_CHARGE = 0.3, 0.15
-
-
-def number(value: float | None, digits: int = 2, unit: str = "") -> str:
-    """Format a number; a dash if unknown."""
-    if value is None:
-        return UNKNOWN
-    if abs(value) >= 1e7:
-        return f"{value:.1e}{unit}"
-    return f"{round(value, digits) + 0.0:.{digits}f}{unit}"  # + 0.0: no -0.00
 
 
 def clock_text(time_s: float | None) -> str:

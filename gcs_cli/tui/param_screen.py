@@ -32,6 +32,7 @@ from gcs_cli.tui.param_model import (
     parse_param,
 )
 from gcs_cli.tui.row_list import RowList, title_text
+from gcs_cli.tui.search_field import SearchField
 from gcs_cli.vehicle.param_info import (
     UNKNOWN,
     ParamInfo,
@@ -76,15 +77,11 @@ class ParamScreen(JobScreen):
                 yield RowList(id="param-rows")
             with VerticalScroll(id="param-side", can_focus=False):
                 yield Static(id="param-details")
-        search = Input(
-            placeholder="letters of the name, or words of the help", id="param-search", compact=True
-        )
-        search.display = False
-        yield search
+        yield SearchField("letters of the name, or words of the help", id="param-search")
 
     def on_mount(self) -> None:
         """Put the cursor into the table."""
-        self.rows.focus()
+        self.set_focus(self.rows)
 
     @property
     def rows(self) -> RowList:
@@ -102,7 +99,7 @@ class ParamScreen(JobScreen):
         if not self.query(RowList):  # resumed before it was composed
             return
         system_id = None if view.identity is None else view.identity.system_id
-        if system_id is not None and system_id != self._system_id and not self.doing:
+        if system_id is not None and system_id != self._system_id and not self.is_working:
             self._system_id = system_id
             self._take(ParamList())
             self.action_update()
@@ -123,7 +120,7 @@ class ParamScreen(JobScreen):
             left.append(self._problem or "waiting for a vehicle", colours.warning)
         else:
             left.append(f"{len(self._names)} of {len(params.parameters)} parameters", colours.text)
-            query = self.query_one("#param-search", Input).value
+            query = self.query_one(SearchField).value
             left.append(f", with “{query}”" if query else "", colours.text)
             left.append(", changed only" if self._changed_only else "", colours.warning)
         what = "in the file" if params.file is None else f"other than in {params.file_name}"
@@ -143,7 +140,7 @@ class ParamScreen(JobScreen):
     def _filter(self, *, keeps: bool = True) -> None:
         rows = self.rows
         before = self._names[rows.cursor] if self._names and keeps else ""
-        self._names = self._params.names(self.query_one("#param-search", Input).value, self._changed_only)
+        self._names = self._params.names(self.query_one(SearchField).value, self._changed_only)
         rows.show_rows(len(self._names), self._draw)
         rows.select(self._names.index(before) if before in self._names else 0)
         self._show_titles()
@@ -188,9 +185,7 @@ class ParamScreen(JobScreen):
 
     def action_search(self) -> None:
         """Open the search field."""
-        search = self.query_one("#param-search", Input)
-        search.display = True
-        search.focus()
+        self.query_one(SearchField).open()
 
     def action_changed_only(self) -> None:
         """Show all parameters, or those that differ."""
@@ -199,10 +194,10 @@ class ParamScreen(JobScreen):
 
     def action_clear(self) -> None:
         """Close the search field; without one, end the comparison with a file."""
-        search = self.query_one("#param-search", Input)
-        self.rows.focus()
+        search = self.query_one(SearchField)
+        self.set_focus(self.rows)
         if search.display:
-            search.value, search.display = "", False
+            search.close()
         elif self._params.file is not None or self._changed_only:
             self._changed_only = False
             self._take(self._params._replace(file=None, file_name=""))
@@ -213,7 +208,7 @@ class ParamScreen(JobScreen):
 
     @on(Input.Submitted, "#param-search")
     def _found(self) -> None:
-        self.rows.focus()
+        self.set_focus(self.rows)
 
     # -- exchange with the vehicle
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from rich.text import Text
 
 from gcs_cli.tui.palette import Palette
-from gcs_cli.tui.panels import UNKNOWN, bar, number
+from gcs_cli.tui.panels import bar
+from gcs_cli.vehicle.numbers import UNKNOWN, number
 from gcs_cli.vehicle.view_types import LoopTiming, VehicleView
 
 

@@ -10,7 +10,8 @@ from textual.screen import ModalScreen
 from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
-from gcs_cli.tui.panels import UNKNOWN, height_m, number
+from gcs_cli.tui.panels import height_m
+from gcs_cli.vehicle.numbers import UNKNOWN, number
 from gcs_cli.vehicle.view_types import VehicleView
 
 ALL = 0

@@ -8,9 +8,9 @@ from textual.containers import Container
 from textual.events import Click
 from textual.screen import Screen
 from textual.widget import Widget
-from textual.widgets import Footer
 
 from gcs_cli.tui.drawing import Drawing, watch_app
+from gcs_cli.tui.key_bar import KeyBar
 from gcs_cli.tui.palette import Palette
 from gcs_cli.tui.screens import SCREENS
 from gcs_cli.tui.status_line import status_line
@@ -78,7 +78,7 @@ class WatchScreen(Screen[None]):
         yield Tabs(id="tabs")
         with Container(id="body"):
             yield from self.compose_body()
-        yield Footer(show_command_palette=False)
+        yield KeyBar()
 
     def _status(
         self, view: VehicleView, now_s: float, width: int, height: int, colours: Palette

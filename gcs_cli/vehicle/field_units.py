@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from flightstack.core.contract import FloatArray
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
@@ -63,7 +61,9 @@ def shown_values(message: Message, field: str, values: FloatArray) -> FloatArray
     factor, _ = shown_unit(field_unit(message, field))
     unknown = unknown_value(message, field)
     shown = values * factor
-    return shown if unknown is None else np.where(values == unknown, np.nan, shown)
+    if unknown is not None:
+        shown[values == unknown] = math.nan
+    return shown
 
 
 def enum_text(message: Message, field: str, value: Any) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from difflib import SequenceMatcher
+from difflib import SequenceMatcher, get_close_matches
 
 from flightstack.mavlink.param_values import Parameter
 from gcs_cli.vehicle.param_info import UNKNOWN, ParamInfo
@@ -29,6 +29,13 @@ def search_parameters(
     ]
     found = [(score, parameter) for score, parameter in scored if score > 0.0]
     return [parameter for _, parameter in sorted(found, key=lambda entry: -entry[0])]
+
+
+def near_names(name: str, parameters: Sequence[Parameter]) -> list[str]:
+    """Return names that are spelt like ``name``, the most similar first; else those that ``search`` finds for it."""
+    names = [parameter.name for parameter in parameters]
+    near = get_close_matches(name.upper(), names, cutoff=_SIMILAR)
+    return near or [parameter.name for parameter in search_parameters(parameters, {}, name.split("_"))]
 
 
 def _score(name: str, info: ParamInfo, wanted: Sequence[str]) -> float:

@@ -4,22 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
-from typing import Any
-
-from rich import box
-from rich.table import Table
-from rich.text import Text
+from typing import TYPE_CHECKING, Any
 
 from flightstack.mavlink.param_values import Parameter
+from gcs_cli.tables import new_table
 from gcs_cli.vehicle.param_info import UNKNOWN, ParamInfo, number_text
 
+if TYPE_CHECKING:
+    from rich.table import Table
+
 Infos = Mapping[str, ParamInfo]
+
+
+def is_pattern(text: str) -> bool:
+    """Return True if the text has wildcards: ``*``, ``?`` or ``[...]``."""
+    return bool(set(text) & set("*?["))
 
 
 def matching(parameters: Sequence[Parameter], pattern: str) -> list[Parameter]:
     """Return the parameters whose name matches: with ``*`` and ``?`` as a whole, else in any part."""
     wanted = pattern.upper()
-    if not set(wanted) & set("*?["):
+    if not is_pattern(pattern):
         wanted = f"*{wanted}*"
     return [parameter for parameter in parameters if fnmatchcase(parameter.name.upper(), wanted)]
 
@@ -51,9 +56,9 @@ def parameter_table(parameters: Sequence[Parameter], infos: Infos, compared: str
 
     ``compared`` is the heading of the defaults.
     """
-    table = Table(
-        box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold"
-    )
+    from rich.text import Text  # noqa: PLC0415
+
+    table = new_table(header_style="bold")
     table.add_column("name", no_wrap=True)
     table.add_column("value", justify="right", no_wrap=True)
     table.add_column("unit", no_wrap=True)

@@ -53,7 +53,7 @@ def names(files: MAVFTP, path: str) -> list[str]:
 
 
 def test_files_are_listed_and_fetched(files: MAVFTP, tmp_path: Path) -> None:
-    assert names(files, "/") == ["@MAV_LOG", "@PARAM", "etc", "fs"]
+    assert names(files, "/") == ["@MAV_LOG", "@PARAM", "@SYS", "etc", "fs"]
     assert {Path(GENERAL).name, Path(PARAMETERS).name} < set(names(files, str(Path(GENERAL).parent)))
     assert json.loads(fetch(files, GENERAL, tmp_path / "general.json"))["version"] == 1
     parameters = fetch(files, PARAMETERS, tmp_path / "parameters.json")  # much more than one burst

@@ -245,6 +245,21 @@ def test_logs_of_ardupilot_are_named_bin(tmp_path: Path, monkeypatch: pytest.Mon
     assert [path.name for path in tmp_path.iterdir()] == ["log_1.bin"]
 
 
+@pytest.mark.parametrize("cause", ["armed", "grown", "finished"])
+def test_download_of_a_log_that_is_being_written_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cause: str
+) -> None:
+    sizes = iter([3, 9] if cause == "grown" else [3, 3])
+    monkeypatch.setattr(log_calls, "fetch_list", lambda _: (LogEntry(1, next(sizes), 0),))
+    monkeypatch.setattr(log_calls, "fetch_files", lambda _: ())
+    monkeypatch.setattr(log_calls, "fetch_log", lambda *_: b"new")
+    vehicle = FakeVehicle()
+    vehicle.armed = cause == "armed"
+    result = told(vehicle, "log", "download", "-o", tmp_path)
+    assert result.returncode == 0
+    assert ("still writing this log" in result.stdout) == (cause != "finished")
+
+
 def test_a_vehicle_without_geofence_is_downloaded_from() -> None:
     vehicle = FakeVehicle(unknown_types=(1, 2))
     result = told(vehicle, "mission", "download")
@@ -276,9 +291,16 @@ def test_status_as_json() -> None:
     assert facts["pos_ned_m"] == [1.0, 2.0, -3.0]
     assert facts["battery_remaining"] is None
     assert result.returncode == 0
-    lines = told(FakeVehicle(), "status").stdout.splitlines()
-    assert facts.pop("event") == "status"
-    assert len(lines) == len(facts)
+
+
+def test_status_prints_units_and_rounds() -> None:
+    lines = dict(line.split(maxsplit=1) for line in told(FakeVehicle(), "status").stdout.splitlines())
+    assert lines["vehicle"] == "quadrotor, system 1"
+    assert lines["attitude"] == "roll 5.7°, pitch -2.9°, yaw 85.9°"
+    assert lines["position"] == "north 1.00 m, east 2.00 m, down -3.00 m"
+    assert lines["place"] == "47.3977420°, 8.5455940°, 491.0 m above sea level"
+    assert lines["rotors"] == "2310, 2290, 2305, 2400 rpm"
+    assert lines["battery"] == "—"
 
 
 def test_perf_shows_the_loops() -> None:

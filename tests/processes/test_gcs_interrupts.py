@@ -1,37 +1,106 @@
-"""Ctrl-C ends every command of ``gcs`` that waits, with an exit code and at most one sentence."""
+"""Ctrl-C ends every command of ``gcs``, with an exit code and at most one sentence."""
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
+import threading
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+import typer
 
 from flightstack.transports.udp import UdpSocket
+from gcs_cli.program import app
+from tests.support.commands import gcs
 from tests.support.fake_links import tcp_server
 from tests.support.fake_vehicle import FakeVehicle
+from tests.support.programs import Program
 
 LONG_S = 60.0
 """Hang guard [s]."""
+PLAN = Path(__file__).parents[2] / "missions" / "fenced_square.plan"
+ON_VEHICLE = {
+    "arm": [], "disarm": [], "takeoff": [], "land": [], "rtl": [], "hold": [], "goto": ["47.4", "8.5"], "yaw": ["90"],
+    "speed": ["3"], "mode": ["hold"], "set-home": [], "terminate": ["--yes"], "inject": ["gps", "off"], "reboot": [],
+    "wait": ["armed"], "status": [], "messages": [], "listen": ["ATTITUDE"], "send": ["HEARTBEAT"],
+    "record": ["x.tlog"], "shell": ["-c", "arm"], "perf": [], "watch": ["--once"],
+    "mission upload": [str(PLAN)], "mission download": ["x.plan"], "mission verify": [str(PLAN)], "mission clear": [],
+    "mission start": [], "mission pause": [], "mission resume": [], "mission jump": ["1"],
+    "mission check": [str(PLAN), "--vehicle"], "mission show": [],
+    "fence upload": [str(PLAN)], "fence download": ["x.plan"], "fence show": [], "fence verify": [str(PLAN)],
+    "fence clear": [], "rally upload": [str(PLAN)], "rally download": ["x.plan"], "rally show": [],
+    "rally verify": [str(PLAN)], "rally clear": [],
+    "param list": [], "param search": ["speed"], "param get": ["MAV_SYS_ID"], "param set": ["MAV_SYS_ID", "1"],
+    "param reset": ["MAV_SYS_ID"], "param save": ["x.params"], "param load": ["given.params"], "param diff": [],
+    "log list": [], "log download": [], "log erase": ["--yes"],
+}  # fmt: skip
+"""Commands that wait for a vehicle, with arguments."""
+ELSEWHERE = {
+    "fly": "test_gcs_fly", "sim": "test_gcs_sim", "paper": "test_paper_run", "test": "test_gcs_test",
+    "replay": "test_gcs_logs", "report": "test_gcs_logs", "compare": "test_compare", "mission new": "test_gcs_missions",
+    "mission convert": "test_gcs_missions", "log info": "test_gcs_logs", "log plot": "test_gcs_logs",
+    "log export": "test_log_export", "log draw": "test_render", "pil fly": "test_gcs_pil",
+    "pil doctor": "test_gcs_pil", "pil replay": "test_gcs_pil",
+}  # fmt: skip
+"""Commands on files, or with a vehicle of their own, and the file that tests them."""
 
 
-@pytest.mark.parametrize(
-    "words",
-    [["arm"], ["status"], ["listen", "ATTITUDE"], ["messages"], ["record", "x.tlog"], ["shell", "-c", "arm"]],
-    ids=" ".join,
-)
-def test_interrupted_search_ends_without_a_file(words: list[str], tmp_path: Path) -> None:
+def names_of(command: Any, words: tuple[str, ...] = ()) -> Iterator[str]:
+    """Yield the names of all commands that the help shows."""
+    if not hasattr(command, "list_commands"):
+        yield " ".join(words)
+        return
+    context = typer.Context(command)
+    for name in command.list_commands(context):
+        inner = command.get_command(context, name)
+        if not inner.hidden:
+            yield from names_of(inner, (*words, name))
+
+
+def test_every_command_is_interrupted_here_or_tested_elsewhere() -> None:
+    names = set(names_of(typer.main.get_command(app)))
+    assert names == {*ON_VEHICLE, *ELSEWHERE}
+    here = Path(__file__).parent
+    for name, file in ELSEWHERE.items():
+        (found,) = here.parent.glob(f"*/{file}.py")
+        assert name.split()[-1] in found.read_text()
+
+
+@pytest.mark.parametrize("name", ON_VEHICLE)
+def test_interrupted_search_ends_without_a_file(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Within the test: a process of its own takes a second."""
+    monkeypatch.chdir(tmp_path)
+    Path("given.params").write_text("1\t1\tMPC_XY_CRUISE\t4.0\t9\n")
+    with UdpSocket("127.0.0.1") as silent:
+
+        def interrupt() -> None:
+            silent.wait(LONG_S)  # the heartbeat to a vehicle that does not answer
+            os.kill(os.getpid(), signal.SIGINT)
+
+        thread = threading.Thread(target=interrupt)
+        thread.start()
+        link = f"--connect=udpout:127.0.0.1:{silent.address[1]}"
+        ended = gcs("--timeout=600", link, *name.split(), *ON_VEHICLE[name])
+        thread.join()
+    assert ended == ("", "gcs: interrupted\n", 1)
+    assert [path.name for path in tmp_path.iterdir()] == ["given.params"]
+
+
+@pytest.mark.parametrize("name", ["arm", "record", "mission upload"])
+def test_interrupted_process_ends_with_a_known_code(name: str, tmp_path: Path) -> None:
     with UdpSocket("127.0.0.1") as silent:
         link = f"--connect=udpout:127.0.0.1:{silent.address[1]}"
-        command = [sys.executable, "-m", "gcs_cli", "--timeout=600", link, *words]
-        with subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path
-        ) as process:
-            assert silent.wait(LONG_S)  # the heartbeat to a vehicle that does not answer
-            process.send_signal(signal.SIGINT)
-            said, complaint = process.communicate(timeout=LONG_S)
+        process = Program("gcs_cli", ["--timeout=600", link, *name.split(), *ON_VEHICLE[name]], tmp_path)
+        assert silent.wait(LONG_S)
+        process.send_signal(signal.SIGINT)
+        said, complaint = process.communicate(LONG_S)
     assert (said, complaint, process.returncode) == ("", "gcs: interrupted\n", 1)
     assert list(tmp_path.iterdir()) == []
 

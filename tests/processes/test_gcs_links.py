@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from flightstack.transports.udp import UdpSocket
 from gcs_cli.errors import CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.endpoint import VehicleEndpoint, parse_endpoint
-from gcs_cli.link.lines import RETRY_S, Line
+from gcs_cli.link.lines import RETRY_S, Line, TcpInLine
 from gcs_cli.link.share import ShareServer, open_shared, share_path
 from gcs_cli.link.tlog import encode_record
 from tests.support.commands import gcs
@@ -38,9 +39,15 @@ def test_command_over_tcp() -> None:
         assert gcs("--connect", f"tcp:127.0.0.1:{port}", "arm") == ("armed\n", "", 0)
 
 
-def test_command_to_a_vehicle_that_connects_over_tcp() -> None:
-    port = free_port()
-    with tcp_client(FakeVehicle(), port):
+def test_command_to_a_vehicle_that_connects_over_tcp(monkeypatch: pytest.MonkeyPatch) -> None:
+    port, listening, listen = free_port(), threading.Event(), TcpInLine.__init__
+
+    def listen_and_tell(line: TcpInLine, host: str, number: int) -> None:
+        listen(line, host, number)
+        listening.set()
+
+    monkeypatch.setattr(TcpInLine, "__init__", listen_and_tell)
+    with tcp_client(FakeVehicle(), port, listening):
         assert gcs("--connect", f"tcpin:127.0.0.1:{port}", "arm") == ("armed\n", "", 0)
 
 

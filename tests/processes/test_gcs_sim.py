@@ -11,7 +11,8 @@ from pathlib import Path
 from flightstack.core.port_numbers import INSTANCES
 from flightstack.testing.instances import ServerError, free_instance
 from tests.support.commands import gcs
-from tests.support.process import Process, children_of
+from tests.support.process import Process, children_of, ends_of
+from tests.support.terminal import terminal
 
 
 def free_pair() -> int:
@@ -58,3 +59,28 @@ def test_sim_ends_all_when_one_process_dies() -> None:
         assert f"gcs: vehicle {first + 1}: flightstack was killed by signal 9" in sim.output
     finally:
         sim.kill()
+
+
+def test_killed_sim_ends_its_vehicle() -> None:
+    sim = Process("gcs_cli", "sim", "--instance", str(free_instance()), "--log", "none", "--state", "none")
+    try:
+        sim.wait_for("Ctrl-C ends the simulation")
+        with ends_of(*children_of(sim._popen.pid).values()):
+            sim.kill()
+    finally:
+        sim.kill()
+
+
+def test_ctrl_c_in_the_view_of_sim_ends_all() -> None:
+    instance = str(free_instance())
+    words = ["-m", "gcs_cli", "sim", "--watch", "--instance", instance, "--log", "none", "--state", "none"]
+    with terminal(words) as screen:
+        screen.read_until(b"Position")
+        children = children_of(screen.process.pid)
+        assert set(children) == {"sim_bridge", "flightstack", "gcs_cli"}
+        with ends_of(*children.values()):
+            screen.type(b"\x03")
+        screen.read_until(b"simulation ended")
+        assert screen.process.wait() == 0
+        assert screen.is_restored
+        assert b"Traceback" not in screen.seen

@@ -63,6 +63,15 @@ def test_messages_prints_texts_up_to_a_severity(tmp_path: Path) -> None:
     )  # fmt: skip
 
 
+def test_messages_begins_with_those_of_before(tmp_path: Path) -> None:
+    with real_vehicle(tmp_path, with_simulator=False) as stack:
+        assert gcs("--connect", stack.link, "arm").returncode == 1
+        past = lines(gcs("--connect", stack.link, "messages", "--duration", "0", "--json"))
+        assert past[-1]["text"] == "Command refused: no valid position and attitude yet"
+        assert (past[-1]["severity"], past[-1]["past"]) == ("warning", True)
+        assert gcs("--connect", stack.link, "messages", "--duration", "0", "--past", "0").stdout == ""
+
+
 def test_messages_ends_after_its_duration(link: str) -> None:
     assert gcs(link, "messages", "--duration", "0.1") == ("", "", 0)
 
@@ -233,11 +242,13 @@ def test_typed_commands_are_completed_and_kept(tmp_path: Path, link: str) -> Non
         os.write(main, b"ar\t\n")
         read_until("armed")
         read_until("1 HOLD armed> ")
+        # Python notices a signal that comes before it waits for a key only after the next line
+        process.send_signal(signal.SIGINT)
+        os.write(main, b"\n")
+        read_until("> ")
         os.write(main, b"frobnicate\n")
         read_until("No such command")
-        read_until("> ")
-        process.send_signal(signal.SIGINT)
-        read_until("> ")
+        read_until("> ")  # the only prompt since, so that the terminal passes on the key
         os.write(main, b"\x04")
         assert process.wait(LONG_S) == 0
     finally:

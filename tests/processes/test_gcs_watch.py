@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import os
-import pty
-import select
 import signal
 import socket
 import subprocess
 import sys
-import termios
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,6 +17,7 @@ import pytest
 
 from tests.support.browser import Page, chromium, page_socket
 from tests.support.fake_vehicle import FakeVehicle, serve
+from tests.support.terminal import terminal
 
 LONG_S = 60  # a bound for a machine that is busy
 GCS = [sys.executable, "-m", "gcs_cli"]
@@ -86,13 +84,6 @@ def test_once_prints_one_screen(link: list[str]) -> None:
     assert "\x1b" not in result.stdout
 
 
-# makes the terminal on stdin the process's own, so that Ctrl-C reaches it
-ON_ITS_TERMINAL = """
-import fcntl, os, sys, termios
-os.setsid()
-fcntl.ioctl(0, termios.TIOCSCTTY, 0)
-os.execv(sys.executable, [sys.executable, *sys.argv[1:]])
-"""
 FAILING = """
 import sys
 from gcs_cli.__main__ import main
@@ -105,49 +96,6 @@ def fail(app):
 WatchApp.redraw = fail
 sys.exit(main(sys.argv[1:]))
 """
-
-
-class Terminal:
-    """A process on a terminal of its own."""
-
-    def __init__(self, arguments: list[str]) -> None:
-        self._terminal, self._inner = pty.openpty()
-        self._before = termios.tcgetattr(self._inner)
-        self.process = subprocess.Popen(
-            [sys.executable, "-c", ON_ITS_TERMINAL, *arguments],
-            stdin=self._inner, stdout=self._inner, stderr=self._inner,
-            env={**os.environ, "TERM": "xterm-256color", "COLUMNS": "80", "LINES": "24"},
-        )  # fmt: skip
-        self.seen = b""
-
-    def read_until(self, wanted: bytes) -> None:
-        while wanted not in self.seen:
-            assert select.select([self._terminal], [], [], LONG_S)[0], f"{wanted!r} never came"
-            self.seen += os.read(self._terminal, 65536)
-
-    def type(self, keys: bytes) -> None:
-        os.write(self._terminal, keys)
-
-    @property
-    def is_restored(self) -> bool:
-        """True if the main screen, the cursor, the mouse and the line discipline are as before."""
-        ends = (b"\x1b[?1049l", b"\x1b[?25h", b"\x1b[?1000l")
-        return all(end in self.seen for end in ends) and termios.tcgetattr(self._inner) == self._before
-
-    def close(self) -> None:
-        self.process.kill()
-        self.process.wait()
-        os.close(self._terminal)
-        os.close(self._inner)
-
-
-@contextmanager
-def terminal(arguments: list[str]) -> Iterator[Terminal]:
-    made = Terminal(arguments)
-    try:
-        yield made
-    finally:
-        made.close()
 
 
 @pytest.mark.parametrize(
@@ -222,20 +170,37 @@ def served(link: list[str]) -> Iterator[str]:
         assert process.wait(LONG_S) == 0
 
 
-def test_a_browser_shows_the_view_and_commands_the_vehicle(tmp_path: Path) -> None:
+async def open_view(page: Page, url: str) -> None:
+    """Open the view, which loads nothing from another address, and wait for the vehicle."""
+    await page.call("Network.enable")
+    await page.call("Page.navigate", url=url)
+    await page.wait("document.body.classList.contains('-first-byte')")
+    loaded = await page.value("performance.getEntriesByType('resource').map(e => e.name).join(' ')")
+    assert all(name.startswith(url) for name in loaded.split())
+    await page.wait_for_frame("DISARMED")
+
+
+def test_two_browsers_show_the_view_and_command_the_vehicle(tmp_path: Path) -> None:
     vehicle = FakeVehicle()
 
     async def visit(devtools: str, url: str) -> None:
-        async with aiohttp.ClientSession() as session, session.ws_connect(page_socket(devtools)) as ws:
-            page = Page(ws)
-            await page.call("Page.navigate", url=url)
-            await page.wait("document.body.classList.contains('-first-byte')")
-            loaded = await page.value("performance.getEntriesByType('resource').map(e => e.name).join(' ')")
-            assert all(name.startswith(url) for name in loaded.split())
-            while not vehicle.armed:  # a key before the heartbeat has no effect
-                for key in "Ay":
-                    await page.type(key)
-                    await asyncio.sleep(0.5)
+        async with (
+            aiohttp.ClientSession() as session,
+            session.ws_connect(page_socket(devtools)) as first,
+            session.ws_connect(page_socket(devtools)) as second,
+        ):
+            one, two = Page(first), Page(second)
+            await open_view(one, url)
+            await open_view(two, url)
+            await one.type("A")
+            await one.wait_for_frame("The rotors start")
+            await one.type("y")
+            await two.wait_for_frame(" ARMED ")
+            assert vehicle.armed
+            await two.type("D")
+            await two.wait_for_frame("in the air?")
+            await two.type("y")
+            await one.wait_for_frame(" DISARMED ")
 
     with (
         serve(vehicle) as udp,
@@ -243,7 +208,7 @@ def test_a_browser_shows_the_view_and_commands_the_vehicle(tmp_path: Path) -> No
         chromium(tmp_path) as devtools,
     ):
         asyncio.run(asyncio.wait_for(visit(devtools, url), 4 * LONG_S))
-    assert vehicle.armed
+    assert not vehicle.armed
 
 
 def test_pages_of_other_origins_cannot_command_the_vehicle(link: list[str]) -> None:

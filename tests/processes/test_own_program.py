@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 from pathlib import Path
 
@@ -9,6 +11,7 @@ import pytest
 
 import flightstack
 from flightstack.process.command_line import own_program
+from flightstack.process.supervised import supervised
 
 
 @pytest.mark.parametrize("inside", [False, True], ids=["elsewhere", "in the checkout"])
@@ -22,3 +25,16 @@ def test_folders_of_the_same_name_are_not_run(
         own_program("flightstack", "--version"), capture_output=True, text=True, check=False
     )
     assert (done.stdout, done.stderr) == (f"flightstack {flightstack.__version__}\n", "")
+
+
+def test_supervised_program_ends_when_its_pipe_closes() -> None:
+    inherited, own_end = os.pipe()
+    program = supervised("code", descriptor=inherited)
+    with subprocess.Popen(
+        program, stdin=subprocess.PIPE, stderr=subprocess.PIPE, pass_fds=[inherited]
+    ) as child:
+        os.close(inherited)
+        assert child.stderr is not None
+        assert child.stderr.readline()
+        os.close(own_end)
+        assert child.wait() == -signal.SIGTERM

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from flightstack.mavlink.link import Address, Link
-from flightstack.plan import Command, Frame, MissionItem, MissionType, check_fence, check_mission, check_rally
+from flightstack.plan import Command, Frame, MissionItem, MissionType, check_mission
+from flightstack.plan.fence import check_fence
+from flightstack.plan.rally import check_rally
 from flightstack.services.mission.mission_server import MissionServer
 from flightstack.services.mission.mission_store import MissionEvent
 from flightstack.transports.memory import LOSSLESS, Conditions, LossyLink

@@ -9,15 +9,9 @@ import pytest
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
-from flightstack.plan import (
-    MissionItem,
-    MissionType,
-    Plan,
-    check_fence,
-    check_mission,
-    check_rally,
-    fence_shape,
-)
+from flightstack.plan import MissionItem, MissionType, Plan, check_mission
+from flightstack.plan.fence import check_fence, fence_shape
+from flightstack.plan.rally import check_rally
 from flightstack.services.mission.mission_server import MissionServer
 from flightstack.services.mission.mission_store import Check, CurrentRequested, MissionReplaced
 from flightstack.transports.memory import LOSSLESS, Conditions, LossyLink

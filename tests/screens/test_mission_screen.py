@@ -72,6 +72,13 @@ def test_progress_of_a_mission_that_begins_with_home_is_one_item_less():
     assert mission_progress(TABLE, view)[:2] == (0, None)
 
 
+def test_all_items_of_a_complete_mission_are_reached():
+    view = FLYING._replace(mission=FLYING.mission._replace(state=mavlink.MISSION_STATE_COMPLETE))
+    progress = mission_progress(TABLE, view)
+    columns = mission_columns(118, in_flight=False)
+    assert [mission_row(TABLE, seq, progress, columns, DARK).plain[0] for seq in range(5)] == ["✓"] * 5
+
+
 @pytest.mark.parametrize("width", [78, 118, 198])
 def test_row_of_an_item_fits_and_marks_progress(width):
     columns = mission_columns(width, in_flight=True)
@@ -252,7 +259,9 @@ def test_upload_checks_asks_while_armed_and_reads_back():
         assert "The vehicle is armed" in "\n".join(shown(app))
         await pilot.press("y")
         await pilot.pause()
-        answer(app, "uploaded: mission of 4 items equal")
+        answer(app, True)
+        await pilot.pause()
+        answer(app, "mission of 4 items equal")
         await pilot.pause()
         assert said(app) == ["uploaded: mission of 4 items equal"]
         assert not screen.draft.is_changed

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable
 
 import pytest
+from textual.color import Color
 from textual.pilot import Pilot
 
 from flightstack.core.enums import Severity
@@ -220,6 +221,15 @@ def test_a_form_asks_for_values_and_names_what_is_wrong() -> None:
     assert [action.facts for action in feed.actions] == [{"altitude_m": 12.0}]
 
 
+def test_help_of_an_order_is_shown_whole_in_its_form() -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await pilot.press("T")
+        await pilot.pause()
+        assert "without one, the vehicle's own" in " ".join(" ".join(shown(app)).replace("│", " ").split())
+
+    play(story, GROUNDED)
+
+
 def test_escape_leaves_a_form_without_an_order() -> None:
     async def story(_app: WatchApp, pilot: Pilot) -> None:
         await pilot.press("G")
@@ -316,6 +326,24 @@ def test_a_theme_changes_the_colours_of_drawings() -> None:
         app.theme = "nord"
         await pilot.pause()
         assert app.palette.text.startswith("#")
+
+    play(story)
+
+
+@pytest.mark.parametrize("theme", ["gcs-dark", "gcs-light"])
+def test_without_colour_warnings_and_the_horizon_differ_by_brightness(
+    theme: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NO_COLOR", "1")
+
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        app.theme = theme
+        await pilot.pause()
+        colours = app.palette
+        grey = {name: Color.parse(colour).monochrome.r for name, colour in colours._asdict().items()}
+        contrast = {name: abs(value - grey["background"]) for name, value in grey.items()}
+        assert contrast["bad"] == contrast["warning"] >= contrast["text"] > contrast["muted"]
+        assert grey["sky"] - grey["ground"] > 30  # measured: 36 and more
 
     play(story)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import itertools
 import json
 import shutil
@@ -18,6 +19,8 @@ import aiohttp
 from tests.support.tools import missing
 
 HANG_S = 120.0
+BINARY = 2
+"""Opcode of a frame with bytes, which DevTools reports in base64."""
 
 
 class Page:
@@ -26,13 +29,29 @@ class Page:
     def __init__(self, socket: aiohttp.ClientWebSocketResponse) -> None:
         self._socket = socket
         self._numbers = itertools.count(1)
+        self._frames = b""
+        """What the page's own WebSocket received, after ``Network.enable``."""
+
+    async def _receive(self) -> dict[str, Any]:
+        message: dict[str, Any] = json.loads(await self._socket.receive_str(timeout=HANG_S))
+        if message.get("method") == "Network.webSocketFrameReceived":
+            frame = message["params"]["response"]
+            data = frame["payloadData"]
+            self._frames += base64.b64decode(data) if frame["opcode"] == BINARY else data.encode()
+        return message
+
+    async def wait_for_frame(self, text: str) -> None:
+        """Wait until the page's WebSocket has received ``text`` since the last wait."""
+        while text.encode() not in self._frames:
+            await self._receive()
+        self._frames = self._frames.partition(text.encode())[2]
 
     async def call(self, method: str, **params: Any) -> dict[str, Any]:
         """Return the result of a DevTools method."""
         number = next(self._numbers)
         await self._socket.send_json({"id": number, "method": method, "params": params})
         while True:
-            answer = json.loads(await self._socket.receive_str(timeout=HANG_S))
+            answer = await self._receive()
             if answer.get("id") == number:
                 return answer["result"]
 
@@ -77,7 +96,7 @@ def chromium(folder: Path) -> Iterator[str]:
 
 
 def page_socket(devtools: str) -> str:
-    """Return the WebSocket address of the first page."""
-    with urllib.request.urlopen(f"{devtools}/json/list", timeout=HANG_S) as answer:
-        pages = [target for target in json.load(answer) if target["type"] == "page"]
-    return str(pages[0]["webSocketDebuggerUrl"])
+    """Open a page; return its WebSocket address."""
+    request = urllib.request.Request(f"{devtools}/json/new?about:blank", method="PUT")
+    with urllib.request.urlopen(request, timeout=HANG_S) as answer:
+        return str(json.load(answer)["webSocketDebuggerUrl"])

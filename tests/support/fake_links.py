@@ -74,17 +74,15 @@ def tcp_server(vehicle: FakeVehicle) -> Iterator[int]:
 
 
 @contextmanager
-def tcp_client(vehicle: FakeVehicle, port: int) -> Iterator[None]:
-    """Connect ``vehicle`` to a TCP port, again after the connection ends."""
+def tcp_client(vehicle: FakeVehicle, port: int, listening: threading.Event) -> Iterator[None]:
+    """Connect ``vehicle`` to a TCP port once it is ``listening``, until that connection ends."""
     stopped = threading.Event()
 
     def step() -> None:
-        try:
-            connection = socket.create_connection(("127.0.0.1", port))
-        except OSError:
-            time.sleep(STEP_S)
+        if not listening.wait(STEP_S):
             return
-        with connection:
+        listening.clear()
+        with socket.create_connection(("127.0.0.1", port)) as connection:
             vehicle.make_heartbeat_due()
             while not stopped.is_set() and exchange(vehicle, connection.fileno()):
                 pass

@@ -129,13 +129,22 @@ class FakeVehicle:
         return ACCEPTED
 
     def _answer_request(self, number: int) -> None:
-        makers = {
-            mavlink.MAVLINK_MSG_ID_SYS_STATUS: self._sys_status,
-            mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current,
+        available = {
+            mavlink.MAVLINK_MSG_ID_SYS_STATUS: self._sys_status(),
+            mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current(),
+            **self._on_request(),
         }
-        if number in makers:
-            self._out.append(makers[number]())
-        self._ack(REQUEST, ACCEPTED if number in makers else UNSUPPORTED)
+        if number in available:
+            self._out.append(available[number])
+        self._ack(REQUEST, ACCEPTED if number in available else UNSUPPORTED)
+
+    def _on_file_transfer_protocol(self, message: Any) -> None:
+        """Refuse: the vehicle has no files."""
+        request = bytes(message.payload)
+        sequence = int.from_bytes(request[:2], "little") + 1
+        nak = sequence.to_bytes(2, "little") + bytes([0, 129, 1, request[3], 0, 0, 0, 0, 0, 0, 10])
+        sender = message.get_srcSystem(), message.get_srcComponent()
+        self._out.append(mavlink.MAVLink_file_transfer_protocol_message(0, *sender, nak.ljust(251, b"\0")))
 
     def _on_mission_count(self, message: Any) -> None:
         self.plan_type = message.mission_type

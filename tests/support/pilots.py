@@ -8,6 +8,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from textual.app import App
+from textual.events import Key
 from textual.pilot import Pilot
 
 
@@ -53,3 +54,11 @@ def run_story(
 
     with asyncio.Runner(loop_factory=_SkippingLoop) as runner:
         runner.run(run())
+
+
+async def type_ahead(pilot: Pilot[None], *keys: str) -> None:
+    """Press keys without waiting for their effects in between."""
+    for key in keys:
+        pilot.app.post_message(Key(key, key if len(key) == 1 else None))
+    await pilot.pause()
+    await pilot.pause()

@@ -50,7 +50,7 @@ def children_of(pid: int) -> dict[str, int]:
             continue
         if parent == pid and "-m" in arguments:
             module, *rest = arguments[arguments.index("-m") + 1 :]
-            found[rest[0] if module == SUPERVISOR else module] = int(entry.name)
+            found[rest[1] if module == SUPERVISOR else module] = int(entry.name)
     return found
 
 

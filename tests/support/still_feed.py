@@ -14,12 +14,14 @@ from gcs_cli.link.connection import Connection
 from gcs_cli.tui.feed import Feed, Notice
 from gcs_cli.tui.history import History
 from gcs_cli.tui.message_log import MessageLog
+from gcs_cli.tui.traffic import Traffic
 from gcs_cli.vehicle.view_types import VehicleView
 
 
 class StillFeed(Feed):
     def __init__(self, view: VehicleView, now_s: float = 10.0, history: History | None = None) -> None:
         self.history = history or History()
+        self.traffic = Traffic()
         self.messages = MessageLog()
         self.messages.follow(view)
         self.notices = deque()
@@ -59,7 +61,9 @@ class StillFeed(Feed):
     def link_name(self) -> str:
         return "UDP 127.0.0.1:14550"
 
-    def submit(self, job: Callable[[Connection], Any], system_id: int | None = None) -> Future[Any]:
+    def submit(
+        self, job: Callable[[Connection], Any], system_id: int | None = None, *, ends_in_order: bool = False
+    ) -> Future[Any]:
         self.job_targets.append(system_id)
         self.jobs.append((job, Future()))
         return self.jobs[-1][1]

@@ -57,10 +57,14 @@ def wait_until_healthy(link: str) -> None:
 
 @contextlib.contextmanager
 def vehicle(
-    folder: Path, *arguments: object, speed: object = 10, with_simulator: bool = True
+    folder: Path,
+    *arguments: object,
+    speed: object = 10,
+    with_simulator: bool = True,
+    instance: int | None = None,
 ) -> Iterator[VehicleProcesses]:
-    """Run both and end them at exit; ``arguments`` are those of the flight stack."""
-    instance = free_instance()
+    """Run both and end them at exit; ``arguments`` are those of the flight stack. Without ``instance``, a free one."""
+    instance = free_instance() if instance is None else instance
     with contextlib.ExitStack() as ends:
 
         def run(module: str, *words: object) -> Program:

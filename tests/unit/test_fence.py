@@ -13,8 +13,10 @@ from hypothesis import strategies as st
 
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.guidance.fence import NO_FENCE, Fence, FenceBreach, FenceEvaluator
-from flightstack.plan import FenceCommand, FenceShape, fence_shape
-from flightstack.plan.fence_shape import Area, edges_that_cross
+from flightstack.plan import FenceCommand
+from flightstack.plan.fence import fence_shape
+from flightstack.plan.fence_areas import Area
+from flightstack.plan.fence_shape import FenceShape, edges_that_cross
 from tests.support.plan_items import HOME, circle, polygon, square, vertex_items
 
 FRAME = LocalFrame(HOME)

@@ -1,12 +1,27 @@
-"""``gcs --help`` and completion are quick because they import nothing heavy."""
+"""Help, completion and commands are quick because they import only what they use."""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+
+from gcs_cli.__main__ import main
+from gcs_cli.commands.registry import (
+    FenceGroup,
+    GcsGroup,
+    LogGroup,
+    MissionGroup,
+    ParamGroup,
+    PilGroup,
+    RallyGroup,
+)
+from gcs_cli.lazy_group import LazyGroup
+from gcs_cli.program import run
+from tests.support.sample_logs import small_tlog
 
 HEAVY = ("numpy", "numba", "scipy", "matplotlib", "pyulog", "pymavlink", "rich", "jinja2", "plotly")
 LIGHT = (
@@ -48,6 +63,35 @@ def test_help_imports_nothing_heavy(words: list[str]) -> None:
     assert f"Usage: {' '.join(['gcs', *words])}" in output_of(*words, "--help")
 
 
+def test_help_of_gcs_imports_no_command_line_library() -> None:
+    code = (
+        "import sys, gcs_cli.__main__; gcs_cli.__main__.main(['--help']); assert 'typer' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
+
+
+@pytest.mark.parametrize("columns", ["60", "80", "200"])
+def test_help_of_gcs_fits_the_terminal(
+    columns: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", columns)
+    assert main(["--help"]) == run(["--help"]) == 0
+    printed = capsys.readouterr().out
+    assert printed[: len(printed) // 2] == printed[len(printed) // 2 :]
+    assert max(map(len, printed.splitlines())) < int(columns)
+
+
+def completions(line: str, *, checks: bool = True) -> list[str]:
+    """Return the completions of bash; with ``checks``, nothing heavy is imported for them."""
+    words = {"_GCS_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(line.count(" "))}
+    if checks:
+        return output_of(**words).splitlines()
+    command = [sys.executable, "-m", "gcs_cli"]
+    return subprocess.run(
+        command, capture_output=True, text=True, check=True, env={**os.environ, **words}
+    ).stdout.splitlines()
+
+
 @pytest.mark.parametrize(
     ("line", "completion"),
     [
@@ -60,32 +104,74 @@ def test_help_imports_nothing_heavy(words: list[str]) -> None:
     ],
 )
 def test_completion_imports_nothing_heavy(line: str, completion: str) -> None:
-    shell = {"_GCS_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(line.count(" "))}
-    assert completion in output_of(**shell).splitlines()
+    assert completion in completions(line)
 
 
-LATE = (
+@pytest.mark.parametrize(
+    ("line", "completion"),
+    [
+        ("gcs param get mpc_xy_cr", "mpc_xy_cruise"),
+        ("gcs param set MPC_XY_CR", "MPC_XY_CRUISE"),
+        ("gcs mode al", "altitude"),
+        ("gcs mode alt_", "alt_hold"),
+        ("gcs listen ATTITUDE_Q", "ATTITUDE_QUATERNION"),
+        ("gcs send command_l", "command_long"),
+    ],
+)
+def test_values_are_completed(line: str, completion: str) -> None:
+    assert completion in completions(line, checks=False)
+
+
+LIBRARIES = (
+    "numpy",
     "numba",
     "scipy",
     "matplotlib",
     "pyulog",
-    "rich.console",
+    "rich",
     "jinja2",
     "plotly",
     "textual",
     "serial",
+    "pandas",
 )
-"""Libraries that a command about messages does not use; a serial port is opened with the last one."""
+"""Libraries that a command about a vehicle does not use; a serial port is opened with pyserial."""
+
+USED: dict[str, set[str]] = {
+    "mission_new": {"numpy"},
+    "log_file": {"numpy", "pyulog"},
+    "log_plot": {"numpy", "pyulog", "rich", "jinja2"},
+    "log_draw": {"numpy", "pyulog"},
+    "replay": {"numpy", "pyulog"},
+    "report": {"numpy", "pyulog", "jinja2"},
+    "compare": {"numpy", "pyulog", "jinja2", "rich"},
+    "watch": {"rich"},
+}
+"""Libraries that a command imports at once, because it uses them always."""
 
 
-@pytest.mark.parametrize(
-    "module",
-    [
-        f"gcs_cli.commands.{name}"
-        for name in ("actions", "status", "messages", "listen", "send", "record", "shell")
-    ],
-)
-def test_command_imports_only_the_link(module: str) -> None:
-    code = f"import sys, {module}; print(*[name for name in {LATE!r} if name in sys.modules])"
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert result.stdout.strip() == ""
+def modules_of(group: type[LazyGroup] = GcsGroup) -> set[str]:
+    own = {command.module for command in group.lazy.values()}
+    parts = (MissionGroup, FenceGroup, RallyGroup, ParamGroup, LogGroup, PilGroup)
+    return own.union(*(modules_of(part) for part in parts)) if group is GcsGroup else own
+
+
+def loaded_by(code: str, *arguments: str) -> set[str]:
+    """Return the libraries that a Python program has imported at its end."""
+    ending = f"import sys; print('loaded', *[n for n in {LIBRARIES!r} if n in sys.modules], file=sys.stderr)"
+    command = [sys.executable, "-c", f"{code}\n{ending}", *arguments]
+    result = subprocess.run(command, capture_output=True, text=True, check=True)
+    return set(result.stderr.splitlines()[-1].split()[1:])
+
+
+@pytest.mark.parametrize("module", sorted(modules_of()))
+def test_command_imports_only_what_it_uses(module: str) -> None:
+    assert loaded_by(f"import {module}") == USED.get(module.rpartition(".")[2], set())
+
+
+@pytest.mark.parametrize("words", [["status"], ["listen", "ATTITUDE"], ["messages"]], ids=" ".join)
+def test_link_command_runs_without_numpy(words: list[str], tmp_path: Path) -> None:
+    recording = tmp_path / "small.tlog"
+    recording.write_bytes(small_tlog())
+    code = "import sys; from gcs_cli.__main__ import main; assert main(sys.argv[1:]) == 0"
+    assert loaded_by(code, "--connect", str(recording), *words) == set()

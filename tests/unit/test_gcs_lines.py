@@ -6,9 +6,12 @@ from collections.abc import Iterable, Sequence
 
 import pytest
 
-from flightstack.transports.udp import Address
+from flightstack.core.port_numbers import INSTANCES, vehicle_ground_port
+from flightstack.transports.udp import Address, UdpSocket
+from gcs_cli.errors import CliError
 from gcs_cli.link import opening
-from gcs_cli.link.endpoint import VehicleEndpoint, parse_endpoint
+from gcs_cli.link.connection import Connection
+from gcs_cli.link.endpoint import LOOPBACK, VehicleEndpoint, parse_endpoint
 from gcs_cli.link.lines import Interest, Line
 from gcs_cli.link.opening import LATER_S, SeveralLines
 
@@ -91,3 +94,33 @@ def test_later_transports_are_opened_once_nothing_arrives(monkeypatch: pytest.Mo
     list(several.receive(100.0 + LATER_S))
     assert (opened, several.peers, broken.is_closed) == ([TWO, ONE], [THERE], True)
     assert several.due_s() is None
+
+
+def test_running_instances_are_those_whose_port_is_in_use() -> None:
+    last = INSTANCES - 1
+    with UdpSocket(LOOPBACK, vehicle_ground_port(last)):
+        assert last in opening.running_instances()
+    assert last not in opening.running_instances()
+
+
+@pytest.mark.parametrize(
+    ("running", "advice"),
+    [
+        ([], "start one with `gcs sim`, or give its address with --connect"),
+        ([3], "instance 3 runs on this machine: choose it with --instance 3"),
+        ([0, 7], "instances 0, 7 run on this machine: choose one with --instance"),
+        (
+            list(range(1, 20)),
+            "instances 1, 2, 3, 4, 5, 6, 7, 8 … run on this machine: choose one with --instance",
+        ),
+    ],
+    ids=["none", "one", "two", "many"],
+)
+def test_missing_vehicle_is_reported_with_those_that_run(
+    running: list[int], advice: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(opening, "running_instances", lambda: running)
+    connection = Connection(parse_endpoint("udp:127.0.0.1:1"), line=MemoryLine(HERE))
+    with connection, pytest.raises(CliError) as raised:
+        connection.wait_for_vehicle(0.0)
+    assert str(raised.value) == f"no vehicle sent to UDP 127.0.0.1:1 within 0 s: {advice}"

@@ -79,4 +79,4 @@ def test_completion_knows_the_messages_of_the_dialect() -> None:
     kinds = mavlink.mavlink_map.values()
     known = {kind.msgname for kind in kinds if not kind.__module__.endswith("ardupilotmega")}
     assert set(message_names("")) == known
-    assert message_names("attitude_q") == ["ATTITUDE_QUATERNION", "ATTITUDE_QUATERNION_COV"]
+    assert message_names("attitude_q") == ["attitude_quaternion", "attitude_quaternion_cov"]

@@ -134,6 +134,22 @@ def test_get_of_an_unknown_name(vehicle: ParamVehicle) -> None:
     assert (result.stderr, result.returncode) == ("gcs: NONE refused: the vehicle has no such parameter\n", 1)
 
 
+def test_get_of_a_misspelt_name_suggests_similar_ones(vehicle: ParamVehicle) -> None:
+    result = told(vehicle, "get", "MPC_XY_CRUIS")
+    assert result.returncode == 1
+    assert result.stderr.endswith("the vehicle has no such parameter; did you mean MPC_XY_CRUISE?\n")
+    assert "did you mean MPC_XY_CRUISE" in told(vehicle, "set", "MPC_XY_CRUSE", "3").stderr
+
+
+def test_get_takes_patterns(vehicle: ParamVehicle) -> None:
+    result = told(vehicle, "get", "mpc_*", "MPC_XY_CRUISE", "--json")
+    names = [json.loads(line)["name"] for line in result.stdout.splitlines()]
+    assert "MPC_XY_CRUISE" in names
+    assert len(names) == len(set(names)) > 1
+    assert all(name.startswith("MPC_") for name in names)
+    assert told(vehicle, "get", "NIX*").stderr == "gcs: no parameter matches NIX*\n"
+
+
 def test_search_finds_by_description(vehicle: ParamVehicle) -> None:
     found = told(vehicle, "search", "horizontal", "sped", "--json").stdout.splitlines()
     assert [json.loads(line)["name"] for line in found] == ["MPC_XY_CRUISE"]

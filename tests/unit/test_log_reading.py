@@ -165,6 +165,17 @@ def test_fields_are_found_by_incomplete_names(ulog: Recording, wanted: str, foun
     assert [field.label for field in find_fields(ulog, wanted)] == found
 
 
+def test_topic_stands_for_all_its_fields(ulog: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = find_fields(ulog, "Vehicle_Attitude")
+    assert {field.topic.name for field in found} == {"vehicle_attitude"}
+    assert [field.name for field in found][-4:] == [f"q[{index}]" for index in range(4)]
+    monkeypatch.setattr("gcs_cli.logs.fields.MOST_FIELDS", 3)
+    with pytest.raises(
+        CliError, match=r"vehicle_attitude: has \d+ fields, give some of them: .*q\[0\], q\[1\]"
+    ):
+        find_fields(ulog, "vehicle_attitude")
+
+
 @pytest.mark.parametrize(
     ("wanted", "said"),
     [

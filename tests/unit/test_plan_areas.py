@@ -24,13 +24,12 @@ from flightstack.plan import (
     MissionItem,
     MissionResult,
     Plan,
-    check_fence,
     check_mission,
-    check_rally,
-    fence_shape,
     load_plan,
     save_plan,
 )
+from flightstack.plan.fence import check_fence, fence_shape
+from flightstack.plan.rally import check_rally
 from tests.support.plan_items import HOME, circle, degrees, polygon, rally_point, return_point, square
 
 NAN = math.nan

@@ -20,9 +20,9 @@ from flightstack.plan import (
     MissionItem,
     MissionResult,
     check_mission,
-    fence_shape,
     mission_rejections,
 )
+from flightstack.plan.fence import fence_shape
 from flightstack.plan.item import integer_coordinate
 from tests.support.plan_items import circle, item
 

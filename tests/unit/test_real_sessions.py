@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 from flightstack.mavlink.link import Link
-from gcs_cli.actions.conditions import is_ready
+from gcs_cli.actions.conditions import Completion, is_ready, parse_condition
 from gcs_cli.link.tlog import decode_records
 from gcs_cli.vehicle.vehicle_view import update
-from gcs_cli.vehicle.view_types import VehicleView
+from gcs_cli.vehicle.view_types import MISSION_ACTIVE, MISSION_COMPLETE, Identity, Mission, VehicleView
 
 DATA = Path(__file__).parents[1] / "data"
 
@@ -76,6 +76,30 @@ def test_px4_reports_its_state() -> None:
     assert (view.gnss.fix_name, view.gnss.satellites) == ("3D fix", 10)
     assert view.mission.reached == 2
     assert values(seen, lambda view: view.on_ground)[:3] == [None, True, False]
+
+
+@pytest.mark.parametrize("ends_with_return", [True, False])
+def test_px4_mission_without_a_state_is_complete_at_its_return(ends_with_return: bool) -> None:
+    """PX4 f2471861 sends no MISSION_STATE, and does not report the return as reached."""
+    seen, completion = views("px4_sih_flight"), Completion(ends_with_return)
+    held = [completion.holds(view) for view in seen]
+    if not ends_with_return:
+        assert not any(held)
+        assert "does not report the state" in parse_condition("complete").value(seen[-1])
+        return
+    first = held.index(True)
+    assert (seen[first - 1].mode, seen[first].mode, seen[first].mission.current) == ("MISSION", "RTL", 3)
+    landed = seen[-1]._replace(armed=False, landed_state=1, mode="HOLD")
+    assert completion.holds(landed)
+    assert Completion(ends_with_return).holds(landed)  # a client that connects later
+
+
+def test_completed_mission_counts_until_it_begins_again() -> None:
+    """PX4 clears the state when the vehicle disarms."""
+    view, completion = VehicleView(identity=Identity(1, 1, 2, 12)), Completion()
+    states = (MISSION_ACTIVE, MISSION_COMPLETE, 2, MISSION_ACTIVE)
+    views = [view._replace(mission=Mission(0, 3, None, state)) for state in states]
+    assert [completion.holds(view) for view in views] == [False, True, True, False]
 
 
 def test_px4_has_a_position_while_it_stands() -> None:

@@ -7,6 +7,7 @@ import random
 import re
 import struct
 from collections import Counter
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from flightstack.mavlink.frames import pack_frame
 from flightstack.mavlink.link import Link, Message
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.link.session import Session
+from gcs_cli.link.tlog import decode_records, encode_record
 from gcs_cli.logs.recording import ULOG, Recording, Topic
 from gcs_cli.logs.tlog_reader import read_tlog
 from gcs_cli.logs.ulog_reader import read_ulog
@@ -24,6 +26,7 @@ from gcs_cli.replay.keys import names_of
 from gcs_cli.replay.playback import Playback, TlogPlayback
 from gcs_cli.replay.replay_run import apply_keys
 from gcs_cli.replay.replay_vehicle import _ANSWERS, ReplayVehicle
+from gcs_cli.replay.throttle import throttle_of
 from gcs_cli.replay.ulog_playback import UlogPlayback
 from tests.support.sample_logs import small_tlog, small_ulog
 
@@ -246,6 +249,107 @@ def test_ulog_positions_are_those_of_the_log(ulog: Playback) -> None:
     (message,) = sent
     index = int(topic.time_us.searchsorted(recording.start_us + 10_000_000, side="right")) - 1
     assert (message.x, message.y, message.z) == tuple(float(topic.fields[name][index]) for name in "xyz")
+
+
+def test_ulog_has_the_progress_of_the_mission(ulog: Playback) -> None:
+    reached, states = [], []
+    for message in ulog.messages(-1.0, ulog.duration_s):
+        kind = message.get_type()
+        if kind == "MISSION_ITEM_REACHED":
+            reached.append(message.seq)
+        elif kind == "MISSION_CURRENT" and (not states or states[-1] != message.mission_state):
+            states.append(message.mission_state)
+    assert reached == list(range(len(reached)))
+    assert len(reached) > 1
+    assert states == [
+        mavlink.MISSION_STATE_NOT_STARTED,
+        mavlink.MISSION_STATE_ACTIVE,
+        mavlink.MISSION_STATE_PAUSED,  # lands in another mode
+        mavlink.MISSION_STATE_COMPLETE,
+    ]
+    assert [m.seq for m in ulog.state(ulog.duration_s) if m.get_type() == "MISSION_ITEM_REACHED"] == reached[
+        -1:
+    ]
+
+
+@pytest.mark.parametrize(
+    ("topic", "info", "throttle"),
+    [
+        (("vehicle_thrust_setpoint", {"xyz[0]": 0.0, "xyz[1]": 0.3, "xyz[2]": -0.4}), {}, 0.5),
+        (
+            ("rotor_speeds", {f"command_rad_s[{index}]": 200.0 + 100.0 * (index % 2) for index in range(6)}),
+            {"rotor_max_speed_rad_s": 400.0, "rotor_count": 6},
+            0.5 * (0.25 + 0.5625),
+        ),
+        (("wrench", {"thrust_achieved_n": 9.81}), {"mass_kg": 1.0}, 0.5),
+    ],
+)
+def test_throttle_of_any_ulog(
+    topic: tuple[str, dict[str, float]], info: dict[str, float], throttle: float
+) -> None:
+    name, fields = topic
+    values = {key: np.array([value]) for key, value in fields.items()}
+    log = Recording("log", ULOG, 0, 1, None, (Topic(name, np.array([0]), values),), info=info)
+    assert throttle_of(log).values.tolist() == [[pytest.approx(throttle)]]
+    position = Topic(
+        "vehicle_local_position",
+        np.array([0]),
+        {name: np.array([0.0]) for name in ("x", "y", "z", "vx", "vy", "vz")},
+    )
+    playback = UlogPlayback(replace(log, topics=(*log.topics, position)))
+    (hud,) = (message for message in playback.state(0.0) if message.get_type() == "VFR_HUD")
+    assert hud.throttle == round(100.0 * throttle)
+
+
+def plan_frames(vehicle: Link, station: Link) -> list[bytes]:
+    """Return the frames of an upload of two items, a refused one, and a download."""
+    mission = mavlink.MAV_MISSION_TYPE_MISSION
+
+    def items(link: Link, target: tuple[int, int], altitudes: tuple[float, ...]) -> list[bytes]:
+        return [
+            link.encode(
+                mavlink.MAVLink_mission_item_int_message(
+                    *target, seq, 6, 16, 0, 1, 0.0, 0.0, 0.0, 0.0, 473_977_420, 85_455_940, altitude, mission
+                )
+            )
+            for seq, altitude in enumerate(altitudes)
+        ]
+
+    def ack(result: int) -> bytes:
+        return vehicle.encode(mavlink.MAVLink_mission_ack_message(255, 190, result, mission))
+
+    count = mavlink.MAVLink_mission_count_message
+    frames = [station.encode(count(7, 1, 2, mission)), *items(station, (7, 1), (5.0, 6.0)), ack(0)]
+    frames += [station.encode(count(7, 1, 1, mission)), *items(station, (7, 1), (9.0,)), ack(15)]
+    return [
+        *frames,
+        vehicle.encode(count(255, 190, 3, mission)),
+        *items(vehicle, (255, 190), (1.0, 2.0, 3.0)),
+    ]
+
+
+def test_plans_in_a_tlog_are_served() -> None:
+    frames = [frame for _, frame in zip(range(9), decode_frames(small_tlog()), strict=False)]
+    frames += plan_frames(Link(7, 1), Link(255, 190))
+    content = b"".join(encode_record(1_000_000 * number, frame) for number, frame in enumerate(frames))
+    playback = TlogPlayback(content, (7, 1))
+    found = [
+        [item.z for item in playback.plan(mavlink.MAV_MISSION_TYPE_MISSION, float(at_s))]
+        for at_s in (9, 12, 16, len(frames) - 1)
+    ]
+    assert found == [[], [5.0, 6.0], [5.0, 6.0], [1.0, 2.0, 3.0]]
+    vehicle = ReplayVehicle(playback, [STATION], 0.0, begin_s=12.0)
+    client = Client(vehicle)
+    listed = client.ask(mavlink.MAVLink_mission_request_list_message(7, 1, 0))
+    assert [m.count for m in listed if m.get_type() == "MISSION_COUNT"] == [2]
+    item = client.ask(mavlink.MAVLink_mission_request_int_message(7, 1, 1, 0))
+    assert [(m.seq, m.z, m.x) for m in item if m.get_type() == "MISSION_ITEM_INT"] == [(1, 6.0, 473_977_420)]
+    beyond = client.ask(mavlink.MAVLink_mission_request_int_message(7, 1, 2, 0))
+    assert [m.type for m in beyond if m.get_type() == "MISSION_ACK"] == [mavlink.MAV_MISSION_INVALID_SEQUENCE]
+
+
+def decode_frames(content: bytes) -> list[bytes]:
+    return [record.frame for record in decode_records(content)]
 
 
 def test_battery_with_unknown_current_is_replayed() -> None:

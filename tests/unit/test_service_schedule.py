@@ -51,6 +51,35 @@ def test_service_is_polled_at_its_deadline_and_after_a_wake() -> None:
     assert schedule.poll(6.0) == [(None, "6"), (None, "6")]
 
 
+def test_mission_item_wakes_only_its_service() -> None:
+    mission, other = Bell(None), Bell(None)
+    mission.handles = frozenset({"MISSION_ITEM_INT"})
+    schedule = Schedule([mission, other])
+    schedule.poll(0.0)
+    schedule.wake("MISSION_ITEM_INT")
+    schedule.poll(1.0)
+    schedule.wake("COMMAND_LONG")
+    schedule.poll(2.0)
+    assert (mission.polled_s, other.polled_s) == ([0.0, 1.0, 2.0], [0.0, 2.0])
+
+
+def test_hub_sends_files_until_the_end_of_a_burst() -> None:
+    net = Net()
+    alice = net.join(ALICE)
+    path = b"etc/extras/parameters.json"
+
+    def request(number: int, opcode: Opcode, size: int, data: bytes = b"") -> None:
+        alice.send(ftp_message(VEHICLE, Packet(number, 0, opcode, size, data=data)))
+        net.poll()
+
+    request(0, Opcode.OPEN_FILE_RO, len(path), path)
+    assert not net.hub.sends_files
+    request(2, Opcode.BURST_READ_FILE, 239)
+    assert net.hub.sends_files
+    net.run(1.0)
+    assert not net.hub.sends_files
+
+
 def test_parameter_changed_without_a_message_is_announced() -> None:
     net = Net()
     alice = net.join(ALICE)

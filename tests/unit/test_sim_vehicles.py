@@ -129,11 +129,12 @@ def test_bad_options_are_refused_before_anything_starts(
 def test_view_is_a_process_that_ends_with_the_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
     started: list[tuple[str, ...]] = []
 
-    def program(*words: str) -> list[str]:
+    def program(*words: str, descriptor: int) -> list[str]:
+        assert descriptor > 2
         started.append(words)
         return [sys.executable, "-c", "import signal; signal.pause()"]
 
-    monkeypatch.setattr(sim_run, "own_program", program)
+    monkeypatch.setattr(sim_run, "supervised", program)
     with sim_run._view(SimOptions(instance=3, signing_key=Path("k")), wanted=True) as view:
         assert view is not None
         assert view.poll() is None

@@ -95,7 +95,17 @@ def test_order_is_performed_and_followed_during_a_job() -> None:
         assert feed.submit(job).result()
 
 
-def test_stop_waits_for_the_end_of_a_job() -> None:
+def test_stop_ends_a_job_that_waits() -> None:
+    begun = threading.Event()
+    with fed(FakeVehicle()) as feed:
+        waiting = feed.submit(lambda connection: connection.wait_for(lambda: bool(begun.set()), HANG_S))
+        begun.wait()
+        feed.stop()
+        with pytest.raises(CliError, match="interrupted"):
+            waiting.result()
+
+
+def test_stop_waits_for_a_job_that_ends_in_order() -> None:
     ended = []
 
     def job(connection: Connection) -> None:
@@ -107,7 +117,7 @@ def test_stop_waits_for_the_end_of_a_job() -> None:
 
     begun = threading.Event()
     with fed(FakeVehicle()) as feed:
-        feed.submit(job)
+        feed.submit(job, ends_in_order=True)
         later = feed.submit(job)
         begun.wait()
         feed.stop()

@@ -86,8 +86,9 @@ class LinkCommands:
             return Answer(
                 DENIED
             )  # no text: ground stations routinely request messages of gimbals and cameras
-        peer.outbox.extend(self._telemetry.requested(number, argument))
-        return Answer(ACCEPTED)
+        messages = self._telemetry.requested(number, argument)
+        peer.outbox.extend(messages)
+        return Answer(ACCEPTED if messages else DENIED)
 
     def _stream_log(self, command: Command) -> Answer:
         """LOGGING_START (format 0, ULog) streams the log of the current or next flight; LOGGING_STOP ends it."""

@@ -9,6 +9,7 @@ import json
 import lzma
 from collections.abc import Callable
 
+from flightstack.mavlink import text_file
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.files import Content, FileTree, fixed
 from flightstack.mavlink.ftp_messages import mavlink_crc32
@@ -81,13 +82,15 @@ def vehicle_files(
     metadata: ComponentMetadata | None,
     parameter_pack: Callable[[str], bytes | None] | None,
     logs: LogStore,
+    texts: Callable[[], bytes] = bytes,
 ) -> FileTree:
     """Return the files that a vehicle serves over MAVLink FTP.
 
     ``parameter_pack`` returns ``@PARAM/param.pck`` for the arguments after its "?". If it is None, the file does not
-    exist, and clients read the parameters one by one.
+    exist, and clients read the parameters one by one. ``texts`` returns the file of past status texts.
     """
     files = {} if metadata is None else dict(metadata.files)
     if parameter_pack is not None:
         files[PARAMETER_PACK] = parameter_pack
+    files[text_file.PATH] = lambda arguments: None if arguments else texts()
     return FileTree(files, {LOGS_FLAT: FlatLogs(logs), LOGS_DATED: DatedLogs(logs)})

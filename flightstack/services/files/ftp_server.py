@@ -98,6 +98,11 @@ class FtpServer:
         """Number of known clients, at most MAX_CLIENTS."""
         return len(self._clients)
 
+    @property
+    def is_busy(self) -> bool:
+        """True while a burst is in progress."""
+        return any(client.is_streaming for client in self._clients.values())
+
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
         """Take a message from ``peer``. Ignore all but requests to this vehicle."""
         if message.get_type() not in self.handles or not is_for(message, self.own):

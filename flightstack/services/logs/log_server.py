@@ -93,6 +93,11 @@ class LogServer:
         """Return the number of queued ranges of each client, at most MAX_RANGES."""
         return [len(client.ranges) for client in self._clients.values()]
 
+    @property
+    def is_busy(self) -> bool:
+        """True while data is left to send."""
+        return any(client.is_busy for client in self._clients.values())
+
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
         """Take a message from ``peer``. Ignore other protocols and other targets."""
         kind = message.get_type()

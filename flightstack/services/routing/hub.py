@@ -17,6 +17,8 @@ from flightstack.mavlink.link import Address, Link, Message, is_unknown
 from flightstack.mavlink.signing import Signing
 from flightstack.plan.kept_plans import KeptPlans
 from flightstack.services.commands.context import VehicleContext
+from flightstack.services.files.ftp_server import FtpServer
+from flightstack.services.logs.log_server import LogServer
 from flightstack.services.mission.mission_server import MissionService
 from flightstack.services.registry import Schedule, Service, make_services
 from flightstack.services.routing.peer import Peer, PeerAddress
@@ -58,6 +60,9 @@ class GroundHub:
         services = make_services(self._own, vehicle, parts, telemetry, info, self._peer_at, self._has_room)
         self._services = [*services, self._setup]
         self._schedule = Schedule(self._services)
+        self._file_services = [
+            service for service in self._services if isinstance(service, FtpServer | LogServer)
+        ]
         vehicle.params.subscribe(lambda _name, _value: self._schedule.wake())
         self._by_type: dict[str, list[Service]] = {}
         for service in self._services:
@@ -114,6 +119,11 @@ class GroundHub:
     def restore_plans(self, plans: KeptPlans) -> str | None:
         """Restore plans that were in force before; return the first refusal, or None."""
         return self._missions().restore(plans)
+
+    @property
+    def sends_files(self) -> bool:
+        """True while data of files or logs is left to send."""
+        return any(service.is_busy for service in self._file_services)
 
     def _missions(self) -> MissionService:
         return next(service for service in self._services if isinstance(service, MissionService))
@@ -188,8 +198,9 @@ class GroundHub:
                 frame = bytes(message.get_msgbuf())
                 self._to_forward.extend((other, frame) for other in route.forward)
             if route.local:
-                self._schedule.wake()
-                for service in self._by_type.get(message.get_type(), ()):
+                kind = message.get_type()
+                self._schedule.wake(kind)
+                for service in self._by_type.get(kind, ()):
                     service.receive(message, address, now_s)
 
     # ------------------------------------------------------------------ sending

@@ -45,7 +45,10 @@ MAKERS: dict[int, Callable[[VehicleStatus], Message]] = {
 
 STREAMED = frozenset({*MAKERS, FS_LOOP_TIMING_ID})
 """Messages that can be sent at a rate."""
-_AVAILABLE = STREAMED | {mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES}
+_AVAILABLE = STREAMED | {
+    mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES,
+    mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED,
+}
 
 
 def is_available(message_id: int) -> bool:
@@ -101,10 +104,15 @@ class Telemetry:
         return made
 
     def requested(self, message_id: int, argument: float = 0.0) -> tuple[Message, ...]:
-        """Return an available message as of now; ``argument`` is the second parameter of REQUEST_MESSAGE."""
+        """Return an available message as of now; ``argument`` is the second parameter of REQUEST_MESSAGE.
+
+        Before the first reached item there is no MISSION_ITEM_REACHED.
+        """
         if message_id == mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES:
             return tuple(modes.available_modes(argument))
         self.begin_poll()
+        if message_id == mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED:
+            return vehicle.item_reached(self.status)
         return self.messages(message_id)
 
     def farewell(self) -> Message:

@@ -91,6 +91,12 @@ def mission_current(f: VehicleStatus) -> Message:
     )
 
 
+def item_reached(f: VehicleStatus) -> tuple[Message, ...]:
+    """MISSION_ITEM_REACHED of the last reached item, if any."""
+    reached = f.mission.reached
+    return (mavlink.MAVLink_mission_item_reached_message(reached),) if reached >= 0 else ()
+
+
 SENSORS = (
     mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
     | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL

@@ -1,0 +1,65 @@
+"""A program on a terminal of its own."""
+
+from __future__ import annotations
+
+import os
+import pty
+import select
+import subprocess
+import sys
+import termios
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+LONG_S = 60
+"""Hang guard [s]."""
+# makes the terminal on stdin the process's own, so that Ctrl-C reaches it
+ON_ITS_TERMINAL = """
+import fcntl, os, sys, termios
+os.setsid()
+fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+os.execv(sys.executable, [sys.executable, *sys.argv[1:]])
+"""
+
+
+class Terminal:
+    """A process on a terminal of its own."""
+
+    def __init__(self, arguments: list[str]) -> None:
+        self._terminal, self._inner = pty.openpty()
+        self._before = termios.tcgetattr(self._inner)
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", ON_ITS_TERMINAL, *arguments],
+            stdin=self._inner, stdout=self._inner, stderr=self._inner,
+            env={**os.environ, "TERM": "xterm-256color", "COLUMNS": "80", "LINES": "24"},
+        )  # fmt: skip
+        self.seen = b""
+
+    def read_until(self, wanted: bytes) -> None:
+        while wanted not in self.seen:
+            assert select.select([self._terminal], [], [], LONG_S)[0], f"{wanted!r} never came"
+            self.seen += os.read(self._terminal, 65536)
+
+    def type(self, keys: bytes) -> None:
+        os.write(self._terminal, keys)
+
+    @property
+    def is_restored(self) -> bool:
+        """True if the main screen, the cursor, the mouse and the line discipline are as before."""
+        ends = (b"\x1b[?1049l", b"\x1b[?25h", b"\x1b[?1000l")
+        return all(end in self.seen for end in ends) and termios.tcgetattr(self._inner) == self._before
+
+    def close(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        os.close(self._terminal)
+        os.close(self._inner)
+
+
+@contextmanager
+def terminal(arguments: list[str]) -> Iterator[Terminal]:
+    made = Terminal(arguments)
+    try:
+        yield made
+    finally:
+        made.close()

@@ -1,0 +1,74 @@
+"""Aircraft on the map of ``gcs watch``, from ADSB_VEHICLE."""
+
+from __future__ import annotations
+
+import pytest
+
+from flightstack.core.contract import Vector3
+from flightstack.mavlink.dialect import mavlink
+from flightstack.plan import Plan
+from gcs_cli.tui.history import History
+from gcs_cli.tui.map_drawing import draw_map
+from gcs_cli.tui.map_model import MapModel
+from gcs_cli.tui.palette import DARK
+from gcs_cli.tui.traffic import KEPT_S, Aircraft, Traffic
+from gcs_cli.tui.viewport import Viewport
+from tests.support.map_views import FRAME, VIEW
+
+NOW_S = 100.0
+VALID = mavlink.ADSB_FLAGS_VALID_COORDS | mavlink.ADSB_FLAGS_VALID_ALTITUDE | mavlink.ADSB_FLAGS_VALID_HEADING
+
+
+def report(address: int = 0x3C6444, callsign: bytes = b"DLH4AB", flags: int = VALID):
+    geo = FRAME.to_geo(Vector3(40.0, 30.0, 0.0))
+    lat, lon = round(geo.latitude_deg * 1e7), round(geo.longitude_deg * 1e7)
+    return mavlink.MAVLink_adsb_vehicle_message(
+        address, lat, lon, 0, 613_000, 9000, 0, 0, callsign, 0, 1, flags, 0
+    )
+
+
+def test_aircraft_is_drawn_with_its_altitude_above_the_vehicle() -> None:
+    traffic = Traffic()
+    traffic.record(report(), NOW_S)
+    scene = MapModel().scene(VIEW, History(), Plan(()), traffic.aircraft(NOW_S))
+    (craft,) = scene.others
+    assert (craft.name, craft.heading_deg, craft.is_traffic) == ("DLH4AB +120 m", 90.0, True)
+    assert craft.place == pytest.approx((40.0, 30.0), abs=0.02)
+    assert "→DLH4AB +120 m" in draw_map(scene, Viewport(width=80, height=40), DARK).text().plain
+
+
+def test_aircraft_leaves_the_map_when_it_is_not_reported() -> None:
+    traffic = Traffic()
+    traffic.record(report(), NOW_S)
+    assert traffic.aircraft(NOW_S + KEPT_S)
+    assert not traffic.aircraft(NOW_S + KEPT_S + 1.0)
+
+
+def test_traffic_does_not_change_the_extent_of_the_map() -> None:
+    far = Aircraft("far", 48.0, 9.0, None, None, NOW_S)
+    model = MapModel()
+    alone = model.scene(VIEW, History(), Plan(())).extent()
+    assert (model.scene(VIEW, History(), Plan(()), [far]).extent() == alone).all()
+
+
+@pytest.mark.parametrize(
+    ("message", "names"),
+    [
+        (report(callsign=b""), ["3C6444"]),
+        (report(flags=0), []),
+        (mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3), []),
+    ],
+)
+def test_only_aircraft_with_a_position_count(message, names) -> None:
+    traffic = Traffic()
+    traffic.record(message, NOW_S)
+    assert [each.name for each in traffic.aircraft(NOW_S)] == names
+
+
+def test_aircraft_are_bounded_and_old_ones_make_room() -> None:
+    traffic = Traffic()
+    for address in range(300):
+        traffic.record(report(address), NOW_S)
+    assert len(traffic.aircraft(NOW_S)) == 200
+    traffic.record(report(999), NOW_S + KEPT_S + 1.0)
+    assert len(traffic.aircraft(NOW_S + KEPT_S + 1.0)) == 1
