@@ -83,7 +83,7 @@ class _Items:
     def are_needed(self) -> bool:
         """Return True if the vehicle has a mission that was not asked for yet."""
         mission, asked = self._connection.session.view.mission, self._asked
-        if mission.state is not None or not mission.total or self._connection.is_recording:
+        if mission.state is not None or not mission.total:
             return False
         return asked is None or (mission.mission_id, mission.total) != (asked.mission_id, asked.total)
 

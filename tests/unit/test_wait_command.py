@@ -24,7 +24,7 @@ class ScriptedConnection:
 
     def __init__(self, steps: Iterator[list[Any]], refusal: CliError | None = None) -> None:
         self.steps, self.refusal = steps, refusal
-        self.now_s, self.downloads, self.is_recording = 0.0, 0, False
+        self.now_s, self.downloads = 0.0, 0
         self.vehicle = Vehicle()
         self.session = SimpleNamespace(view=self.vehicle.view)
         self.fold(heartbeat(mode=HOLD_MODE))
