@@ -200,7 +200,9 @@ def test_log_data_waits_for_a_congested_peer_and_not_for_others() -> None:
     assert [peer for peer, _ in server.poll(0.0)] == [other, other]
     for second in range(60):
         assert server.poll(float(second)) == []
+    assert not server.is_busy
     congested.clear()
+    assert server.is_busy
     assert [(peer, message.ofs) for peer, message in server.poll(60.0)] == [(GCS, 0), (GCS, 90)]
 
 
