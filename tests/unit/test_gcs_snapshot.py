@@ -12,10 +12,10 @@ from gcs_cli.vehicle.view_types import Euler, GeoPosition, Identity, LoopTiming,
 OURS = VehicleView(identity=Identity(7, 1, mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4))
 TIMING = LoopTiming(0.0, 0, 0, 0, *[None] * 9, lockstep=True)
 REQUEST = mavlink.MAV_CMD_REQUEST_MESSAGE
-OWN = Address(255, 190)
+OWN, VEHICLE = Address(255, 190), Address(7, 1)
 
 
-def refusal(target: Address = OWN, sender: Address = Address(7, 1)) -> Message:
+def refusal(target: Address = OWN, sender: Address = VEHICLE) -> Message:
     ack = mavlink.MAVLink_command_ack_message(REQUEST, mavlink.MAV_RESULT_DENIED, 0, 0, *target)
     (received,) = Link(*target).decode(Link(*sender).encode(ack))
     return received
@@ -37,7 +37,10 @@ def test_snapshot_requests_nothing_before_a_heartbeat() -> None:
 
 def test_snapshot_requests_all_missing_messages_once() -> None:
     view = OURS._replace(
-        attitude=Euler(0.0, 0.0, 0.0), position_ned_m=(0.0, 0.0, 0.0), landed_state=1, mission=Mission(0, reached=0)
+        attitude=Euler(0.0, 0.0, 0.0),
+        position_ned_m=(0.0, 0.0, 0.0),
+        landed_state=1,
+        mission=Mission(0, reached=0),
     )
     snapshot = snapshot_of(view)
     battery, geo = mavlink.MAVLINK_MSG_ID_SYS_STATUS, mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
