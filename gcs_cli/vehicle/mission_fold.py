@@ -13,7 +13,7 @@ from flightstack.mavlink.dialect import mavlink
 from gcs_cli.autopilots.autopilot import Role
 from gcs_cli.vehicle.view_types import MISSION_ACTIVE, MISSION_COMPLETE, Mission, VehicleView
 
-_NO_NUMBER = 65535  # MISSION_CURRENT.total when the vehicle has no mission
+_NO_NUMBER = 65535  # MISSION_CURRENT.total without a mission; ArduPilot: no item is reached yet
 
 
 def after_heartbeat(view: VehicleView, mode: str, armed: bool) -> Mission:
@@ -54,7 +54,10 @@ def after_current(view: VehicleView, message: Any, _now_s: float) -> VehicleView
 
 def after_reached(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     """Return ``view`` after MISSION_ITEM_REACHED; PX4 repeats it for 10 s, and so into the next flight."""
-    mission = view.mission._replace(reached=_plan_number(view, message.seq))
+    number, total = _plan_number(view, message.seq), view.mission.total
+    if message.seq == _NO_NUMBER or (number is not None and total is not None and number >= total):
+        return view  # none yet, or one of a former mission
+    mission = view.mission._replace(reached=number)
     is_last = mission.is_at_last and mission.reached == mission.current
     ends = is_last and mission.has_begun and mission.state is None
     return view._replace(mission=mission._replace(has_ended=mission.has_ended or ends))

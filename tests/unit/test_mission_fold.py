@@ -213,6 +213,13 @@ def test_reported_completion_counts_until_the_mission_begins_again(vehicle: Vehi
     assert not flown(MISSION_ACTIVE)  # the state decides
 
 
+@pytest.mark.parametrize("seq", [65535, 4], ids=["none yet", "of a former mission"])
+def test_reached_item_outside_the_mission_is_none(vehicle: Vehicle, seq: int) -> None:
+    """ArduPilot answers a request with 65535, or with the last item that it ever reached."""
+    vehicle.send(mavlink.MAVLink_mission_current_message(0, 3))
+    assert vehicle.send(mavlink.MAVLink_mission_item_reached_message(seq)).mission.reached is None
+
+
 @pytest.fixture
 def vehicle() -> Vehicle:
     made = Vehicle()
