@@ -8,13 +8,13 @@ READY := $(VENV)/.test-ready
 # bytecode is written for what is imported, when it is first imported: half of the time to install, a fifth less room
 export PYTHONDONTWRITEBYTECODE :=
 INSTALL := $(BIN)/python -m pip install -q --no-compile --disable-pip-version-check -e
-# test processes side by side: one more than cores, because flights in real time wait most of theirs
-WORKERS ?= 3
+# test processes side by side: twice the cores, because flights in real time wait most of theirs
+WORKERS ?= 4
 # files in order: those of firmware, interop and processes, which take longest, come first
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 .DEFAULT_GOAL := help
 
-.PHONY: help setup fly test test-all stress check lint types imports generated generate docs bench fuzz fuzz-firmware firmware-check mutation clean
+.PHONY: help setup fly test test-all stress check static lint types imports generated generate docs bench fuzz fuzz-firmware firmware-check mutation clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
@@ -49,7 +49,10 @@ test-all: $(READY) ## Run every test
 stress: $(READY) ## Run every test beside a program that keeps each core busy
 	@$(BIN)/python tools/beside_load.py $(PYTEST)
 
-check: lint types imports generated docs test-all ## Everything that CI checks
+check: static test-all ## Everything that CI checks
+
+static: $(READY) ## Check everything that needs no test: style, types, imports, generated files, documentation
+	@$(MAKE) --no-print-directory -j 2 --output-sync lint types imports generated docs
 
 lint: $(READY)
 	$(BIN)/ruff check .

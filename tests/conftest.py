@@ -23,8 +23,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-# every run tries the same examples: one that fails does so on every machine, and again
-settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
+# every run tries the same examples: one that fails does so on every machine, and again; nights try others, and more
+settings.register_profile("repeatable", derandomize=True, deadline=None, database=None, max_examples=40)
 settings.register_profile("explore", deadline=None, database=None, print_blob=True)
 settings.load_profile("explore" if os.environ.get("NIGHTLY") else "repeatable")
 

@@ -43,6 +43,9 @@ FsLoopTiming: Any = mavlink.mavlink_map[LAYOUT_BY_NAME["FS_LOOP_TIMING"].message
 FsPlantState: Any = mavlink.mavlink_map[LAYOUT_BY_NAME["FS_PLANT_STATE"].message_id]
 FsActuators: Any = mavlink.mavlink_map[LAYOUT_BY_NAME["FS_ACTUATORS"].message_id]
 
+NAME_IN_VERSION = list(b"flightst")
+"""AUTOPILOT_VERSION.flight_custom_version in place of a Git hash; it distinguishes the vehicle from PX4."""
+
 FS_PLANT_STATE_ID: int = FsPlantState.id
 FS_ACTUATORS_ID: int = FsActuators.id
 FS_LOOP_TIMING_ID: int = FsLoopTiming.id
@@ -52,6 +55,7 @@ __all__ = [
     "FS_LOOP_TIMING_ID",
     "FS_PLANT_STATE_ID",
     "LAYOUT_BY_NAME",
+    "NAME_IN_VERSION",
     "EscStatus",
     "FsActuators",
     "FsLoopTiming",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, TypeAlias
 
+from flightstack.mavlink.link import Message
 from gcs_cli.autopilots.autopilot import VehicleCommand
 from gcs_cli.vehicle.view_types import VehicleView
 
@@ -32,6 +33,8 @@ class Step(NamedTuple):
     """Modes that belong to the step: once in one of them, a change to another mode ends the action; empty: any."""
     needs_armed: bool = False
     """True if a disarm before the effect ends the action."""
+    instead: Callable[[int, int], Message] | None = None
+    """Message to system and component of the same effect, which has no answer, if the command is not supported."""
     restarts: bool = False
     """True if the vehicle restarts: silence does not end the action, and the command is sent once."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from flightstack.mavlink.dialect import mavlink
 from gcs_cli.actions.action import Action, NotReadyError, Step
 from gcs_cli.actions.in_flight import hold, start_mission
 from gcs_cli.autopilots import common_commands
@@ -52,8 +53,9 @@ def jump(seq: int) -> Action:
             Step(
                 "mission jump",
                 common_commands.set_mission_current(number),
-                lambda view: view.mission.current == number,
+                lambda view: view.mission.current == seq,
                 f"does not report item {seq} as the current one",
+                instead=lambda *target: mavlink.MAVLink_mission_set_current_message(*target, number),
             ),
         )
 

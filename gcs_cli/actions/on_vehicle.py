@@ -32,7 +32,7 @@ def disarm(*, force: bool = False) -> Action:
 
 
 def select_mode(name: str) -> Action:
-    """Select a flight mode by its name."""
+    """Select a flight mode by its name or number."""
 
     def plan(view: VehicleView) -> tuple[Step, ...]:
         return (mode_step(view, name),)
@@ -57,12 +57,20 @@ def mode_step(view: VehicleView, name: str) -> Step:
 
 
 def find_mode(view: VehicleView, name: str) -> int | None:
-    """Return the custom mode of a name: the autopilot's, or the vehicle's own in AVAILABLE_MODES."""
+    """Return the custom mode of a name, the autopilot's or the vehicle's own in AVAILABLE_MODES, or of its number."""
+    if name.isascii() and name.isdecimal():
+        return _numbered(view, int(name))
     number = view.autopilot.mode_number(name, view.vehicle_type)
     if number is not None:
         return number
     wanted = plain_name(name)
     return next((mode.number for mode in view.modes if plain_name(mode.label) == wanted), None)
+
+
+def _numbered(view: VehicleView, number: int) -> int | None:
+    """Return the number of a mode if the vehicle may have it: any one if neither table nor vehicle lists modes."""
+    known = {*view.autopilot.mode_names(view.vehicle_type), *(mode.number for mode in view.modes)}
+    return number if number in (known or range(2**32)) else None
 
 
 def mode_choices(view: VehicleView) -> dict[str, int]:

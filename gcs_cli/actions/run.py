@@ -7,10 +7,11 @@ from enum import Enum
 from typing import NamedTuple
 
 from flightstack.core.enums import Severity
+from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Message
 from gcs_cli.actions.action import Action, ActionError, NotReadyError, Step
 from gcs_cli.actions.progress import EffectTimer
-from gcs_cli.clients.command_client import CommandClient, CommandTiming
+from gcs_cli.clients.command_client import CommandClient, CommandTiming, RepeatedMessage
 from gcs_cli.vehicle.view_types import VehicleView
 
 NEEDS_LIMIT_S = 3.0
@@ -83,7 +84,7 @@ class ActionRun:
         self._waits = waits
         self._begun_s = now_s
         self._steps: list[Step] | None = None
-        self._client: CommandClient | None = None
+        self._client: CommandClient | RepeatedMessage | None = None
         self._timer: EffectTimer | None = None
         self._whole = EffectTimer(view(), now_s)
         self._texts_before = 0
@@ -151,14 +152,18 @@ class ActionRun:
             self._end(Outcome.DONE, self.action.done)
             return
         self.step, self._timer, self._text_due_s = self._steps.pop(0), None, None
-        assert view.identity is not None
-        vehicle = Address(*view.identity[:2])
+        vehicle = self._vehicle(view)
         if self.step.restarts:  # a repeated command would act on the restarted vehicle
             self._client = CommandClient(vehicle, self._own, CommandTiming(self.step.limit_s, retries=0))
         else:
             self._client = CommandClient(vehicle, self._own)
         self._client.send_command(self.step.command, now_s)
         self._texts_before = view.text_count
+
+    @staticmethod
+    def _vehicle(view: VehicleView) -> Address:
+        assert view.identity is not None
+        return Address(*view.identity[:2])
 
     def _await_answer(self, view: VehicleView, now_s: float) -> None:
         assert self._client is not None
@@ -172,6 +177,8 @@ class ActionRun:
             return
         if answer.result is None:
             self._end(Outcome.SILENT, f"{self.step.name}: {answer.reason}")
+        elif answer.result == mavlink.MAV_RESULT_UNSUPPORTED and self.step.instead is not None:
+            self._send_instead(self.step.instead(*self._vehicle(view)), view, now_s)
         elif not answer.accepted:
             self._refuse(view, answer.reason, now_s)
         elif self.step.effect is None or not (self._waits or self._steps):
@@ -184,6 +191,12 @@ class ActionRun:
             self.acknowledged = not self._steps
             self._timer = EffectTimer(view, now_s)
             self._await_effect(view, now_s)
+
+    def _send_instead(self, message: Message, view: VehicleView, now_s: float) -> None:
+        """Send a message without an answer: a change of the current item shows that the vehicle received it."""
+        before = view.mission.current
+        self._client = RepeatedMessage(message, now_s, lambda: self._view().mission.current != before)
+        self._timer = EffectTimer(view, now_s)
 
     def _refuse(self, view: VehicleView, answer: str, now_s: float) -> None:
         """End with the vehicle's texts; they follow the answer."""
@@ -215,10 +228,20 @@ class ActionRun:
             self._end(Outcome.ENDED, f"{self.action.name}: the vehicle changed to mode {view.mode}")
             return
         if timer.is_over(step.limit_s, step.is_flight):
-            waited = f"within {step.limit_s:g} s"
-            if step.is_flight:
-                waited = f"and has not moved for {step.limit_s:g} s"
-            self._end(Outcome.NOT_SEEN, f"{step.name}: the vehicle acknowledged, but {step.missing} {waited}")
+            self._miss(step, view)
+
+    def _miss(self, step: Step, view: VehicleView) -> None:
+        """End without the effect; a message without an answer is refused by a text."""
+        waited = f"within {step.limit_s:g} s"
+        if step.is_flight:
+            waited = f"and has not moved for {step.limit_s:g} s"
+        has_answered = not isinstance(self._client, RepeatedMessage)
+        reason = "" if has_answered else refusal_reason(view, self._texts_before)
+        if reason:
+            self._end(Outcome.REFUSED, f"{step.name} refused: {reason}")
+        else:
+            acknowledged = "acknowledged, but " if has_answered else ""
+            self._end(Outcome.NOT_SEEN, f"{step.name}: the vehicle {acknowledged}{step.missing} {waited}")
 
     def _end(self, outcome: Outcome, sentence: str) -> None:
         self._client = None

@@ -85,12 +85,15 @@ ARDUPILOT = Autopilot(
         mavlink.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
     },
     reports_estimator=True,
-    lacks_messages=frozenset({FS_LOOP_TIMING_ID, int(EscStatus.id)}),
+    lacks_messages=frozenset(
+        {FS_LOOP_TIMING_ID, int(EscStatus.id), mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED}
+    ),
     sends_modes_as_stream=True,
     refusal_prefixes=("Arm: ", "PreArm: "),
     casts_parameters=True,
     mission_begins_with_home=True,
     replaces_plans_at_once=False,
     stores_items_exactly=False,
+    is_silent_without_logs=False,
     log_suffix=".bin",
 )

@@ -82,7 +82,7 @@ class Autopilot(NamedTuple):
     reports_estimator: bool
     """True if the vehicle sends ESTIMATOR_STATUS or EKF_STATUS_REPORT."""
     lacks_messages: frozenset[int]
-    """Messages not to request: the vehicle answers each request with a warning."""
+    """Messages not to request: the vehicle answers each request with a warning, or with a value of a former flight."""
     sends_modes_as_stream: bool
     """True if AVAILABLE_MODES is sent one mode per stream interval, so that its rate must be raised first."""
     refusal_prefixes: tuple[str, ...]
@@ -95,6 +95,8 @@ class Autopilot(NamedTuple):
     """True if an upload that ends early leaves the former plan; False if it overwrites the plan item by item."""
     stores_items_exactly: bool
     """True if a downloaded item equals the uploaded one; False if frames and unused fields may differ."""
+    is_silent_without_logs: bool
+    """True if LOG_REQUEST_LIST has no answer while the vehicle has no logs."""
     log_suffix: str = ".ulg"
     """End of the name of a downloaded log."""
 
@@ -107,7 +109,7 @@ class Autopilot(NamedTuple):
         return self.mode_number(self.roles.get(role, ""), vehicle_type)
 
     def mode_number(self, name: str, vehicle_type: int) -> int | None:
-        """Return the custom mode of a name in any case, with spaces, hyphens or underscores; None if unknown."""
+        """Return the custom mode of a name in any case, with any signs between its words; None if unknown."""
         wanted = plain_name(name)
         wanted = plain_name(self.aliases.get(wanted, wanted))
         names = self.mode_names(vehicle_type)
@@ -115,5 +117,5 @@ class Autopilot(NamedTuple):
 
 
 def plain_name(name: str) -> str:
-    """Return the name of a mode in upper case, without spaces, hyphens and underscores."""
-    return name.strip().upper().replace(" ", "").replace("-", "").replace("_", "")
+    """Return the letters and digits of the name of a mode, in upper case."""
+    return "".join(character for character in name.upper() if character.isalnum())

@@ -44,4 +44,5 @@ GENERIC = Autopilot(
     mission_begins_with_home=False,
     replaces_plans_at_once=False,
     stores_items_exactly=False,
+    is_silent_without_logs=False,
 )

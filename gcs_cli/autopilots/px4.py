@@ -80,6 +80,10 @@ PX4 = Autopilot(
         "ALTCTL": "ALTITUDE",
         "STABILISED": "STABILIZED",
         "AUTO": "MISSION",
+        "FOLLOWME": "FOLLOW",
+        "AUTOLOITER": "HOLD",
+        "AUTOFOLLOWTARGET": "FOLLOW",
+        **{f"AUTO{name}": name for name in ("MISSION", "RTL", "LAND", "TAKEOFF", "PRECLAND")},
     },
     select_mode=_select_mode,
     takeoff_phases=(Phase.TAKEOFF, Phase.ARM),
@@ -109,4 +113,5 @@ PX4 = Autopilot(
     mission_begins_with_home=False,
     replaces_plans_at_once=True,
     stores_items_exactly=True,
+    is_silent_without_logs=True,
 )

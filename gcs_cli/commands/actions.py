@@ -22,6 +22,9 @@ from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
 
+_NUMBERS = {"ignore_unknown_options": True}
+"""Settings of a command with arguments that may be negative."""
+
 AltitudeOption = Annotated[
     float | None,
     typer.Option("--alt", metavar="METRES", min=0.1, max=10_000.0, help="Altitude above home."),
@@ -64,7 +67,10 @@ def disarm(
     ] = False,
     yes: YesOption = False,
 ) -> None:
-    """Disarm the vehicle."""
+    """Disarm the vehicle.
+
+    With --force, in the air, asks first on a terminal; elsewhere it needs --yes.
+    """
     with connect_vehicle(context, link) as connection:
         if force and not yes and _may_fly(connection):
             confirm("the vehicle may be in the air, and its rotors will stop", yes, connection)
@@ -126,7 +132,7 @@ def hold(context: typer.Context, link: LinkOptions, options: ActionOptions) -> N
     run_action(context, link, options, in_flight.hold())
 
 
-@app.command()
+@app.command(context_settings=_NUMBERS)
 @expand_options
 def goto(
     context: typer.Context,
@@ -138,7 +144,7 @@ def goto(
 ) -> None:
     """Fly to a position and hold there.
 
-    Ends when the vehicle stands there, within 1 m. Put -- before negative degrees.
+    Ends when the vehicle stands there, within 1 m.
     """
     run_action(context, link, options, in_flight.goto(latitude, longitude, alt))
 
@@ -155,7 +161,7 @@ def yaw(
     run_action(context, link, options, in_flight.yaw(heading))
 
 
-@app.command()
+@app.command(context_settings=_NUMBERS)
 @expand_options
 def speed(
     context: typer.Context,
@@ -180,7 +186,9 @@ def mode(
     name: Annotated[
         str | None,
         typer.Argument(
-            metavar="MODE", help="Name of the mode; without one, list the modes.", autocompletion=mode_names
+            metavar="MODE",
+            help="Name or number of the mode; without one, list the modes.",
+            autocompletion=mode_names,
         ),
     ] = None,
 ) -> None:
@@ -213,7 +221,7 @@ def _list_modes(view: VehicleView, is_listed: bool, output: Output) -> None:
         )
 
 
-@app.command("set-home")
+@app.command("set-home", context_settings=_NUMBERS)
 @expand_options
 def set_home(
     context: typer.Context,
@@ -226,7 +234,7 @@ def set_home(
 ) -> None:
     """Set the home position.
 
-    A return goes there, and relative altitudes are measured from it. Put -- before negative degrees.
+    A return goes there, and relative altitudes are measured from it.
     """
     if place and len(place) != 3:
         raise CliError(

@@ -91,7 +91,7 @@ def erase(
 ) -> None:
     """Erase all logs but the one that is being written.
 
-    An armed vehicle may refuse.
+    Asks first on a terminal; elsewhere it needs --yes. An armed vehicle may refuse.
     """
     if not yes and (sys.stdin is None or not sys.stdin.isatty()):
         raise CliError("erase removes all logs from the vehicle: confirm with --yes", USAGE)
@@ -102,6 +102,7 @@ def erase(
         size = size_text(sum(log.size for log in before))
         confirm(f"{len(before)} logs of {size} will be erased from the vehicle", yes, connection)
         left = log_calls.erase_logs(connection, len(before))
+    left = log_calls.kept_logs(before, left)
     if len(left) == len(before) and len(before) > 1:
         raise CliError(f"the vehicle still has all {len(left)} logs")
     count = len(before) - len(left)
@@ -180,7 +181,8 @@ def _chosen(logs: tuple[LogEntry, ...], number: int | None) -> LogEntry:
     for log in logs:
         if log.log_id == number:
             return log
-    first, last = logs[0].log_id, logs[-1].log_id
+    numbers = [log.log_id for log in logs]
+    first, last = min(numbers), max(numbers)
     raise CliError(f"no log {number}: the vehicle has {first} to {last}", FAILED)
 
 

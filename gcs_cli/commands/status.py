@@ -7,8 +7,8 @@ from typing import Any
 
 import typer
 
+from flightstack.mavlink.dialect import mavlink
 from flightstack.process.command_line import expand_options, make_app
-from gcs_cli.link.perform import request_reached
 from gcs_cli.link.quality import LinkQuality
 from gcs_cli.link.snapshot import Snapshot
 from gcs_cli.settings import LinkOptions, output_of
@@ -22,6 +22,10 @@ GATHER_S = 0.35
 """Longest wait for the values after the 0.1 s in which other vehicles are noticed; a request may be lost."""
 _OF_RECORDING_S = 5.0
 """The same for a recording, whose time does not pass; messages come every 2 s."""
+_STREAMED_S = 1.1
+"""Longest wait for MISSION_CURRENT, which PX4 streams once a second and denies to a request."""
+_NOT_RECORDED = frozenset({mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED})
+"""Messages that a recording may not have: they are sent once."""
 _LANDED = {1: "on ground", 2: "in air", 3: "taking off", 4: "landing"}
 
 
@@ -31,13 +35,15 @@ def status(context: typer.Context, link: LinkOptions) -> None:
     """Show the state of the vehicle."""
     with connect_vehicle(context, link, takes_recording=True, in_real_time=False) as connection:
         session = connection.session
-        snapshot = Snapshot(lambda: session.view)
+        omitted = _NOT_RECORDED if connection.is_recording else frozenset()
+        snapshot = Snapshot(lambda: session.view, session.own, omitted=omitted)
         session.attach(snapshot)
-        request_reached(connection)
         connection.wait_for(
             lambda: snapshot.complete, _OF_RECORDING_S if connection.is_recording else GATHER_S
         )
         session.detach(snapshot)
+        if not connection.is_recording:
+            connection.wait_for(lambda: session.view.mission.current is not None, _STREAMED_S)
         view, quality = session.view, session.quality
     sentence = "\n".join(f"{name:<12}{text}" for name, text in status_lines(view, quality))
     output_of(context, link).say("status", sentence, **status_facts(view), **_link_facts(quality))
@@ -58,6 +64,7 @@ def status_facts(view: VehicleView) -> dict[str, Any]:
     return {
         "system": None if view.identity is None else view.identity.system_id,
         "type": None if view.identity is None else view.identity.kind,
+        "autopilot": None if view.identity is None else view.autopilot.name,
         "mode": view.mode,
         "armed": view.armed,
         "landed": _LANDED.get(view.landed_state),
@@ -68,10 +75,11 @@ def status_facts(view: VehicleView) -> dict[str, Any]:
         "latitude_deg": None if geo is None else geo.latitude_deg,
         "longitude_deg": None if geo is None else geo.longitude_deg,
         "altitude_m": None if geo is None else geo.altitude_m,
+        "relative_altitude_m": view.relative_altitude_m,
         "mission_current": view.mission.current,
         "mission_total": view.mission.total,
         "mission_reached": view.mission.reached,
-        "mission_complete": view.mission.complete,
+        "mission_complete": None if view.mission.is_end_unknown else view.mission.complete,
         "battery_remaining": None if battery is None else battery.remaining,
         "rotor_rpm": list(view.rotor_rpm),
         "inner_hz": None if timing is None else timing.inner_hz,

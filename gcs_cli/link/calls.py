@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol, TypeAlias
 
@@ -26,6 +27,8 @@ _PREFIXES = (
     "Geofence refused: ",
     "List of rally points refused: ",
 )
+_NAMES_ITEM = re.compile(r"\bitem \d", re.IGNORECASE)
+"""A text with the number of the refused item; PX4's "IGN MISSION_ITEM: Invalid item" has none."""
 
 
 class Answer(NamedTuple):
@@ -94,7 +97,7 @@ class Call:
             if now_s < self._text_due_s:
                 return None
         reason = text or result.reason
-        if isinstance(result, Failed) and not (text and (result.is_whole or "item" in text.lower())):
+        if isinstance(result, Failed) and not (text and (result.is_whole or _NAMES_ITEM.search(text))):
             item = self._refused_item(result)
             reason = f"{item}: {reason}" if item else reason
         return Answer(False, reason, result=result.result or 0)
@@ -192,6 +195,7 @@ RESET_PARAMETERS: Command = (int(mavlink.MAV_CMD_PREFLIGHT_STORAGE), (2.0,))
 SHUT_DOWN: Command = (int(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN), (2.0,))
 _REQUEST = int(mavlink.MAV_CMD_REQUEST_MESSAGE)
 REQUEST_MISSION_CURRENT: Command = (_REQUEST, (float(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT),))
+REQUEST_VERSION: Command = (_REQUEST, (float(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION),))
 REQUEST_LOOP_TIMING: Command = (_REQUEST, (float(FS_LOOP_TIMING_ID),))
 REQUEST_SYS_STATUS: Command = (_REQUEST, (float(mavlink.MAVLINK_MSG_ID_SYS_STATUS),))
 

@@ -67,8 +67,9 @@ def ask_modes(connection: Connection) -> bool:
 
 def request_reached(connection: Connection) -> None:
     """Request MISSION_ITEM_REACHED, and do not wait for it: other vehicles than this project's send it once only."""
-    if not connection.is_recording:
-        number, rest = float(mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED), (0.0,) * 6
+    message_id = mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED
+    if not connection.is_recording and message_id not in connection.session.view.autopilot.lacks_messages:
+        number, rest = float(message_id), (0.0,) * 6
         request = mavlink.MAV_CMD_REQUEST_MESSAGE
         connection.send(
             mavlink.MAVLink_command_long_message(*connection.session.target, request, 0, number, *rest)

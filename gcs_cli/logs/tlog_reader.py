@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from flightstack.core.errors import ConfigError
-from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.dialect import ardupilot_dialect, mavlink
 from flightstack.mavlink.link import Link, Message
 from flightstack.mavlink.param_values import HASH_NAME, REAL32, integer_of
 from gcs_cli.autopilots.registry import autopilot_of
@@ -17,6 +17,8 @@ from gcs_cli.logs.recording import TLOG, AnyArray, LogText, Recording, Topic
 
 _Key: TypeAlias = tuple[int, int, str]
 """System, component and message."""
+_Messages: TypeAlias = dict[_Key, list[tuple[int, Message]]]
+"""The messages of each sender and kind, with their times [us]."""
 _LATEST_US = 1 << 53
 """In the year 2255."""
 _NOT_AUTOPILOTS = (mavlink.MAV_AUTOPILOT_INVALID,)
@@ -25,12 +27,10 @@ _NOT_AUTOPILOTS = (mavlink.MAV_AUTOPILOT_INVALID,)
 def read_tlog(content: bytes, source: str) -> Recording:
     """Read the bytes of a tlog, complete or truncated; raise ConfigError, which names ``source``."""
     records = dated_records(content)
-    link = Link(0, 0)
-    messages: dict[_Key, list[tuple[int, Message]]] = {}
-    for record in records:
-        for message in link.decode(record.frame):
-            key = (message.get_srcSystem(), message.get_srcComponent(), message.get_type())
-            messages.setdefault(key, []).append((record.time_us, message))
+    messages, unknown = _decoded(records)
+    if unknown and _has_ardupilot(messages):
+        ardupilot_dialect()
+        messages, unknown = _decoded(records)
     if not messages:
         raise ConfigError(source, "", "is neither a ULog nor a tlog with MAVLink messages")
     vehicle = vehicle_in(messages)
@@ -53,9 +53,25 @@ def read_tlog(content: bytes, source: str) -> Recording:
             if message.param_id != HASH_NAME
         },
         damaged=_size_of(records) < len(content),
-        unknown=link.bad,
+        unknown=unknown,
         vehicle=vehicle,
     )
+
+
+def _decoded(records: Sequence[Record]) -> tuple[_Messages, int]:
+    """Return the messages with their times, and the number of frames that the dialect does not have."""
+    link = Link(0, 0)
+    messages: _Messages = {}
+    for record in records:
+        for message in link.decode(record.frame):
+            key = (message.get_srcSystem(), message.get_srcComponent(), message.get_type())
+            messages.setdefault(key, []).append((record.time_us, message))
+    return messages, link.bad
+
+
+def _has_ardupilot(messages: _Messages) -> bool:
+    beats = (samples[0][1] for (*_, kind), samples in messages.items() if kind == "HEARTBEAT")
+    return any(beat.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA for beat in beats)
 
 
 def dated_records(content: bytes) -> list[Record]:
@@ -63,7 +79,7 @@ def dated_records(content: bytes) -> list[Record]:
     return [record for record in decode_records(content) if record.time_us < _LATEST_US]
 
 
-def vehicle_in(messages: dict[_Key, list[tuple[int, Message]]]) -> tuple[int, int]:
+def vehicle_in(messages: _Messages) -> tuple[int, int]:
     """Return system and component of the first autopilot, else of the first sender."""
     beats = [
         (samples[0][0], system, component)
@@ -76,7 +92,7 @@ def vehicle_in(messages: dict[_Key, list[tuple[int, Message]]]) -> tuple[int, in
     return system, component
 
 
-def _topics(messages: dict[_Key, list[tuple[int, Message]]], vehicle: tuple[int, int]) -> Iterator[Topic]:
+def _topics(messages: _Messages, vehicle: tuple[int, int]) -> Iterator[Topic]:
     for (system, component, kind), samples in sorted(
         messages.items(), key=lambda item: (item[0][2], item[0])
     ):

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 from flightstack.plan import Frame, MissionItem
+from flightstack.plan.vocabulary import RALLY_POINT, FenceCommand
 from gcs_cli.plans.names import any_command_name
 
 _EQUIVALENT_FRAMES = {
@@ -14,6 +15,8 @@ _EQUIVALENT_FRAMES = {
     Frame.GLOBAL_RELATIVE_ALT_INT: Frame.GLOBAL_RELATIVE_ALT,
     11: 10,  # GLOBAL_TERRAIN_ALT_INT
 }
+
+_PLACES_ONLY = frozenset(FenceCommand) | {RALLY_POINT}
 
 
 class Difference(NamedTuple):
@@ -44,11 +47,13 @@ class Tolerance(NamedTuple):
     nan_is_zero: bool = False
     """The vehicle stores 0 for NaN."""
     keeps_autocontinue: bool = True
+    keeps_idle_frames: bool = True
+    """The vehicle stores the frame of an item without a position."""
 
 
 EXACT = Tolerance()
 PACKED = Tolerance(  # ArduPilot packs an item into 15 bytes
-    altitude_m=0.01, degrees_e7=1, nan_is_zero=True, keeps_autocontinue=False
+    altitude_m=0.01, degrees_e7=1, nan_is_zero=True, keeps_autocontinue=False, keeps_idle_frames=False
 )
 
 
@@ -71,7 +76,8 @@ def _field_differences(
     if wanted.command != found.command:
         names = any_command_name(wanted.command), any_command_name(found.command)
         yield Difference(seq, "command", *names)
-    if _frame(wanted) != _frame(found):
+        return  # the fields of another command have other meanings
+    if _frame(wanted) != _frame(found) and (tolerance.keeps_idle_frames or wanted.is_global):
         yield Difference(seq, "frame", wanted.frame, found.frame)
     for number, (one, other) in enumerate(zip(wanted.params, found.params, strict=True), start=1):
         if not _same(one, other, 0.0, tolerance):
@@ -82,8 +88,13 @@ def _field_differences(
             yield Difference(seq, name, *shown)
     if not _same(wanted.z, found.z, tolerance.altitude_m, tolerance):
         yield Difference(seq, "altitude", wanted.z, found.z)
-    if tolerance.keeps_autocontinue and wanted.autocontinue != found.autocontinue:
+    if _has_autocontinue(wanted, tolerance) and wanted.autocontinue != found.autocontinue:
         yield Difference(seq, "autocontinue", wanted.autocontinue, found.autocontinue)
+
+
+def _has_autocontinue(item: MissionItem, tolerance: Tolerance) -> bool:
+    """Return True if autocontinue has a meaning: a geofence and rally points have none, and PX4 stores it as 0."""
+    return tolerance.keeps_autocontinue and item.command not in _PLACES_ONLY
 
 
 def _frame(item: MissionItem) -> int:

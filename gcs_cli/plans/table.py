@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from flightstack.plan import Command, MissionItem
+from flightstack.plan.vocabulary import FenceCommand
 from gcs_cli.plans.itinerary import Itinerary, Stop
 from gcs_cli.plans.names import any_command_name
 from gcs_cli.tables import new_table
@@ -124,7 +125,9 @@ def clock(seconds: float) -> str:
 
 
 def altitude_text(item: MissionItem) -> str:
-    """Return the altitude of an item with its unit; empty without one."""
+    """Return the altitude of an item with its unit; empty without one, as in a geofence."""
+    if item.command in FenceCommand.__members__.values():
+        return ""
     if item.position_deg is None and not (item.command == Command.NAV_TAKEOFF and math.isfinite(item.z)):
         return ""
     if math.isnan(item.z):

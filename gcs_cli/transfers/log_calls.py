@@ -23,18 +23,31 @@ Progress: TypeAlias = Callable[[int, int], None]
 
 
 def fetch_list(connection: Connection) -> tuple[LogEntry, ...]:
-    """Return all logs of the vehicle; raise CliError."""
-    client = LogClient(vehicle_address(connection.session))
+    """Return all logs of the vehicle, the oldest first; raise CliError."""
+    client = _log_client(connection)
     client.start_list()
     connection.run(client, "log list")
     if isinstance(client.result, LogDone):
-        return client.result.entries
+        return oldest_first(client.result.entries)
     raise _error(client.result, "log list")
+
+
+def oldest_first(logs: tuple[LogEntry, ...]) -> tuple[LogEntry, ...]:
+    """Return logs by their time, or by their number if a time is unknown: PX4 numbers them in no order."""
+    return (
+        tuple(sorted(logs, key=lambda log: log.time_utc_s)) if all(log.time_utc_s for log in logs) else logs
+    )
+
+
+def kept_logs(before: tuple[LogEntry, ...], after: tuple[LogEntry, ...]) -> tuple[LogEntry, ...]:
+    """Return the logs that an erase has left; a smaller one of the same number began since, as on ArduPilot."""
+    sizes = {log.log_id: log.size for log in before}
+    return tuple(log for log in after if log.size >= sizes.get(log.log_id, log.size + 1))
 
 
 def erase_logs(connection: Connection, before: int) -> tuple[LogEntry, ...]:
     """Erase the ``before`` logs of the vehicle; return those that are left; raise CliError."""
-    client = LogClient(vehicle_address(connection.session))
+    client = _log_client(connection)
     client.start_erase(before)
     connection.run(client, "log erase")
     if isinstance(client.result, LogDone):
@@ -67,13 +80,20 @@ def file_of(log: LogEntry, logs: tuple[LogEntry, ...], files: tuple[Entry, ...])
     return found[0] if len(found) == 1 else None
 
 
-def is_growing(connection: Connection, log: LogEntry, logs: tuple[LogEntry, ...]) -> bool:
-    """Return True if the vehicle still writes ``log``: the newest one of an armed vehicle, or one that has grown."""
+def is_growing(connection: Connection, log: LogEntry, logs: tuple[LogEntry, ...]) -> bool | None:
+    """Return True if the vehicle still writes ``log``: the newest one of an armed vehicle, or one that has grown.
+
+    None if the vehicle does not answer.
+    """
     if log != logs[-1]:
         return False
-    now = fetch_list(connection)
-    grown = any(entry.log_id == log.log_id and entry.size > log.size for entry in now)
-    return grown or connection.session.view.armed
+    if connection.session.view.armed:
+        return True
+    try:
+        now = fetch_list(connection)
+    except CliError:
+        return None
+    return any(entry.log_id == log.log_id and entry.size > log.size for entry in now)
 
 
 def fetch_log(connection: Connection, log: LogEntry, file: Entry | None, show: Progress) -> bytes:
@@ -85,7 +105,7 @@ def fetch_log(connection: Connection, log: LogEntry, file: Entry | None, show: P
         connection.run(over_ftp, name, show=show)
         if isinstance(over_ftp.result, FtpDone):
             return over_ftp.result.content
-    client = LogClient(vehicle_address(connection.session))
+    client = _log_client(connection)
     client.start_download(log)
     connection.run(client, name, show=show)
     if isinstance(client.result, LogDone):
@@ -107,6 +127,12 @@ def _error(result: object, name: str) -> CliError:
     if isinstance(result, LogFailed):
         return CliError(f"{name}: {result.reason}", NO_ANSWER if result.silent else FAILED)
     return CliError(f"{name}: the vehicle did not answer", NO_ANSWER)
+
+
+def _log_client(connection: Connection) -> LogClient:
+    session = connection.session
+    is_silent = session.view.autopilot.is_silent_without_logs
+    return LogClient(vehicle_address(session), is_silent_without_logs=is_silent)
 
 
 def _ftp_client(connection: Connection) -> FtpClient:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from flightstack.core.geodesy import GeoPoint
 from flightstack.plan import DEFAULT_LIMITS, MissionType, Plan
+from gcs_cli.autopilots.px4 import PX4
 from gcs_cli.errors import FAILED, CliError
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
@@ -12,6 +13,7 @@ from gcs_cli.plans.itinerary import home_of_items
 from gcs_cli.transfers import param_calls
 
 _HOME_WAIT_S = 3.0
+_VERSION_WAIT_S = 1.0
 KINDS = (MissionType.MISSION, MissionType.FENCE, MissionType.RALLY)
 
 
@@ -44,6 +46,20 @@ def limit_parameters(connection: Connection) -> dict[str, float]:
     return found
 
 
+def is_own_vehicle(connection: Connection) -> bool:
+    """Return True for the vehicle of this project, which announces itself as PX4; raise CliError without an answer."""
+    session = connection.session
+    if session.view.is_own is None and session.view.autopilot.name == PX4.name:
+        try:
+            connection.command(calls.REQUEST_VERSION, "request of the version")
+        except CliError as error:
+            if error.exit_code != FAILED:
+                raise
+            return False
+        connection.wait_for(lambda: session.view.is_own is not None, _VERSION_WAIT_S)
+    return bool(session.view.is_own)
+
+
 def problems_on_vehicle(connection: Connection, plan: Plan) -> tuple[list[Problem], str]:
     """Return the problems of ``plan`` with the vehicle's home, geofence and limits, and what could not be checked.
 
@@ -51,7 +67,7 @@ def problems_on_vehicle(connection: Connection, plan: Plan) -> tuple[list[Proble
     """
     stored = download_plan(connection, with_home=True, kinds=(MissionType.FENCE,))
     autopilot = connection.session.view.autopilot
-    is_foreign = not autopilot.stores_items_exactly
+    is_foreign = not is_own_vehicle(connection)
     limits = DEFAULT_LIMITS if is_foreign else limits_of(limit_parameters(connection))
     home = home_of_items(plan.items, stored.home or plan.home)
     found = list(plan_problems(plan, home, limits, stored.fence, is_foreign=is_foreign))

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Message, is_unknown
 
 ROWS_KEPT = 12_000
 """Samples kept of each message type: 4 min at 50 Hz, 20 min at 10 Hz."""
@@ -122,6 +122,11 @@ class History:
         instance = None if instance_name is None else getattr(message, instance_name)
         key = StreamKey(message.get_srcSystem(), message.get_srcComponent(), message.get_msgId(), instance)
         with self._lock:
+            before = self._streams.get(key._replace(instance=None))
+            if before is not None and is_unknown(before.last) and not is_unknown(message):
+                del self._streams[
+                    before.key
+                ]  # the dialect of an autopilot is known from its first heartbeat on
             stream = self._streams.get(key)
             if stream is None:
                 if len(self._streams) >= MOST_STREAMS:

@@ -52,9 +52,8 @@ def mission_progress(table: MissionTable, view: VehicleView) -> Progress:
     """Return the progress that the vehicle reports, numbered as the items of the table."""
     if view.mission.complete:
         return Progress(reached=len(table.items) - 1)
-    first = int(view.autopilot.mission_begins_with_home)
     current, reached = (
-        None if number is None or not 0 <= number - first < len(table.items) else number - first
+        None if number is None or number >= len(table.items) else number
         for number in (view.mission.current, view.mission.reached)
     )
     stop = None if current is None else table.stops.get(current)

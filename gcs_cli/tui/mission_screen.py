@@ -153,8 +153,8 @@ class MissionScreen(JobScreen):
             left.append(" NOT UPLOADED ", f"bold {colours.background} on {colours.warning}")
             left.append(" ")
         left.append(summary(self._table, self._progress), colours.text)
-        parts = [f"{len(draft.plan.fence)} fence items"] if draft.plan.fence else []
-        parts += [f"{len(draft.plan.rally)} rally points"] if draft.plan.rally else []
+        parts = [f"fence: {len(draft.plan.fence)}"] if draft.plan.fence else []
+        parts += [f"rally points: {len(draft.plan.rally)}"] if draft.plan.rally else []
         right = Text(", ".join(parts), colours.muted)
         if self.doing:
             right = Text(self.doing_text, colours.accent)

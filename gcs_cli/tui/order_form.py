@@ -22,6 +22,7 @@ class OrderForm(ModalScreen[list[Any] | None]):
     OrderForm { align: center middle; }
     OrderForm > Vertical { width: 60; max-width: 90%; height: auto; border: round $accent; padding: 0 2;
                            background: $surface; }
+    OrderForm Label { width: 1fr; }
     OrderForm Input { margin-bottom: 1; }
     OrderForm Label { width: 100%; }
     OrderForm .title { text-style: bold; color: $accent; margin-bottom: 1; }

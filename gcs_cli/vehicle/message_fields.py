@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
-from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.dialect import ardupilot_dialect, mavlink
 from flightstack.mavlink.link import Message
 
 _TEXT = "char"
@@ -19,10 +19,17 @@ class FieldError(ValueError):
 
 def message_class(name: str) -> Any:
     """Return the class of a message by its name, in any case, or its id; raise FieldError."""
-    found = mavlink.mavlink_map.get(int(name)) if name.isdecimal() else _by_name().get(name.upper())
+    found = _known(name)
+    if found is None:
+        ardupilot_dialect()
+        found = _known(name)
     if found is None:
         raise FieldError(f"{name}: the dialect has no such message{_did_you_mean(name.upper(), _by_name())}")
     return found
+
+
+def _known(name: str) -> Any:
+    return mavlink.mavlink_map.get(int(name)) if name.isdecimal() else _by_name().get(name.upper())
 
 
 def _by_name() -> dict[str, Any]:

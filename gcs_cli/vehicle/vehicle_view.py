@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from flightstack.core.portable_math import euler_angles
-from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.dialect import NAME_IN_VERSION, mavlink
+from gcs_cli.vehicle import mission_fold
 from gcs_cli.vehicle.status_texts import add_piece, without_stale_piece
 from gcs_cli.vehicle.view_types import (
     AvailableMode,
@@ -19,7 +20,6 @@ from gcs_cli.vehicle.view_types import (
     Identity,
     LinkCounts,
     LoopTiming,
-    Mission,
     Setpoint,
     Vector,
     VehicleView,
@@ -32,7 +32,6 @@ _IGNORE_ATTITUDE = 128  # ATTITUDE_TARGET_TYPEMASK
 _PREARM_CHECK = 1 << 28  # MAV_SYS_STATUS_PREARM_CHECK: no sensor
 _RATE_WINDOW_S = 1.0
 _MOST_ROTORS = 16
-_NO_NUMBER = 65535  # MISSION_CURRENT.total when the vehicle has no mission
 _NOT_SELECTABLE = 2  # MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
 _RESTART_S = 0.25
 """Step back of the vehicle's clock that no reordering of datagrams explains."""
@@ -104,10 +103,12 @@ def _euler(q: Any) -> Euler | None:
 
 def _heartbeat(view: VehicleView, message: Any, now_s: float) -> VehicleView:
     armed = bool(message.base_mode & _ARMED)
+    mode = mode_name(view, message.custom_mode)
     return view._replace(
         last_heartbeat_s=now_s,
-        mode=mode_name(view, message.custom_mode),
+        mode=mode,
         custom_mode=message.custom_mode,
+        mission=mission_fold.after_heartbeat(view, mode, armed),
         armed=armed,
         ever_armed=view.ever_armed or armed,
         system_status=message.system_status,
@@ -265,19 +266,6 @@ def _extended_state(view: VehicleView, message: Any, _now_s: float) -> VehicleVi
     return view._replace(landed_state=message.landed_state)
 
 
-def _mission_current(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    total = None if message.total == _NO_NUMBER else message.total
-    state = message.mission_state or None
-    reached = view.mission.reached
-    if total is not None and reached is not None and reached >= total:
-        reached = None  # of a former mission
-    return view._replace(mission=Mission(message.seq, total, reached, state))
-
-
-def _item_reached(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    return view._replace(mission=view.mission._replace(reached=message.seq))
-
-
 def _rotors(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     return _with_rotors(view, message.index, message.rpm)
 
@@ -294,7 +282,12 @@ def _with_rotors(view: VehicleView, first: int, speeds_rpm: Iterable[float]) -> 
 
 
 def _esc_telemetry(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    """ArduPilot's ESC_TELEMETRY_1_TO_4 and the like: the speeds of four rotors, the first one in the name."""
+    """ArduPilot's ESC_TELEMETRY_1_TO_4 and the like: the speeds of four rotors, the first one in the name.
+
+    An ESC that draws current at no speed does not measure it, as in ArduPilot's simulation.
+    """
+    if any(message.current) and not any(message.rpm):
+        return view._replace(rotor_rpm=())
     first = int(message.get_type().split("_")[2]) - 1
     return _with_rotors(view, first, message.rpm)
 
@@ -307,12 +300,17 @@ def _loop_timing(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     return view._replace(timing=timing)
 
 
+def _version(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+    return view._replace(is_own=list(message.flight_custom_version) == NAME_IN_VERSION)
+
+
 def _system_time(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     return view._replace(time_s=message.time_boot_ms / 1e3)
 
 
 _FOLDS: dict[str, Callable[[VehicleView, Any, float], VehicleView]] = {
     "HEARTBEAT": _heartbeat,
+    "AUTOPILOT_VERSION": _version,
     "AVAILABLE_MODES": _available_mode,
     "SYS_STATUS": _system,
     "BATTERY_STATUS": _battery,
@@ -330,8 +328,11 @@ _FOLDS: dict[str, Callable[[VehicleView, Any, float], VehicleView]] = {
     "POSITION_TARGET_LOCAL_NED": _position_target,
     "VFR_HUD": _hud,
     "EXTENDED_SYS_STATE": _extended_state,
-    "MISSION_CURRENT": _mission_current,
-    "MISSION_ITEM_REACHED": _item_reached,
+    "MISSION_CURRENT": mission_fold.after_current,
+    "MISSION_ITEM_REACHED": mission_fold.after_reached,
+    "MISSION_COUNT": mission_fold.after_count,
+    "MISSION_ITEM": mission_fold.after_item,
+    "MISSION_ITEM_INT": mission_fold.after_item,
     "ESC_STATUS": _rotors,
     "ESC_TELEMETRY_1_TO_4": _esc_telemetry,
     "ESC_TELEMETRY_5_TO_8": _esc_telemetry,

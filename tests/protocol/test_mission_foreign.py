@@ -125,6 +125,7 @@ def test_a_fence_that_is_not_cleared_is_replaced_by_no_items() -> None:
         (1, "", "item 1 (NAV_WAYPOINT): the vehicle refused: the command is not supported (MAV_MISSION_UNSUPPORTED)"),
         (1, "no such thing", "item 1 (NAV_WAYPOINT): no such thing"),
         (1, "item 0 is bad", "item 0 is bad"),
+        (2, "IGN MISSION_ITEM: Invalid item", "item 2 (NAV_WAYPOINT): IGN MISSION_ITEM: Invalid item"),  # PX4
         (3, "it leaves out home", "it leaves out home"),  # of the plan as a whole
         (3, "", "item 3 (NAV_WAYPOINT) or one before it: the vehicle refused: the command is not supported "
          "(MAV_MISSION_UNSUPPORTED)"),

@@ -67,11 +67,6 @@ def test_distance_to_go_is_from_the_vehicle_in_flight_and_from_the_start_before(
     assert summary(TABLE, progress) == "item 1 of 5 items, 86 m and 0:38 to go"
 
 
-def test_progress_of_a_mission_that_begins_with_home_is_one_item_less():
-    view = FLYING._replace(identity=Identity(1, 1, 2, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA))
-    assert mission_progress(TABLE, view)[:2] == (0, None)
-
-
 def test_all_items_of_a_complete_mission_are_reached():
     view = FLYING._replace(mission=FLYING.mission._replace(state=mavlink.MISSION_STATE_COMPLETE))
     progress = mission_progress(TABLE, view)

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
-
 import pytest
 from textual.color import Color
 from textual.pilot import Pilot
-from textual.widgets import Input
 
 from flightstack.core.enums import Severity
 from gcs_cli.tui.app import WatchApp
@@ -16,31 +13,9 @@ from gcs_cli.tui.orders import ORDERS, Field, FieldError
 from gcs_cli.tui.screens import SCREENS, ScreenEntry
 from gcs_cli.vehicle.view_types import Identity, VehicleView
 from tests.support.pictures import check_picture
-from tests.support.pilots import run_story, type_ahead
 from tests.support.screens import shown
-from tests.support.still_feed import StillFeed
+from tests.support.watch_plays import GROUNDED, Story, asked, play
 from tests.support.watch_states import BARE, FULL, flown_history
-
-GROUNDED = FULL._replace(armed=False, landed_state=1)
-Story = Callable[[WatchApp, Pilot], Awaitable[None]]
-
-
-def play(story: Story, view: VehicleView = FULL, size: tuple[int, int] = (80, 24)) -> StillFeed:
-    """Run the application with ``story``; return its feed."""
-    feed = StillFeed(view)
-
-    app = WatchApp(feed)
-
-    async def begin(pilot: Pilot[None]) -> None:
-        await pilot.pause()
-        await story(app, pilot)
-
-    run_story(app, begin, size=size, notifications=True)
-    return feed
-
-
-def asked(feed: StillFeed) -> list[str]:
-    return [action.name for action in feed.actions]
 
 
 @pytest.mark.parametrize("entry", SCREENS, ids=lambda entry: entry.mode)
@@ -76,20 +51,6 @@ def test_a_click_on_a_tab_opens_its_screen() -> None:
         assert app.current_mode == "messages"
 
     play(story, size=(120, 24))
-
-
-@pytest.mark.parametrize("width", [60, 80])
-def test_keys_of_all_screens_are_shown_at_any_width(width: int) -> None:
-    async def story(app: WatchApp, pilot: Pilot) -> None:
-        await pilot.press("3")
-        await pilot.pause()
-        assert shown(app)[-1].endswith("^p Commands  q Quit  ? Keys")
-        assert " … " in shown(app)[-1]
-        await pilot.click("KeyBar", offset=(shown(app)[-1].index("? Keys"), 0))
-        await pilot.pause()
-        assert app.screen.query("HelpPanel")
-
-    play(story, size=(width, 24))
 
 
 def test_waiting_for_a_vehicle_names_the_link() -> None:
@@ -251,29 +212,6 @@ def test_escape_leaves_a_form_without_an_order() -> None:
         await pilot.pause()
         await pilot.press("4", "escape")
         await pilot.pause()
-
-    assert asked(play(story)) == []
-
-
-def test_keys_typed_ahead_reach_the_form_that_opens() -> None:
-    async def story(_app: WatchApp, pilot: Pilot) -> None:
-        await type_ahead(pilot, "T", "backspace", "1", "2", "enter")
-
-    assert [action.facts for action in play(story, GROUNDED).actions] == [{"altitude_m": 12.0}]
-
-
-def test_value_typed_ahead_after_a_refused_one_is_sent() -> None:
-    async def story(_app: WatchApp, pilot: Pilot) -> None:
-        await type_ahead(pilot, "T", *"x", "enter", "backspace", *"7", "enter")
-
-    assert [action.facts for action in play(story, GROUNDED).actions] == [{"altitude_m": 7.0}]
-
-
-@pytest.mark.parametrize("screen", ["5", "6"])
-def test_words_typed_ahead_are_searched_and_command_nothing(screen: str) -> None:
-    async def story(app: WatchApp, pilot: Pilot) -> None:
-        await type_ahead(pilot, screen, "slash", *"LAY")
-        assert app.screen.query_one("#search", Input).value == "LAY"
 
     assert asked(play(story)) == []
 

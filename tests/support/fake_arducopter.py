@@ -15,6 +15,7 @@ STABILIZE, AUTO, GUIDED, LOITER, RTL, LAND, BRAKE = 0, 3, 4, 5, 6, 9, 17
 ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
 HOME_M, CLIMB_M_S, SPEED_M_S = 488.1, 2.5, 5.0
 RELATIVE = apm.MAV_FRAME_GLOBAL_RELATIVE_ALT
+ITEMS = 4
 METRES_PER_DEGREE = 111_195.0
 _NEEDS_POSITION = (AUTO, GUIDED, LOITER, RTL, BRAKE)
 _NOT_ARMABLE = {AUTO: "AUTO", RTL: "RTL", LAND: "LAND", BRAKE: "BRAKE"}
@@ -35,6 +36,9 @@ class FakeArduCopter:
     """Acknowledges a takeoff and stays on the ground."""
     unanswered: set[int] = field(default_factory=set)
     """Commands that are executed without an answer."""
+    unsupported: set[int] = field(default_factory=set)
+    """Commands that are answered with MAV_RESULT_UNSUPPORTED, as another autopilot does."""
+    current_item: int = 0
     velocity_ned_m_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Reported velocity."""
     rise_of_ground_m: float = 0.0
@@ -98,6 +102,8 @@ class FakeArduCopter:
             kind = message.get_type()
             if kind == "REQUEST_DATA_STREAM":
                 self._streams_due_s = min(self._streams_due_s, self._time_s)
+            elif kind == "MISSION_SET_CURRENT":
+                self._set_current([float(message.seq)], RELATIVE)
             elif kind == "COMMAND_LONG":
                 params = [getattr(message, f"param{number}") for number in range(1, 8)]
                 if message.command != apm.MAV_CMD_SET_MESSAGE_INTERVAL:
@@ -122,11 +128,12 @@ class FakeArduCopter:
             apm.MAV_CMD_CONDITION_YAW: self._yaw,
             apm.MAV_CMD_DO_FLIGHTTERMINATION: self._terminate,
             apm.MAV_CMD_DO_SET_HOME: self._set_home,
+            apm.MAV_CMD_DO_SET_MISSION_CURRENT: self._set_current,
             apm.MAV_CMD_REQUEST_MESSAGE: self._request,
             apm.MAV_CMD_SET_MESSAGE_INTERVAL: lambda _params, _frame: ACCEPTED,
             apm.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
         }
-        handler = handlers.get(command)
+        handler = None if command in self.unsupported else handlers.get(command)
         result, texts = UNSUPPORTED, len(self._out)
         if handler is not None and not (is_long and command == apm.MAV_CMD_DO_REPOSITION):
             result = handler(params, frame)
@@ -202,6 +209,13 @@ class FakeArduCopter:
         self.home_m = HOME_M + self.altitude_m if params[0] == 1.0 else params[6]
         return ACCEPTED
 
+    def _set_current(self, params: list[float], _frame: int) -> int:
+        if params[0] >= ITEMS:
+            self._say("item is not in the list")
+            return DENIED
+        self.current_item = int(params[0])
+        return ACCEPTED
+
     def _request(self, params: list[float], _frame: int) -> int:
         if params[0] != apm.MAVLINK_MSG_ID_HOME_POSITION:
             return UNSUPPORTED
@@ -238,7 +252,7 @@ class FakeArduCopter:
                 above_mm, *(round(speed * 1e2) for speed in self.velocity_ned_m_s), round(self.heading_deg * 100),
             ),
             apm.MAVLink_sys_status_message(check, check, health, 0, 12600, 0, 100, 0, 0, 0, 0, 0, 0),
-            apm.MAVLink_mission_current_message(0, 3, 3 if self.mode == AUTO else 2, 0),
+            apm.MAVLink_mission_current_message(self.current_item, ITEMS, 3 if self.mode == AUTO else 2, 0),
             apm.MAVLink_ekf_status_report_message(831 if self.has_position else 167, 0, 0, 0, 0, 0),
             apm.MAVLink_extended_sys_state_message(0, 2 if self.altitude_m > 0.1 else 1),
         ]  # fmt: skip

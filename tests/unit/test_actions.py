@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
+from typer.core import TyperGroup
+from typer.main import get_command
 
 from flightstack.testing import World
 from gcs_cli.actions import in_flight, on_vehicle
@@ -12,6 +14,7 @@ from gcs_cli.actions.action import Action
 from gcs_cli.actions.conditions import ConditionError, parse_condition
 from gcs_cli.actions.run import ActionRun, Outcome, Result
 from gcs_cli.clients.mode_client import ModeClient
+from gcs_cli.commands import actions
 from gcs_cli.vehicle.view_types import VehicleView
 
 LIMIT_S = 200.0
@@ -188,3 +191,16 @@ def test_a_generic_vehicle_takes_off_holds_and_lands_by_standard_commands() -> N
         assert perform(world, in_flight.hold()).ok
         assert perform(world, in_flight.yaw(180.0)).ok
         assert perform(world, in_flight.land())[:2] == (Outcome.DONE, "landed and disarmed")
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [("speed", ["-2"]), ("goto", ["-33.5", "-70.1", "--alt", "5"]), ("set-home", ["-33.5", "-70.1", "-4"])],
+)
+def test_negative_numbers_need_no_separator(command: str, words: list[str]) -> None:
+    group = get_command(actions.app)
+    assert isinstance(group, TyperGroup)
+    parameters = group.commands[command].make_context(command, list(words)).params
+    numbers = [value for value in parameters.values() if isinstance(value, float)]
+    numbers += parameters.get("place") or []
+    assert set(numbers) >= {float(word) for word in words if word != "--alt"}

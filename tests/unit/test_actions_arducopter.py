@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from flightstack.mavlink.dialect import mavlink
-from gcs_cli.actions import in_flight, on_vehicle
+from gcs_cli.actions import in_flight, in_mission, on_vehicle
 from gcs_cli.actions.action import Action
 from gcs_cli.actions.conditions import parse_condition
 from gcs_cli.actions.run import ActionRun, Outcome, Result
@@ -286,3 +286,18 @@ def test_landing_is_done_if_the_landed_state_follows_the_disarm(rig: Rig) -> Non
     rig.run_for(0.5)
     assert run.result is not None
     assert run.result.outcome is Outcome.DONE
+
+
+def test_jump_is_a_message_to_a_vehicle_without_the_command(rig: Rig) -> None:
+    rig.vehicle.unsupported.add(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT)
+    assert rig.perform(in_mission.jump(2))[:2] == (Outcome.DONE, "item 2 is the current one")
+    assert rig.vehicle.current_item == 3
+    result = rig.perform(in_mission.jump(9))
+    assert result[:2] == (Outcome.REFUSED, "mission jump refused: item is not in the list")
+    assert rig.vehicle.current_item == 3
+
+
+def test_mode_numbers_select_modes_that_the_vehicle_has(rig: Rig) -> None:
+    assert rig.perform(on_vehicle.select_mode("4"))[:2] == (Outcome.DONE, "mode 4")
+    assert rig.view.mode == "GUIDED"
+    assert rig.perform(on_vehicle.select_mode("99")).outcome is Outcome.IMPOSSIBLE

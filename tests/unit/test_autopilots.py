@@ -9,10 +9,10 @@ import pytest
 from flightstack.core.enums import CUSTOM_MODE
 from flightstack.mavlink.dialect import mavlink
 from flightstack.services.telemetry.modes import MODES, NOT_SELECTABLE
-from gcs_cli.actions.on_vehicle import mode_choices
+from gcs_cli.actions.on_vehicle import find_mode, mode_choices
 from gcs_cli.autopilots.autopilot import Autopilot, Role
 from gcs_cli.autopilots.registry import autopilot_of
-from gcs_cli.vehicle.view_types import Identity, VehicleView
+from gcs_cli.vehicle.view_types import AvailableMode, Identity, VehicleView
 
 QUADROTOR = int(mavlink.MAV_TYPE_QUADROTOR)
 PX4 = autopilot_of(mavlink.MAV_AUTOPILOT_PX4)
@@ -72,3 +72,24 @@ def test_selectable_modes_come_from_the_table_until_the_vehicle_lists_them() -> 
     choices = mode_choices(view)
     assert "HOLD" in choices
     assert "TERMINATION" not in choices
+
+
+@pytest.mark.parametrize(
+    ("name", "mode"),
+    [
+        ("auto.loiter", "HOLD"),
+        ("AUTO.MISSION", "MISSION"),
+        ("auto:rtl", "RTL"),
+        ("AUTO.FOLLOW_TARGET", "FOLLOW"),
+    ],
+)
+def test_px4_modes_have_the_names_of_its_console_and_of_mavros(name: str, mode: str) -> None:
+    assert PX4.mode_number(name, QUADROTOR) == PX4.mode_number(mode, QUADROTOR)
+
+
+def test_any_mode_number_is_sent_to_a_vehicle_whose_modes_are_unknown() -> None:
+    view = VehicleView(identity=Identity(1, 1, QUADROTOR, mavlink.MAV_AUTOPILOT_GENERIC))
+    assert find_mode(view, "7") == 7
+    assert find_mode(view, str(2**32)) is None
+    listed = view._replace(modes=(AvailableMode(3, "Cruise", True, 0),))
+    assert (find_mode(listed, "3"), find_mode(listed, "cruise"), find_mode(listed, "7")) == (3, 3, None)

@@ -14,6 +14,7 @@ from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import GeoPoint
 from flightstack.plan import Command, Frame, MissionItem, Plan, load_plan
 from gcs_cli.errors import CliError
+from gcs_cli.plans.compare import differences
 from gcs_cli.plans.formats import libraries
 from gcs_cli.plans.formats.features import features_of_plan, plan_of_features
 from gcs_cli.plans.formats.files import load_any, save_any
@@ -169,3 +170,11 @@ def test_home_of_a_plan_without_items_survives(tmp_path: Path) -> None:
     for suffix in (".kml", ".geojson", ".gpx"):
         save_any(tmp_path / f"a{suffix}", Plan((), home))
         assert load_any(tmp_path / f"a{suffix}").home == home
+
+
+def test_geofence_as_px4_stores_it_is_the_geofence_of_the_file(tmp_path: Path) -> None:
+    plan = load_plan("missions/fenced_square.plan")
+    stored = tuple(replace(item, autocontinue=False, frame=Frame.GLOBAL_INT) for item in plan.fence)
+    assert list(differences(plan.fence, stored)) == []
+    assert save_any(tmp_path / "a.plan", replace(plan, fence=stored, document={})) == ""
+    assert [difference.field for difference in differences(plan.fence, stored[1:])][-1] == "item"

@@ -10,33 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightstack.mavlink.dialect import EscStatus, FsLoopTiming, ardupilot_dialect, mavlink
+from flightstack.mavlink.dialect import NAME_IN_VERSION, EscStatus, FsLoopTiming, ardupilot_dialect, mavlink
 from flightstack.mavlink.link import Link
 from gcs_cli.vehicle.status_texts import PIECE_TIMEOUT_S
 from gcs_cli.vehicle.vehicle_view import update
 from gcs_cli.vehicle.view_types import TEXTS_KEPT, VehicleView
+from tests.support.folded_vehicle import Vehicle, heartbeat
 
 NAN, INF = math.nan, math.inf
-MISSION_MODE = 4 << 16 | 4 << 24
-
-
-class Vehicle:
-    """Sends messages as one system and folds them."""
-
-    def __init__(self, system_id: int = 1, component_id: int = 1) -> None:
-        self.link = Link(system_id, component_id)
-        self.view = VehicleView()
-
-    def send(self, message: Any, now_s: float = 1.0) -> VehicleView:
-        for decoded in Link(0, 0).decode(self.link.encode(message)):
-            self.view = update(self.view, decoded, now_s)
-        return self.view
-
-
-def heartbeat(
-    base: int = 1, mode: int = MISSION_MODE, state: int = 4, autopilot: int = 12, kind: int = 2
-) -> Any:
-    return mavlink.MAVLink_heartbeat_message(kind, autopilot, base, mode, state, 3)
 
 
 @pytest.fixture
@@ -132,11 +113,11 @@ def test_battery_is_none_when_it_is_not_measured(vehicle: Vehicle) -> None:
 def test_mission_progress(vehicle: Vehicle) -> None:
     vehicle.send(mavlink.MAVLink_mission_current_message(2, 6, 3, 1))
     view = vehicle.send(mavlink.MAVLink_mission_item_reached_message(1))
-    assert view.mission == (2, 6, 1, 3)
+    assert view.mission[:4] == (2, 6, 1, 3)
     assert not view.mission.complete
     assert vehicle.send(mavlink.MAVLink_mission_current_message(5, 6, 5, 1)).mission.complete
     shorter = vehicle.send(mavlink.MAVLink_mission_current_message(0, 1, 2, 1)).mission
-    assert shorter == (0, 1, None, 2)  # the item reached was another mission's
+    assert shorter[:4] == (0, 1, None, 2)  # the item reached was another mission's
 
 
 def test_rotor_speeds_come_in_groups_of_four() -> None:
@@ -262,8 +243,8 @@ def _raw_frame(message_id: int, payload: bytes) -> Any:
 
 ardupilot_dialect()
 FOLDED = [
-    0, 1, 2, 24, 30, 32, 33, 42, 46, 74, 83, 85, 147, 162, 168, 193, 230, 231, 242, 245, 253, 291, 435, 11030, 11031,
-    53002,
+    0, 1, 2, 24, 30, 32, 33, 39, 42, 44, 46, 73, 74, 83, 85, 147, 148, 162, 168, 193, 230, 231, 242, 245, 253, 291, 435,
+    11030, 11031, 53002,
 ]  # fmt: skip
 
 
@@ -320,3 +301,13 @@ def test_charge_at_arming_is_kept_until_disarmed(vehicle: Vehicle) -> None:
 
 def test_fence_breach_is_folded(vehicle: Vehicle) -> None:
     assert vehicle.send(mavlink.MAVLink_fence_status_message(1, 1, 3, 0)).fence_breached
+
+
+def test_vehicle_of_this_project_is_distinguished_from_px4(vehicle: Vehicle) -> None:
+    def version(custom: list[int]) -> Any:
+        nothing = [0] * 8
+        return mavlink.MAVLink_autopilot_version_message(0, 0, 0, 0, 0, custom, nothing, nothing, 0, 0, 0)
+
+    assert vehicle.view.is_own is None
+    assert vehicle.send(version(NAME_IN_VERSION)).is_own
+    assert vehicle.send(version([1] * 8)).is_own is False

@@ -7,6 +7,7 @@ import math
 import pytest
 
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Link
 from gcs_cli.tui.history import ROWS_KEPT, History
 from tests.support.telemetry_frames import attitude, received
 
@@ -73,3 +74,16 @@ def test_rate_of_a_slow_stream_is_measured_between_its_messages() -> None:
         rates = [history.rate_hz(stream, 2.0 * step + late_s) for late_s in (0.0, 0.5, 1.9)]
         assert rates == ([0.5] * 3 if step else [0.0] * 3)
     assert history.rate_hz(stream, 13.0) == 0.0
+
+
+def test_message_that_becomes_known_replaces_its_unknown_stream() -> None:
+    history = History()
+    link = Link(1, 1)
+    frame = link.encode(mavlink.MAVLink_attitude_message(1, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0))
+    unknown = mavlink.MAVLink_unknown(mavlink.MAVLINK_MSG_ID_ATTITUDE, frame)
+    known = received(mavlink.MAVLink_attitude_message(1, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0))
+    unknown._header = known.get_header()
+    history.record(unknown, 1.0)
+    history.record(known, 2.0)
+    assert [stream.name for stream in history.streams()] == ["ATTITUDE"]
+    assert history.series("ATTITUDE.roll").values.tolist() == [0.5]

@@ -10,7 +10,7 @@ from flightstack.commander.failsafe import Action
 from flightstack.core.contract import Vector3
 from flightstack.core.enums import CUSTOM_MODE, Mode
 from flightstack.guidance.fence import FenceBreach
-from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.dialect import NAME_IN_VERSION, mavlink
 from flightstack.mavlink.fields import int16, int32, whole
 from flightstack.mavlink.link import Message
 from flightstack.params.vehicle import system_type
@@ -20,9 +20,6 @@ from flightstack.vehicle.status import VehicleStatus
 MAVLINK_2 = 200
 NO_MISSION = 0xFFFF
 """MISSION_CURRENT.total of a vehicle without a mission."""
-NAME_IN_VERSION = list(b"flightst")
-"""Eight bytes in place of a Git hash; they distinguish the vehicle from PX4."""
-
 _OWN_TARGETS = (Mode.TAKEOFF, Mode.MISSION, Mode.HOLD, Mode.RETURN, Mode.LAND)
 
 

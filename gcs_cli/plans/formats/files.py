@@ -88,7 +88,7 @@ def _losses(before: Plan, after: Plan) -> Iterator[str]:
         del fields["altitude"]
     names_of = {"frame": "altitudes above home (now above sea level)", "item": "items"}
     yield from (names_of.get(field, field) for field in fields)
-    if before.fence and after.fence != before.fence:
+    if any(differences(before.fence, after.fence)):
         yield f"the geofence of {len(before.fence)} items"
     if before.rally and len(after.rally) != len(before.rally):
         yield f"{len(before.rally)} rally points"

@@ -1,0 +1,49 @@
+"""Keys of ``gcs watch``: those typed ahead, and the line that shows them."""
+
+from __future__ import annotations
+
+import pytest
+from textual.pilot import Pilot
+from textual.widgets import Input
+
+from gcs_cli.tui.app import WatchApp
+from tests.support.pilots import type_ahead
+from tests.support.screens import shown
+from tests.support.watch_plays import GROUNDED, asked, play
+
+
+def test_keys_typed_ahead_reach_the_form_that_opens() -> None:
+    async def story(_app: WatchApp, pilot: Pilot) -> None:
+        await type_ahead(pilot, "T", "backspace", "1", "2", "enter")
+
+    assert [action.facts for action in play(story, GROUNDED).actions] == [{"altitude_m": 12.0}]
+
+
+def test_value_typed_ahead_after_a_refused_one_is_sent() -> None:
+    async def story(_app: WatchApp, pilot: Pilot) -> None:
+        await type_ahead(pilot, "T", *"x", "enter", "backspace", *"7", "enter")
+
+    assert [action.facts for action in play(story, GROUNDED).actions] == [{"altitude_m": 7.0}]
+
+
+@pytest.mark.parametrize("screen", ["5", "6"])
+def test_words_typed_ahead_are_searched_and_command_nothing(screen: str) -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await type_ahead(pilot, screen, "slash", *"LAY")
+        assert app.screen.query_one("#search", Input).value == "LAY"
+
+    assert asked(play(story)) == []
+
+
+@pytest.mark.parametrize("width", [60, 80])
+def test_keys_of_all_screens_are_shown_at_any_width(width: int) -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await pilot.press("3")
+        await pilot.pause()
+        assert shown(app)[-1].endswith("^p Commands  q Quit  ? Keys")
+        assert " … " in shown(app)[-1]
+        await pilot.click("KeyBar", offset=(shown(app)[-1].index("? Keys"), 0))
+        await pilot.pause()
+        assert app.screen.query("HelpPanel")
+
+    play(story, size=(width, 24))
