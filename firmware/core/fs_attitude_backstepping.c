@@ -10,8 +10,8 @@
 /*
  * Return the angular acceleration [rad/s^2] of one axis, without the terms that cancel coupling.
  *
- * epsilon1 = x_d - x, epsilon2 = x' - x_d' - c1 epsilon1, and epsilon1 - c2 epsilon2 - c1 (c1 epsilon1 + epsilon2)
- * + x_d''.
+ * epsilon1 = x_d - x, epsilon2 = x' - x_d' - c1 epsilon1, and epsilon1 - c2 epsilon2 - c1 (c1 epsilon1 + epsilon2) +
+ * x_d''.
  *
  * attitude_backstepping.py:51
  */
@@ -36,8 +36,7 @@ void fs_attitude_backstepping_step(const fs_backstepping_memory *memory, const f
     const fs_vector3 *rates_d = &reference->rates_frd_rad_s;
     const fs_vector3 *acceleration_d = &reference->acceleration_frd_rad_s2;
     const fs_real roll = axis(error->x, rates->x, ff * rates_d->x, fa * acceleration_d->x, params->c1, params->c2);
-    const fs_real pitch = axis(error->y, rates->y, ff * rates_d->y, fa * acceleration_d->y, params->c3,
-        params->c4);
+    const fs_real pitch = axis(error->y, rates->y, ff * rates_d->y, fa * acceleration_d->y, params->c3, params->c4);
     const fs_real yaw = axis(error->z, rates->z, ff * rates_d->z, fa * acceleration_d->z, params->c5, params->c6);
     const fs_real ix = params->ix_kg_m2;
     const fs_real iy = params->iy_kg_m2;

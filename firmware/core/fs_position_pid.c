@@ -27,8 +27,8 @@ static void horizontal_demand(const fs_position_memory *memory, const fs_vehicle
  * Return the attitude with this yaw whose thrust axis is along (forward, right, upward), upward positive.
  *
  * With theta = atan2(-forward, upward) and phi = atan2(right, level), level = sqrt(forward^2 + upward^2), the
- * tangents of the half angles are -forward / (level + upward) and right / (whole + level), without cancellation.
- * One common scale converts them to sines and cosines.
+ * tangents of the half angles are -forward / (level + upward) and right / (whole + level), without cancellation. One
+ * common scale converts them to sines and cosines.
  *
  * position_pid.py:121
  */
@@ -86,8 +86,8 @@ static fs_real bounded(fs_real value, fs_real limit)
 
 /* position_pid.py:72 */
 void fs_position_pid_step(const fs_position_memory *memory, const fs_vehicle_state *state,
-    const fs_position_setpoint *setpoint, const fs_position_params *params, fs_real dt_s,
-    fs_real thrust_saturation, fs_position_memory *memory_out, fs_attitude_target *target_out)
+    const fs_position_setpoint *setpoint, const fs_position_params *params, fs_real dt_s, fs_real thrust_saturation,
+    fs_position_memory *memory_out, fs_attitude_target *target_out)
 {
     fs_real north;
     fs_real east;

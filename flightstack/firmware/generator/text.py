@@ -7,7 +7,7 @@ import textwrap
 import unicodedata
 from collections.abc import Iterable
 
-WIDTH = 115
+WIDTH = 118
 _ASCII = {
     "²": "^2", "³": "^3", "−": "-", "–": "-", "…": "to", "ẋ_d": "x_d'", "ẍ_d": "x_d''", "⊗": "(x)", "×": "x", "·": "*",
     "√": "sqrt", "±": "+-", "≤": "<=", "≥": ">=", "→": "->", "°": " deg", "Σ": "sum ", "ẋ": "x'", "ẍ": "x''", "⁴": "^4",
@@ -63,7 +63,7 @@ def comment(text: str, indent: str = "") -> list[str]:
     text = ascii_text(text).replace("``", "").replace("*/", "* /").replace("/*", "/ *").strip()
     if not text:
         return []
-    if "\n" not in text and len(indent) + len(text) + 6 <= WIDTH + 4:
+    if "\n" not in text and len(indent) + len(text) + 6 <= WIDTH:
         return [f"{indent}/* {text} */"]
     lines = [f"{indent}/*"]
     for paragraph in text.split("\n\n"):
