@@ -189,7 +189,7 @@ static void gather(const fs_loops *loops, const fs_vehicle_state *state, const f
     inputs->reference = *reference;
     inputs->error_rad = fs_rotation_vector(&turn);
     inputs->relative_rotor_speed_rad_s =
-        fs_relative_rotor_speed(loops->last.rotor_command_rad_s, &loops->mixer, loops->rates.rotors);
+        fs_relative_rotor_speed(loops->last.rotor_command_rad_s, loops->mixer.spin, loops->mixer.rotors);
     inputs->saturation.x = direction(lag->x);
     inputs->saturation.y = direction(lag->y);
     inputs->saturation.z = direction(lag->z);
@@ -215,6 +215,25 @@ static uint16_t attitude_loop(const fs_loops *loops, const fs_vehicle_state *sta
     return (uint16_t)(vector_is_finite(&output->wrench.torque_frd_n_m) & is_memory_finite);
 }
 
+/* Share the wrench out to the rotors; those that the vehicle has not stand still. Nonzero: no sum overflowed. */
+static uint16_t mix(const fs_loops *loops, fs_tick *tick, fs_loop_output *output)
+{
+    fs_real work[3][FS_MAX_ROTORS], sum;
+    const fs_wrench *achieved = &output->wrench_achieved;
+    uint16_t i;
+
+    for (i = loops->rates.rotors; i < FS_MAX_ROTORS; i++) {
+        output->rotor_command_rad_s[i] = FS_LIT(0.0);
+    }
+    output->wrench_achieved = fs_mix(&output->wrench, &loops->mixer, output->rotor_command_rad_s, work);
+    output->status = fs_saturation_of(&output->wrench, achieved, &loops->resolution, &tick->saturation);
+    sum = fs_add_part(FS_LIT(0.0), achieved->thrust_n);
+    for (i = 0U; i < loops->rates.rotors; i++) {
+        sum = fs_add_part(sum, output->rotor_command_rad_s[i]);
+    }
+    return (uint16_t)(fs_is_finite(sum) & vector_is_finite(&achieved->torque_frd_n_m));
+}
+
 /* Run inner loop and mixer; return 0 and keep the tick, or the status bit that tells why the output is not sound. */
 static uint16_t inner_loop(fs_loops *loops, const fs_vehicle_state *state, uint16_t state_is_sound, fs_clock clock,
                            uint32_t began, fs_loop_output *output, fs_loop_cost *cost)
@@ -234,10 +253,9 @@ static uint16_t inner_loop(fs_loops *loops, const fs_vehicle_state *state, uint1
     if (!is_sound) {
         return FS_STATUS_OUTPUT_NOT_FINITE;
     }
-    output->status = fs_mix(&output->wrench, &loops->mixer, loops->rates.rotors, output->rotor_command_rad_s,
-                            &output->wrench_achieved, &tick.saturation);
+    is_sound = mix(loops, &tick, output);
     cost->mixer = now(clock) - controlled;
-    if (output->status == FS_STATUS_OUTPUT_NOT_FINITE) {
+    if (!is_sound) {
         return FS_STATUS_OUTPUT_NOT_FINITE;
     }
     output->attitude_target = loops->target;

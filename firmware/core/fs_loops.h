@@ -7,7 +7,7 @@
 #ifndef FS_LOOPS_H
 #define FS_LOOPS_H
 
-#include "fs_mixer.h"
+#include "fs_mixer_limits.h"
 #include "fs_numbers.h"
 #include "fs_types.h"
 
@@ -56,6 +56,7 @@ typedef struct fs_loops {
     fs_reference_params reference;
     fs_controller_params controller;
     fs_mixer mixer;
+    fs_resolution resolution; /* of the mixer's sums */
     fs_loop_rates rates;
     /* memories */
     fs_position_memory position_memory;

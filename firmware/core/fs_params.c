@@ -72,7 +72,7 @@ static void derive(fs_loops *loops)
     loops->rates.outer_dt_s = FS_LIT(1.0) / outer_hz;
     loops->rates.fraction_step = outer_hz / setup->inner_hz;
     loops->position.max_tilt_rad = setup->max_tilt_deg * RADIANS_PER_DEGREE;
-    fs_mixer_derive(&loops->mixer, loops->rates.rotors);
+    fs_mixer_derive(&loops->mixer, loops->rates.rotors, &loops->resolution);
     loops->controller.pid.ix_kg_m2 = setup->ix_kg_m2;
     loops->controller.pid.iy_kg_m2 = setup->iy_kg_m2;
     loops->controller.pid.iz_kg_m2 = setup->iz_kg_m2;

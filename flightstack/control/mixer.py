@@ -1,6 +1,6 @@
 """Mixer: rotor speeds for a wrench, any rotor set, with limits; priority roll and pitch, then thrust, then yaw.
 
-Operations and their order match ``firmware/core/fs_mixer.c``.
+``firmware/core/fs_mixer.c`` is generated from this file.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ def _limit_even(thrust_n: float, mixer: Mixer, work: Work) -> tuple[float, float
 
 
 @compiled
-def _yaw_scale(mixer: Mixer, work: Work) -> float:
+def _largest_yaw_scale(mixer: Mixer, work: Work) -> float:
     """Return the share of yaw, in [0, 1], that fits within the limits."""
     turn, lift = work[1], work[2]
     scale = 1.0
@@ -156,7 +156,7 @@ def _largest_scale(base: PerRotor, direction: PerRotor, low: PerRotor, high: Per
     for i in range(base.size):
         step = direction[i]
         room = high[i] - base[i] if step > 0.0 else low[i] - base[i]
-        if step != 0.0 and scale * abs(step) > abs(room):
+        if scale * abs(step) > abs(room):  # never if the step is zero
             scale = max(0.0, room / step)
     return scale
 
@@ -185,13 +185,13 @@ def _fit_roll_pitch(speed_squared: PerRotor, mixer: Mixer) -> float:
 @compiled
 def _fit_thrust(base: PerRotor, thrust_n: float, mixer: Mixer) -> float:
     """Return the thrust nearest to ``thrust_n`` that keeps every rotor, with its roll-pitch part, within its limits."""
-    least, most = -math.inf, math.inf
     for i in range(base.size):
-        per_newton = mixer.allocation[i, 0]
-        if per_newton > 0.0:
-            least = max(least, (mixer.low[i] - base[i]) / per_newton)
-            most = min(most, (mixer.high[i] - base[i]) / per_newton)
-    return max(min(thrust_n, most), least)
+        if mixer.allocation[i, 0] > 0.0:
+            thrust_n = min(thrust_n, (mixer.high[i] - base[i]) / mixer.allocation[i, 0])
+    for i in range(base.size):
+        if mixer.allocation[i, 0] > 0.0:
+            thrust_n = max(thrust_n, (mixer.low[i] - base[i]) / mixer.allocation[i, 0])
+    return thrust_n
 
 
 @compiled
@@ -238,7 +238,7 @@ def mix(wrench: Wrench, mixer: Mixer, rotor_speed_rad_s: PerRotor, work: Work) -
             if mixer.is_even == 0.0:
                 return _fit(wrench, mixer, rotor_speed_rad_s, work)
             tilt_scale, thrust_n = _limit_even(thrust_n, mixer, work)
-        yaw_scale = _yaw_scale(mixer, work)
+        yaw_scale = _largest_yaw_scale(mixer, work)
     for i in range(mixer.low.size):
         rotor_speed_rad_s[i] = _signed_root(work[2, i] + yaw_scale * work[1, i])
     if is_free:

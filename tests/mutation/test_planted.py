@@ -70,7 +70,7 @@ def caught(test: Callable[..., None], *arguments: object) -> bool:
 
 
 def test_a_sign_in_the_mixer(plant: Plant) -> None:
-    right = "share[1] * torque->x + rotor->share[2] * torque->y"
+    right = "lift[i] = base[i] + mixer->allocation[i][0]"
     plant("core/fs_mixer.c", right, right.replace(" + ", " - "))
     assert caught(test_c_laws.test_mixer_in_double_has_pythons_bits, "cross")
 
@@ -98,15 +98,15 @@ def test_an_integrator_that_winds_up(plant: Plant) -> None:
 
 
 def test_a_status_bit_of_another_axis(plant: Plant) -> None:
-    right = "pitch, resolution[2], FS_STATUS_PITCH_SATURATED"
-    plant("core/fs_mixer.c", right, right.replace("PITCH", "YAW"))
+    right = "resolution->pitch, FS_STATUS_PITCH_SATURATED"
+    plant("core/fs_mixer_limits.c", right, right.replace("PITCH", "YAW"))
     assert caught(test_core_loops.test_a_shaken_vehicle_is_answered_as_by_python, "four")
 
 
 def test_a_short_way_that_is_allowed_by_thrust_alone(plant: Plant) -> None:
     """Of effectiveness times allocation the first row is looked at: nothing that flies today has another one wrong."""
     right = "for (row = 0U; row < 4U; row++) {"
-    plant("core/fs_mixer.c", right, right.replace("4U", "1U"))
+    plant("core/fs_mixer_limits.c", right, right.replace("4U", "1U"))
     assert not caught(test_c_laws.test_the_mixer_knows_which_short_ways_it_may_go, "cross", "double")
     assert caught(
         test_c_laws.test_each_number_of_effectiveness_times_allocation_is_looked_at, "double", 1e-12

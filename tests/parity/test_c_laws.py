@@ -271,11 +271,12 @@ class Mixed(NamedTuple):
 def mixer_of_c(c: Core, rotors: Mixer) -> np.ndarray:
     """Return memory of an fs_mixer with these numbers, and nothing derived yet."""
     flat, n = np.zeros(c.library.drive_sizes(3) // c.dtype.itemsize, c.dtype), rotors.spin.size
-    flat[: 4 * n] = rotors.allocation.ravel()
+    numbers = flat[1:]  # after the number of rotors
+    numbers[: 4 * n] = rotors.allocation.ravel()
     for axis in range(4):
-        flat[32 + 8 * axis : 32 + 8 * axis + n] = rotors.effectiveness[axis]
+        numbers[32 + 8 * axis : 32 + 8 * axis + n] = rotors.effectiveness[axis]
     for place, values in enumerate((rotors.low, rotors.high, rotors.spin)):
-        flat[64 + 8 * place : 64 + 8 * place + n] = values
+        numbers[64 + 8 * place : 64 + 8 * place + n] = values
     return flat
 
 

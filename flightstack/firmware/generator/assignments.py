@@ -130,7 +130,7 @@ class Assignments:
         for element, kind in zip(target.elts, callee.result.items, strict=True):
             name = element.id if isinstance(element, ast.Name) else ""
             old = self.writer.variables.get(name)
-            is_read = old is not None and any(old.name in argument for argument in arguments)
+            is_read = old is not None and any(f"&{old.name}" in argument for argument in arguments)
             if not name.strip("_") or is_read:
                 held = self.writer.declare_temporary(name.strip("_") or "unused", kind)
                 outputs.append(f"&{held.text}")

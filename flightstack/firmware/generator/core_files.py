@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from flightstack.control import mixer
 from flightstack.control.attitude_controller import AttitudeController, AttitudeInputs
 from flightstack.control.attitude_reference import (
     ReferenceMemory,
@@ -37,6 +38,8 @@ LAWS: tuple[Any, ...] = (
     position_pid_step,
     attitude_reference_step,
     in_body_frame,
+    mixer.mix,
+    mixer.relative_rotor_speed,
     geometry.blend,
     geometry.conjugate,
     geometry.quaternion_product,

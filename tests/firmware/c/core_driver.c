@@ -7,7 +7,7 @@
 #include "fs_geometry.h"
 #include "fs_loops.h"
 #include "fs_math.h"
-#include "fs_mixer.h"
+#include "fs_mixer_limits.h"
 #include "fs_params.h"
 #include "fs_position_pid.h"
 #include "fs_rate_groups.h"
@@ -79,17 +79,23 @@ void drive_backstepping(uint32_t count, const fs_attitude_inputs *inputs, const 
 void drive_mixer(uint32_t count, const fs_wrench *wrench, fs_mixer *mixer, uint32_t rotors, fs_real *speeds,
                  fs_wrench *achieved, fs_saturation *saturation, fs_real *relative)
 {
-    fs_mixer_derive(mixer, (uint16_t)rotors); /* after what the test has filled in */
+    fs_resolution resolution;
+    fs_mixer_derive(mixer, (uint16_t)rotors, &resolution); /* after what the test has filled in */
     for (uint32_t i = 0; i < count; i++) {
-        (void)fs_mix(&wrench[i], mixer, (uint16_t)rotors, &speeds[i * FS_MAX_ROTORS], &achieved[i], &saturation[i]);
-        relative[i] = fs_relative_rotor_speed(&speeds[i * FS_MAX_ROTORS], mixer, (uint16_t)rotors);
+        fs_real *speed = &speeds[i * FS_MAX_ROTORS], work[3][FS_MAX_ROTORS];
+        for (uint32_t rotor = rotors; rotor < FS_MAX_ROTORS; rotor++) {
+            speed[rotor] = 0;
+        }
+        achieved[i] = fs_mix(&wrench[i], mixer, speed, work);
+        (void)fs_saturation_of(&wrench[i], &achieved[i], &resolution, &saturation[i]);
+        relative[i] = fs_relative_rotor_speed(speed, mixer->spin, mixer->rotors);
     }
 }
 
 /* Which of its short ways a mixer may go: 1 effectiveness undoes allocation, 2 rotors are alike. */
 uint32_t drive_mixer_ways(const fs_mixer *mixer)
 {
-    return (mixer->is_inverse != 0U ? 1U : 0U) + (mixer->is_even != 0U ? 2U : 0U);
+    return (mixer->is_inverse != 0 ? 1U : 0U) + (mixer->is_even != 0 ? 2U : 0U);
 }
 
 static void put_vector(fs_real *at, const fs_vector3 *v)
