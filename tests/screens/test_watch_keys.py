@@ -7,9 +7,9 @@ from textual.pilot import Pilot
 from textual.widgets import Input
 
 from gcs_cli.tui.app import WatchApp
-from tests.screens.test_watch_app import GROUNDED, asked, play
 from tests.support.pilots import type_ahead
 from tests.support.screens import shown
+from tests.support.watch_plays import GROUNDED, asked, play
 
 
 def test_keys_typed_ahead_reach_the_form_that_opens() -> None:
