@@ -12,6 +12,7 @@ from flightstack.core.enums import Severity
 from gcs_cli.tui.app import WatchApp
 from gcs_cli.tui.feed import Notice
 from gcs_cli.tui.orders import ORDERS
+from gcs_cli.tui.palette import DARK, LIGHT
 from gcs_cli.tui.screens import SCREENS, ScreenEntry
 from gcs_cli.vehicle.view_types import Identity, VehicleView
 from tests.support.pictures import check_picture
@@ -284,6 +285,22 @@ def test_a_theme_changes_the_colours_of_drawings() -> None:
         app.theme = "nord"
         await pilot.pause()
         assert app.palette.text.startswith("#")
+
+    play(story)
+
+
+def test_background_of_a_drawing_follows_the_theme() -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        backgrounds = []
+        for theme in ("gcs-dark", "gcs-light"):
+            app.theme = theme
+            await pilot.pause()
+            app.redraws = 0
+            app.redraw()
+            await pilot.pause()
+            [segment, *_] = app.screen.query_one("#position").render_line(0)
+            backgrounds.append(segment.style.bgcolor.name)
+        assert backgrounds == [palette.background for palette in (DARK, LIGHT)]
 
     play(story)
 
