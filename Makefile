@@ -8,8 +8,8 @@ READY := $(VENV)/.test-ready
 # bytecode is written for what is imported, when it is first imported: half of the time to install, a fifth less room
 export PYTHONDONTWRITEBYTECODE :=
 INSTALL := $(BIN)/python -m pip install -q --no-compile --disable-pip-version-check -e
-# test processes side by side: one more than cores, because flights in real time wait most of theirs
-WORKERS ?= 3
+# test processes side by side: twice the cores, because flights in real time wait most of theirs
+WORKERS ?= 4
 # files in order: those of firmware, interop and processes, which take longest, come first
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 .DEFAULT_GOAL := help

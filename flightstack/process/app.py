@@ -20,6 +20,7 @@ from flightstack.process.connections import (
     GroundConnection,
     check_deadline,
     connect_simulator,
+    serve_while_idle,
     wait_for_state,
 )
 from flightstack.process.process_config import (
@@ -46,8 +47,6 @@ GROUND_BUSY_NS = 50_000_000
 Mission items are requested one at a time: served every outer tick alone, a transfer of 1000 items takes 10 s. Not while
 ticks follow each other faster than GROUND_POLL_NS: then the outer ticks are frequent enough.
 """
-TRANSFER_MS = 1
-"""Interval of polling the ground links while files are sent and the simulator is waited for."""
 GROUND_SHARE = 0.4
 """Maximum share of a real-time tick for sending to ground stations; the rest is sent in the next ticks."""
 REPORT_S = 0.2
@@ -245,21 +244,17 @@ class App:
                 if tick % divisor == 0:
                     self._between_ticks(simulator)
             if self._idle_poller is not None and began_ns - before_ns > GROUND_POLL_NS:
-                self._serve_while_idle(simulator, self._idle_poller)
+                serve_while_idle(
+                    simulator, self._idle_poller, self.stack, self._process, self._serve_while_idle
+                )
             data = receive()
             fresh = self._wait_for_simulator(simulator) if data is None else link.receive(data)
 
-    def _serve_while_idle(self, simulator: TcpClient, poller: select.poll) -> None:
-        """Serve the ground links as data arrives, and while files are sent, until the simulator sends."""
-        number = simulator.fileno()
-        while True:
-            sends_files = self.stack.ground.sends_files
-            ready = poller.poll(TRANSFER_MS if sends_files else 20)
-            if any(descriptor == number for descriptor, _ in ready) or not (ready or sends_files):
-                return
-            if self._serve_ground():
-                self._busy_until_ns = time.monotonic_ns() + GROUND_BUSY_NS
-            self._check_stop()
+    def _serve_while_idle(self) -> None:
+        """Serve the ground links between two states of the simulator, and check for a stop."""
+        if self._serve_ground():
+            self._busy_until_ns = time.monotonic_ns() + GROUND_BUSY_NS
+        self._check_stop()
 
     def _wait_for_simulator(self, simulator: TcpClient) -> bool:
         """Serve the ground links until the simulator sends data; return True for a new state."""

@@ -17,6 +17,10 @@ from flightstack.transports.vehicle_ports import Place, PortsConfig, VehiclePort
 
 FALLBACK_REQUEST_S = 1.0
 """Timeout before the standard message is requested from the simulator."""
+IDLE_MS = 20
+"""Longest wait for data of the ground links between two states of the simulator."""
+TRANSFER_MS = 1
+"""The same while files are sent."""
 SIMULATOR_WARNING_S = 10.0
 """Timeout before the user is warned; waiting continues, because the simulator may be compiling."""
 
@@ -131,6 +135,24 @@ def wait_for_state(
             _warn_of_silence(stack, process)
         check_deadline(began_s + process.simulator_timeout_s, stack, process)
     stack.now.has_state = True
+
+
+def serve_while_idle(
+    simulator: TcpClient, poller: select.poll, stack: Stack, process: ProcessConfig, serve: Callable[[], None]
+) -> None:
+    """Call ``serve`` as ground data arrives, and while files are sent, until the simulator sends.
+
+    ``poller`` has the simulator and the ground links. Raise Ended after the timeout of the simulator.
+    """
+    number = simulator.fileno()
+    deadline_s = time.monotonic() + process.simulator_timeout_s
+    while True:
+        sends_files = stack.ground.sends_files
+        ready = poller.poll(TRANSFER_MS if sends_files else IDLE_MS)
+        if any(descriptor == number for descriptor, _ in ready) or not (ready or sends_files):
+            return
+        serve()
+        check_deadline(deadline_s, stack, process)
 
 
 def _warn_of_silence(stack: Stack, process: ProcessConfig) -> None:

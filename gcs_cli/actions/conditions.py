@@ -10,8 +10,7 @@ from typing import NamedTuple
 
 from gcs_cli.actions.on_vehicle import find_mode
 from gcs_cli.actions.progress import horizontal_m
-from gcs_cli.autopilots.autopilot import Role
-from gcs_cli.vehicle.view_types import MISSION_ACTIVE, GeoPosition, VehicleView
+from gcs_cli.vehicle.view_types import GeoPosition, VehicleView
 
 COMPLETE = "complete"
 POSITION_RADIUS_M = 2.0
@@ -98,42 +97,6 @@ def _mission_text(view: VehicleView) -> str:
     return f"{text}, the vehicle does not report the state of its mission" if unknown else text
 
 
-class Completion:
-    """Whether the vehicle has completed its mission and not begun it again. Call ``holds`` with each new view.
-
-    A vehicle may cease to report the completion when it disarms. Some releases of PX4 report no state of the mission:
-    there it is complete when its last item is reached, or with ``ends_with_return`` when the vehicle returns during
-    that item, which PX4 never reports as reached.
-    """
-
-    def __init__(self, ends_with_return: bool = False) -> None:
-        self._ends_with_return = ends_with_return
-        self._is_complete = False
-
-    def holds(self, view: VehicleView) -> bool:
-        """Return the result as of ``view``."""
-        if self._completes(view):
-            self._is_complete = True
-        elif self._runs(view):
-            self._is_complete = False
-        return self._is_complete
-
-    def _completes(self, view: VehicleView) -> bool:
-        mission, roles = view.mission, view.autopilot.roles
-        if mission.state is not None or not mission.total:
-            return mission.complete
-        last = mission.total - 1
-        if self._ends_with_return and mission.current == last:
-            return view.on_ground is True if not view.armed else view.mode == roles.get(Role.RETURN)
-        return mission.reached == last
-
-    @staticmethod
-    def _runs(view: VehicleView) -> bool:
-        if view.mission.state is not None:
-            return view.mission.state == MISSION_ACTIVE
-        return view.armed and view.mode == view.autopilot.roles.get(Role.MISSION)
-
-
 def is_ready(view: VehicleView) -> bool:
     """Return True if the vehicle can be armed and flown: its pre-arm check passes, and it has a position.
 
@@ -148,7 +111,7 @@ STATES: Mapping[str, tuple[Callable[[VehicleView], bool], Callable[[VehicleView]
     "landed": (lambda view: view.on_ground is True, _landed_text),
     "in-air": (lambda view: view.landed_state == 2, _landed_text),
     "ready": (is_ready, _ready_text),
-    COMPLETE: (lambda view: view.mission.complete, _mission_text),
+    COMPLETE: (lambda view: view.mission.is_flown, _mission_text),
 }
 """Conditions of one word."""
 

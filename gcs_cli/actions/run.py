@@ -178,8 +178,7 @@ class ActionRun:
         if answer.result is None:
             self._end(Outcome.SILENT, f"{self.step.name}: {answer.reason}")
         elif answer.result == mavlink.MAV_RESULT_UNSUPPORTED and self.step.instead is not None:
-            self._client = RepeatedMessage(self.step.instead(*self._vehicle(view)), now_s)
-            self._timer = EffectTimer(view, now_s)
+            self._send_instead(self.step.instead(*self._vehicle(view)), view, now_s)
         elif not answer.accepted:
             self._refuse(view, answer.reason, now_s)
         elif self.step.effect is None or not (self._waits or self._steps):
@@ -192,6 +191,12 @@ class ActionRun:
             self.acknowledged = not self._steps
             self._timer = EffectTimer(view, now_s)
             self._await_effect(view, now_s)
+
+    def _send_instead(self, message: Message, view: VehicleView, now_s: float) -> None:
+        """Send a message without an answer: a change of the current item shows that the vehicle received it."""
+        before = view.mission.current
+        self._client = RepeatedMessage(message, now_s, lambda: self._view().mission.current != before)
+        self._timer = EffectTimer(view, now_s)
 
     def _refuse(self, view: VehicleView, answer: str, now_s: float) -> None:
         """End with the vehicle's texts; they follow the answer."""

@@ -85,7 +85,9 @@ ARDUPILOT = Autopilot(
         mavlink.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
     },
     reports_estimator=True,
-    lacks_messages=frozenset({FS_LOOP_TIMING_ID, int(EscStatus.id)}),
+    lacks_messages=frozenset(
+        {FS_LOOP_TIMING_ID, int(EscStatus.id), mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED}
+    ),
     sends_modes_as_stream=True,
     refusal_prefixes=("Arm: ", "PreArm: "),
     casts_parameters=True,

@@ -82,7 +82,7 @@ class Autopilot(NamedTuple):
     reports_estimator: bool
     """True if the vehicle sends ESTIMATOR_STATUS or EKF_STATUS_REPORT."""
     lacks_messages: frozenset[int]
-    """Messages not to request: the vehicle answers each request with a warning."""
+    """Messages not to request: the vehicle answers each request with a warning, or with a value of a former flight."""
     sends_modes_as_stream: bool
     """True if AVAILABLE_MODES is sent one mode per stream interval, so that its rate must be raised first."""
     refusal_prefixes: tuple[str, ...]

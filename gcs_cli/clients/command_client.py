@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from flightstack.core.float32 import as_float32
@@ -19,6 +19,9 @@ _ACCEPTED: int = mavlink.MAV_RESULT_ACCEPTED
 _IN_PROGRESS: int = mavlink.MAV_RESULT_IN_PROGRESS
 UNUSED = 2**31 - 1
 """Latitude or longitude of a COMMAND_INT that the vehicle is to ignore."""
+MESSAGE_TRIES = 3
+MESSAGE_PERIOD_S = 1.0
+"""How often a message without an answer is sent, and the time between."""
 
 
 class CommandTiming(NamedTuple):
@@ -149,28 +152,36 @@ class CommandClient:
 
 
 class RepeatedMessage:
-    """Sends a message that has no answer, and repeats it, because it may be lost."""
+    """Sends a message that has no answer, up to ``MESSAGE_TRIES`` times, because it may be lost.
+
+    It is not repeated once ``is_received`` returns True: each repetition acts on the vehicle again.
+    """
 
     result: None = None
     """Always unknown: the caller observes the effect."""
 
-    def __init__(self, message: Message, now_s: float, period_s: float = 1.0) -> None:
+    def __init__(self, message: Message, now_s: float, is_received: Callable[[], bool]) -> None:
         self._message = message
-        self._due_s = now_s
-        self._period_s = period_s
+        self._is_received = is_received
+        self._due_s: float | None = now_s
+        self._tries_left = MESSAGE_TRIES
 
     def receive(self, message: Message, now_s: float) -> None:
         """Ignore ``message``."""
 
     def poll(self, now_s: float) -> list[Message]:
         """Return the message if it is due."""
-        if now_s < self._due_s:
+        if self._due_s is None or now_s < self._due_s:
             return []
-        self._due_s = now_s + self._period_s
+        if self._is_received():
+            self._due_s = None
+            return []
+        self._tries_left -= 1
+        self._due_s = now_s + MESSAGE_PERIOD_S if self._tries_left else None
         return [self._message]
 
-    def next_deadline(self) -> float:
-        """Return the time of the next repetition."""
+    def next_deadline(self) -> float | None:
+        """Return the time of the next repetition; None: never."""
         return self._due_s
 
 

@@ -31,6 +31,8 @@ ALL_LOGS = 0xFFFF
 ERASE_RETRY_S = 1.0
 """Time after which LOG_ERASE is repeated; it has no acknowledgement, and a vehicle may erase for seconds."""
 ERASE_TRIES = 3
+ERASE_ANSWERS = 3
+"""Number of answers to TIMESYNC after which silence about the list confirms an erase: the vehicle has no logs."""
 
 
 class LogEntry(NamedTuple):
@@ -75,6 +77,11 @@ class LogClient:
         self._before: int | None = None
         """Number of logs before an erase."""
         self._erases_left = 0
+        self._is_erased = False
+        """True if a text of the vehicle has confirmed the erase."""
+        self._stamps: set[int] = set()
+        """Those of TIMESYNC requests after an erase, until they are answered."""
+        self._answers = 0
         self._log_id: int | None = None
         self._file: PartialFile | None = None
         self._asked_end = 0
@@ -90,10 +97,12 @@ class LogClient:
     def start_erase(self, before: int) -> None:
         """Erase all of ``before`` logs, and list those that are left.
 
-        Repeated until fewer are left; the log that is being written may stay.
+        Repeated until fewer are left; the log that is being written may stay. If the vehicle is silent without logs,
+        its answers to TIMESYNC show that it receives the requests.
         """
         self.start_list()
         self._before, self._erases_left = before, ERASE_TRIES
+        self._is_erased, self._stamps, self._answers = False, set(), 0
 
     def start_download(self, entry: LogEntry) -> None:
         """Download a log of the list."""
@@ -127,13 +136,16 @@ class LogClient:
             self._on_data(self._file, message, now_s)
         elif kind == "STATUSTEXT" and self._before is not None and "log" in message.text.lower():
             self._on_erase_text(message)
+        elif kind == "TIMESYNC" and message.tc1 and message.ts1 in self._stamps:
+            self._stamps.remove(message.ts1)
+            self._answers += 1
 
     def _on_erase_text(self, message: Message) -> None:
         """Take a text about the erase: a warning is the reason of a refusal, a notice says that it is done."""
         if message.severity <= mavlink.MAV_SEVERITY_WARNING:
             self._end(LogFailed(message.text.partition(": ")[2] or message.text))
         elif "erased" in message.text:
-            self._erases_left = 0
+            self._erases_left, self._is_erased = 0, True
 
     def poll(self, now_s: float) -> list[Message]:
         """Return the messages to send now."""
@@ -155,9 +167,12 @@ class LogClient:
         return None if self.result is not None else self._retry_s
 
     def _of_silence(self) -> LogDone | LogFailed:
+        vehicle = f"the vehicle (system {self.vehicle.system})"
         if self._is_silent_without_logs and self._file is None and not self._entries:
-            return LogDone()
-        return LogFailed(f"the vehicle (system {self.vehicle.system}) does not answer", silent=True)
+            if self._before is None or self._is_erased or self._answers >= ERASE_ANSWERS:
+                return LogDone()
+            return LogFailed(f"{vehicle} does not confirm it", silent=True)
+        return LogFailed(f"{vehicle} does not answer", silent=True)
 
     # -- list
 
@@ -192,6 +207,10 @@ class LogClient:
         missing = [log_id for log_id in self._ids or () if log_id not in self._entries]
         first, last = (missing[0], missing[-1]) if missing else (0, ALL_LOGS)
         self._outbox.append(mavlink.MAVLink_log_request_list_message(*self.vehicle, first, last))
+        if self._before is not None and self._is_silent_without_logs:
+            stamp = max(1, round(now_s * 1e9))
+            self._stamps.add(stamp)
+            self._outbox.append(mavlink.MAVLink_timesync_message(0, stamp))
         self._retry_s = now_s + RETRY_S
 
     # -- download

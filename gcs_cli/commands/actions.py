@@ -67,7 +67,10 @@ def disarm(
     ] = False,
     yes: YesOption = False,
 ) -> None:
-    """Disarm the vehicle."""
+    """Disarm the vehicle.
+
+    With --force, in the air, asks first on a terminal; elsewhere it needs --yes.
+    """
     with connect_vehicle(context, link) as connection:
         if force and not yes and _may_fly(connection):
             confirm("the vehicle may be in the air, and its rotors will stop", yes, connection)

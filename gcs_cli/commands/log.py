@@ -91,7 +91,7 @@ def erase(
 ) -> None:
     """Erase all logs but the one that is being written.
 
-    An armed vehicle may refuse.
+    Asks first on a terminal; elsewhere it needs --yes. An armed vehicle may refuse.
     """
     if not yes and (sys.stdin is None or not sys.stdin.isatty()):
         raise CliError("erase removes all logs from the vehicle: confirm with --yes", USAGE)

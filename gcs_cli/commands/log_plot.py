@@ -27,27 +27,29 @@ app = make_app(add_completion=False)
 _TEMPLATES = Path(__file__).resolve().parents[1] / "logs" / "templates"
 _PANEL_ROWS = 12
 _PRINTED = (".png", ".svg", ".pdf")
+FieldsArgument = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="FIELD...",
+        help="topic, topic.field, a part of it that is unique, or a pattern with *.",
+        show_default=False,
+    ),
+]
+PageOption = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Write a page with the charts.", show_default=False)
+]
+PictureOption = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Write a picture: .png, .svg or .pdf.", show_default=False)
+]
 
 
 @app.command()
 def plot(
     context: typer.Context,
     log: LogArgument,
-    fields: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="FIELD...",
-            help="topic, topic.field, a part of it that is unique, or a pattern with *.",
-            show_default=False,
-        ),
-    ],
-    html: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write a page with the charts.", show_default=False)
-    ] = None,
-    png: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write a picture: .png, .svg or .pdf.", show_default=False),
-    ] = None,
+    fields: FieldsArgument,
+    html: PageOption = None,
+    png: PictureOption = None,
     begin: Annotated[
         float, typer.Option("--from", metavar="SECONDS", help="Start, from the start of the log.")
     ] = 0.0,
@@ -74,18 +76,21 @@ def plot(
     limits = begin, math.inf if end is None else end
     out = output_of(context, as_json)
     if html is not None:
-        figure = field_figure(recording, found, *limits)
-        lines = [start_utc(recording) or "unknown date"]
-        page = render_page(
-            _TEMPLATES, "fields.html", title=Path(recording.source).name, lines=lines, figures=[figure]
-        )
-        write_text_atomically(html, page)
+        _write_page(html, recording, found, limits)
         out.say("page", f"page written to {html}", file=str(html))
     if png is not None:
         _print_figure(png, recording, found, limits)
         out.say("picture", f"picture written to {png}", file=str(png))
     if html is None and png is None:
         _print(out, recording, found, limits)
+
+
+def _write_page(path: Path, recording: Recording, fields: list[Field], limits: tuple[float, float]) -> None:
+    figure = field_figure(recording, fields, *limits)
+    lines = [start_utc(recording) or "unknown date"]
+    title = Path(recording.source).name
+    page = render_page(_TEMPLATES, "fields.html", title=title, lines=lines, figures=[figure])
+    write_text_atomically(path, page)
 
 
 def _print_figure(path: Path, recording: Recording, fields: list[Field], limits: tuple[float, float]) -> None:

@@ -15,7 +15,7 @@ from gcs_cli.errors import USAGE, CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.output import Output
 from gcs_cli.settings import LinkOptions, output_of
-from gcs_cli.transfers.past_texts import fetch_past_texts
+from gcs_cli.transfers.past_texts import fetch_past_texts, texts_before
 from gcs_cli.vehicle.view_types import StatusText
 from gcs_cli.vehicle_link import connect_vehicle
 
@@ -24,6 +24,24 @@ app = make_app(add_completion=False)
 PAST = 10
 """Past texts that are shown by default."""
 LEVELS = tuple(severity.name.lower() for severity in Severity)
+LevelOption = Annotated[
+    str,
+    typer.Option(
+        "--level",
+        metavar="SEVERITY",
+        help=f"Least severity: {', '.join(LEVELS)}.",
+        autocompletion=lambda: list(LEVELS),
+    ),
+]
+PastOption = Annotated[
+    int,
+    typer.Option(
+        "--past",
+        metavar="N",
+        min=0,
+        help="Begin with the last N texts that the vehicle keeps; PX4 and ArduPilot keep none.",
+    ),
+]
 
 
 @app.command()
@@ -31,28 +49,12 @@ LEVELS = tuple(severity.name.lower() for severity in Severity)
 def messages(
     context: typer.Context,
     link: LinkOptions,
-    level: Annotated[
-        str,
-        typer.Option(
-            "--level",
-            metavar="SEVERITY",
-            help=f"Least severity: {', '.join(LEVELS)}.",
-            autocompletion=lambda: list(LEVELS),
-        ),
-    ] = "debug",
+    level: LevelOption = "debug",
     count: Annotated[
         int | None, typer.Option("--count", metavar="N", min=1, help="End after N texts.", show_default=False)
     ] = None,
     duration: DurationOption = None,
-    past: Annotated[
-        int,
-        typer.Option(
-            "--past",
-            metavar="N",
-            min=0,
-            help="Begin with the last N texts that the vehicle keeps; PX4 and ArduPilot keep none.",
-        ),
-    ] = PAST,
+    past: PastOption = PAST,
 ) -> None:
     """Print the status texts of the vehicle until Ctrl-C.
 
@@ -65,13 +67,13 @@ def messages(
     with connect_vehicle(
         context, link, takes_recording=True, in_real_time=False, shares=True, several=True
     ) as connection:
-        printer = _Printer(connection, output, LEVELS.index(level.lower()), count)
+        printer = TextPrinter(connection, output, LEVELS.index(level.lower()), count)
         if past and not connection.is_recording and len(connection.fleet.sessions) == 1:
             printer.print_past(fetch_past_texts(connection), past)
         follow(connection, duration, printer.print_new)
 
 
-class _Printer:
+class TextPrinter:
     """Prints texts of all vehicles up to a severity, ``count`` at most."""
 
     def __init__(self, connection: Connection, output: Output, worst: int, count: int | None) -> None:
@@ -80,17 +82,14 @@ class _Printer:
         self._least_severe = worst
         self._left = count
         self._seen: dict[int, int] = {}
-        self._kept: set[tuple[int, str]] = set()
-        self._kept_until = 0
 
     def print_past(self, texts: Sequence[PastText], most: int) -> None:
-        """Print the last ``most`` of the texts that the vehicle keeps."""
-        (number,) = self._connection.fleet.sessions
-        self._kept = {(text.severity, text.text) for text in texts}
-        self._kept_until = self._connection.session.view.text_count  # these came while the file was read
-        shown = [text for text in texts if text.severity <= self._least_severe]
+        """Print the last ``most`` of the texts that the vehicle sent before the first one received."""
+        session = self._connection.session
+        received = session.view.texts_since(0)
+        shown = [text for text in texts_before(texts, received) if text.severity <= self._least_severe]
         for text in shown[-most:]:
-            self._say(number, text.time_s, text.severity, text.text, past=True)
+            self._say(session.target[0], text.time_s, text.severity, text.text, past=True)
 
     def print_new(self) -> bool:
         """Print the texts that are new; return True once enough are printed."""
@@ -106,8 +105,6 @@ class _Printer:
         return self._left == 0
 
     def _print(self, system: int, entry: StatusText) -> None:
-        if entry.number < self._kept_until and (entry.severity, entry.text) in self._kept:
-            return
         self._say(system, entry.vehicle_time_s, entry.severity, entry.text, past=False)
         if self._left is not None:
             self._left -= 1

@@ -19,6 +19,7 @@ from gcs_cli.errors import FAILED, USAGE, CliError, VehicleLostError
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
 from gcs_cli.output import Output
+from gcs_cli.parameter_names_generated import NAMES
 from gcs_cli.settings import LinkOptions, OverwriteOption, output_of
 from gcs_cli.tables import table_console
 from gcs_cli.transfers import param_calls
@@ -122,7 +123,10 @@ def _fetch_matching(connection: Connection, names: Sequence[str]) -> list[Parame
 
 
 def _fetch(connection: Connection, name: str) -> Parameter:
-    """Return one parameter; raise CliError that suggests similar names if the vehicle has no such parameter."""
+    """Return one parameter; raise CliError if the vehicle has no such parameter.
+
+    The error suggests similar names of this flight stack and PX4, if the vehicle has them.
+    """
     try:
         return param_calls.fetch(connection, name.upper())
     except VehicleLostError:
@@ -130,10 +134,18 @@ def _fetch(connection: Connection, name: str) -> Parameter:
     except CliError as error:
         if error.exit_code != FAILED:
             raise
-        near = near_names(name, param_calls.fetch_all(connection))[:_MOST_NEAR]
+        near = [each for each in near_names(name, NAMES)[:_MOST_NEAR] if _is_present(connection, each)]
         if not near:
             raise
         raise CliError(f"{error}; did you mean {' or '.join(near)}?") from None
+
+
+def _is_present(connection: Connection, name: str) -> bool:
+    try:
+        param_calls.fetch(connection, name)
+    except CliError:
+        return False
+    return True
 
 
 @app.command("set", context_settings={"ignore_unknown_options": True})  # a value may be negative

@@ -34,6 +34,7 @@ from gcs_cli.transfers.vehicle_plans import KINDS, download_plan
 from gcs_cli.vehicle_link import connect_vehicle
 
 _COLUMNS, _ROWS = 79, 20
+_ASKS = "If the vehicle is armed, asks first on a terminal; elsewhere it needs --yes."
 
 
 def make_part_app(kind: MissionType) -> typer.Typer:
@@ -51,9 +52,7 @@ def make_part_app(kind: MissionType) -> typer.Typer:
 def add_upload(app: typer.Typer, kind: MissionType | None, text: str) -> None:
     """Add ``upload`` of a part, or of the mission and the other parts that a file has."""
 
-    @app.command(
-        help=f"{cleandoc(text)}\n\nIf the vehicle is armed, asks first on a terminal; elsewhere it needs --yes."
-    )
+    @app.command(help=f"{cleandoc(text)}\n\n{_ASKS}")
     @expand_options
     def upload(
         context: typer.Context, link: LinkOptions, file: AnyPlanArgument, yes: YesOption = False
@@ -122,7 +121,7 @@ def clear_part(
 def _add_clear(app: typer.Typer, kind: MissionType, text: str) -> None:
     name = PLAN_NAMES[kind]
 
-    @app.command(help=text)
+    @app.command(help=f"{text}\n\n{_ASKS}")
     @expand_options
     def clear(context: typer.Context, link: LinkOptions, yes: YesOption = False) -> None:
         clear_part(context, link, kind, name, name, yes)

@@ -7,8 +7,8 @@ from typing import Any
 
 import typer
 
+from flightstack.mavlink.dialect import mavlink
 from flightstack.process.command_line import expand_options, make_app
-from gcs_cli.link.perform import request_reached
 from gcs_cli.link.quality import LinkQuality
 from gcs_cli.link.snapshot import Snapshot
 from gcs_cli.settings import LinkOptions, output_of
@@ -24,6 +24,8 @@ _OF_RECORDING_S = 5.0
 """The same for a recording, whose time does not pass; messages come every 2 s."""
 _STREAMED_S = 1.1
 """Longest wait for MISSION_CURRENT, which PX4 streams once a second and denies to a request."""
+_NOT_RECORDED = frozenset({mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED})
+"""Messages that a recording may not have: they are sent once."""
 _LANDED = {1: "on ground", 2: "in air", 3: "taking off", 4: "landing"}
 
 
@@ -33,9 +35,9 @@ def status(context: typer.Context, link: LinkOptions) -> None:
     """Show the state of the vehicle."""
     with connect_vehicle(context, link, takes_recording=True, in_real_time=False) as connection:
         session = connection.session
-        snapshot = Snapshot(lambda: session.view)
+        omitted = _NOT_RECORDED if connection.is_recording else frozenset()
+        snapshot = Snapshot(lambda: session.view, session.own, omitted=omitted)
         session.attach(snapshot)
-        request_reached(connection)
         connection.wait_for(
             lambda: snapshot.complete, _OF_RECORDING_S if connection.is_recording else GATHER_S
         )

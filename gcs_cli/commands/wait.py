@@ -6,11 +6,9 @@ from typing import Annotated
 
 import typer
 
-from flightstack.mavlink.dialect import mavlink
 from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.actions.conditions import (
     COMPLETE,
-    Completion,
     ConditionError,
     ViewCondition,
     choices,
@@ -23,13 +21,12 @@ from gcs_cli.link.connection import Connection
 from gcs_cli.link.perform import ask_modes, request_reached
 from gcs_cli.output import Output
 from gcs_cli.settings import LinkOptions, link_options, output_of
+from gcs_cli.vehicle.view_types import Mission
 from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
 
 DEFAULT_TIMEOUT_S = 60.0
-_CURRENT_S = 2.0
-"""Longest wait for MISSION_CURRENT, which a vehicle without a mission may not send."""
 
 
 @app.command()
@@ -53,7 +50,6 @@ def wait(
     with connect_vehicle(context, link) as connection:
         _check_modes(connection, wanted)
         request_reached(connection)
-        wanted = [_informed(connection, condition) for condition in wanted]
         wait_for(connection, wanted, timeout_s, output_of(context, link))
 
 
@@ -77,29 +73,50 @@ def _check_modes(connection: Connection, wanted: list[ViewCondition]) -> None:
                 )
 
 
-def _informed(connection: Connection, condition: ViewCondition) -> ViewCondition:
-    """Return ``complete`` with what it needs of a vehicle that does not report the state of its mission."""
-    if condition.text != COMPLETE:
-        return condition
-    session = connection.session
-    connection.wait_for(lambda: session.view.mission.current is not None, _CURRENT_S)
-    mission = session.view.mission
-    is_unknown = mission.state is None and mission.total is not None and not connection.is_recording
-    items = connection.complete(calls.download(session), "wait complete").items if is_unknown else ()
-    returns = bool(items) and items[-1].command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH
-    return condition._replace(holds=Completion(returns).holds)
+class _Items:
+    """Downloads the mission of a vehicle that does not report its state: the view has to know the last item."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+        self._asked: Mission | None = None
+
+    def are_needed(self) -> bool:
+        """Return True if the vehicle has a mission that was not asked for yet."""
+        mission, asked = self._connection.session.view.mission, self._asked
+        if mission.state is not None or not mission.total:
+            return False
+        return asked is None or (mission.mission_id, mission.total) != (asked.mission_id, asked.total)
+
+    def download(self) -> None:
+        """Download the items; without them a return at their end is not recognised, which is printed."""
+        session = self._connection.session
+        self._asked = session.view.mission
+        try:
+            self._connection.complete(calls.download(session), "mission download")
+        except VehicleLostError:
+            raise
+        except CliError as error:
+            typer.echo(
+                f"gcs: wait {COMPLETE}: {error}; a mission that ends with a return is not seen as complete",
+                err=True,
+            )
 
 
 def wait_for(connection: Connection, wanted: list[ViewCondition], timeout_s: float, output: Output) -> None:
     """Wait until all conditions hold; raise CliError after ``timeout_s``, or if the vehicle is lost."""
-    session, begun_s = connection.session, connection.now_s
+    session, begun_s, items = connection.session, connection.now_s, _Items(connection)
+    needs_items = any(condition.text == COMPLETE for condition in wanted)
 
     def ends() -> bool:
         view = session.view
         is_gone = view.powered_off or view.lost(connection.now_s)
         return is_gone or all(condition.holds(view) for condition in wanted)
 
-    in_time = connection.wait_for(ends, timeout_s)
+    def pauses() -> bool:
+        return ends() or (needs_items and items.are_needed())
+
+    while (in_time := connection.wait_for(pauses, begun_s + timeout_s - connection.now_s)) and not ends():
+        items.download()
     view = session.view
     if all(condition.holds(view) for condition in wanted):
         words = [condition.text for condition in wanted]

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import socket
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 
 from flightstack.core.port_numbers import INSTANCES, vehicle_ground_port
 from flightstack.transports.byte_link import LineError
 from flightstack.transports.udp import Address, PortBusyError, UdpSocket, resolve
 from gcs_cli.errors import USAGE, CliError, PortInUseError
 from gcs_cli.link.endpoint import (
-    LOOPBACK,
     SERIAL,
     TCP,
     TCP_IN,
@@ -27,6 +28,7 @@ LATER_S = 1.2
 """Time in which a vehicle that sends heartbeats is heard."""
 _MOST_PEERS = 256
 _MOST_NAMED = 8
+_UDP_TABLE = Path("/proc/net/udp")
 
 
 def open_line(endpoint: VehicleEndpoint) -> Line:
@@ -70,26 +72,31 @@ def opened_lines(endpoints: Iterable[VehicleEndpoint]) -> dict[VehicleEndpoint, 
     return lines
 
 
-def running_instances() -> list[int]:
-    """Return the instances of vehicles on this machine: those whose port for ground stations is in use."""
-    found = []
-    for instance in range(INSTANCES):
-        try:
-            UdpSocket(LOOPBACK, vehicle_ground_port(instance)).close()
-        except PortBusyError as error:
-            found += [instance] * error.is_in_use
-    return found
+def used_instances() -> list[int]:
+    """Return the instances whose port for ground stations is in use on this machine; none if it has no such table."""
+    try:
+        used = ports_in_use(_UDP_TABLE.read_text(encoding="ascii"))
+    except OSError:
+        return []
+    return [instance for instance in range(INSTANCES) if vehicle_ground_port(instance) in used]
+
+
+def ports_in_use(table: str) -> set[int]:
+    """Return the local ports of Linux's table of UDP sockets, whose second column is ADDRESS:PORT in hexadecimal."""
+    return {int(port, 16) for port in re.findall(r"^ *\d+: [0-9A-F]{8}:([0-9A-F]{4}) ", table, re.MULTILINE)}
 
 
 def instances_text() -> str:
-    """Return the advice to use a vehicle that runs on this machine as another instance; empty without one."""
-    found = running_instances()
+    """Return the advice to use a vehicle on this machine that may run as another instance; empty without one."""
+    found = used_instances()
     if not found:
         return ""
     numbers = ", ".join(map(str, found[:_MOST_NAMED])) + (" …" if len(found) > _MOST_NAMED else "")
     if len(found) == 1:
-        return f"instance {numbers} runs on this machine: choose it with --instance {numbers}"
-    return f"instances {numbers} run on this machine: choose one with --instance"
+        return (
+            f"the port of instance {numbers} is in use on this machine: choose it with --instance {numbers}"
+        )
+    return f"the ports of instances {numbers} are in use on this machine: choose one with --instance"
 
 
 def _resolved(host: str) -> str:

@@ -52,6 +52,15 @@ class Stream(NamedTuple):
     make: Callable[[float], Message | None]
 
 
+def parameter_messages(recording: Recording) -> Sequence[Message]:
+    """Return PARAM_VALUE of all parameters, sorted by name."""
+    parameters = sorted(recording.parameters.items())
+    return [
+        value_message(name, value, isinstance(value, int), index, len(parameters))
+        for index, (name, value) in enumerate(parameters)
+    ]
+
+
 class UlogPlayback:
     """The flight of a ULog as telemetry: attitude, position, battery, mode, mission, texts, parameters."""
 
@@ -84,7 +93,13 @@ class UlogPlayback:
             self._read("rotor_speeds", *elements("speed_rad_s", first + _ROTORS)[first:])
             for first in (0, _ROTORS)
         ]
-        self._streams = (
+        self._streams = self._make_streams()
+        self._reached = self._reached_items()
+        self._text_s = np.array([recording.since_start_s(text.time_us) for text in recording.texts])
+        self.parameters = parameter_messages(recording)
+
+    def _make_streams(self) -> tuple[Stream, ...]:
+        return (
             Stream(0.04, self._attitude),
             Stream(0.04, self._quaternion),
             Stream(0.1, self._local_position),
@@ -101,14 +116,6 @@ class UlogPlayback:
             Stream(1.0, self._home),
             Stream(1.0, self._system_time),
         )
-        self._reached = self._reached_items()
-        self._text_s = np.array([recording.since_start_s(text.time_us) for text in recording.texts])
-        names = sorted(recording.parameters)
-        self.parameters: Sequence[Message] = [
-            value_message(name, value, isinstance(value, int), index, len(names))
-            for index, name in enumerate(names)
-            for value in (recording.parameters[name],)
-        ]
 
     def _read(self, topic: str, *fields: str) -> Samples:
         return samples(self._log, [Source(topic, fields)], len(fields), finite=False)

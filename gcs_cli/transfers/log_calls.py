@@ -80,13 +80,20 @@ def file_of(log: LogEntry, logs: tuple[LogEntry, ...], files: tuple[Entry, ...])
     return found[0] if len(found) == 1 else None
 
 
-def is_growing(connection: Connection, log: LogEntry, logs: tuple[LogEntry, ...]) -> bool:
-    """Return True if the vehicle still writes ``log``: the newest one of an armed vehicle, or one that has grown."""
+def is_growing(connection: Connection, log: LogEntry, logs: tuple[LogEntry, ...]) -> bool | None:
+    """Return True if the vehicle still writes ``log``: the newest one of an armed vehicle, or one that has grown.
+
+    None if the vehicle does not answer.
+    """
     if log != logs[-1]:
         return False
-    now = fetch_list(connection)
-    grown = any(entry.log_id == log.log_id and entry.size > log.size for entry in now)
-    return grown or connection.session.view.armed
+    if connection.session.view.armed:
+        return True
+    try:
+        now = fetch_list(connection)
+    except CliError:
+        return None
+    return any(entry.log_id == log.log_id and entry.size > log.size for entry in now)
 
 
 def fetch_log(connection: Connection, log: LogEntry, file: Entry | None, show: Progress) -> bytes:

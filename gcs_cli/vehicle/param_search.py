@@ -31,11 +31,14 @@ def search_parameters(
     return [parameter for _, parameter in sorted(found, key=lambda entry: -entry[0])]
 
 
-def near_names(name: str, parameters: Sequence[Parameter]) -> list[str]:
-    """Return names that are spelt like ``name``, the most similar first; else those that ``search`` finds for it."""
-    names = [parameter.name for parameter in parameters]
+def near_names(name: str, names: Sequence[str]) -> list[str]:
+    """Return those of ``names`` that are spelt like ``name``, the best first; else those that ``search`` finds."""
     near = get_close_matches(name.upper(), names, cutoff=_SIMILAR)
-    return near or [parameter.name for parameter in search_parameters(parameters, {}, name.split("_"))]
+    if near:
+        return near
+    wanted = name.lower().split("_")
+    scored = [(_score(each, UNKNOWN, wanted), each) for each in names]
+    return [each for score, each in sorted(scored, key=lambda entry: -entry[0]) if score > 0.0]
 
 
 def _score(name: str, info: ParamInfo, wanted: Sequence[str]) -> float:

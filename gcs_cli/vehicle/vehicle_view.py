@@ -8,7 +8,7 @@ from typing import Any
 
 from flightstack.core.portable_math import euler_angles
 from flightstack.mavlink.dialect import NAME_IN_VERSION, mavlink
-from gcs_cli.autopilots.autopilot import Role
+from gcs_cli.vehicle import mission_fold
 from gcs_cli.vehicle.status_texts import add_piece, without_stale_piece
 from gcs_cli.vehicle.view_types import (
     AvailableMode,
@@ -20,7 +20,6 @@ from gcs_cli.vehicle.view_types import (
     Identity,
     LinkCounts,
     LoopTiming,
-    Mission,
     Setpoint,
     Vector,
     VehicleView,
@@ -33,7 +32,6 @@ _IGNORE_ATTITUDE = 128  # ATTITUDE_TARGET_TYPEMASK
 _PREARM_CHECK = 1 << 28  # MAV_SYS_STATUS_PREARM_CHECK: no sensor
 _RATE_WINDOW_S = 1.0
 _MOST_ROTORS = 16
-_NO_NUMBER = 65535  # MISSION_CURRENT.total when the vehicle has no mission
 _NOT_SELECTABLE = 2  # MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
 _RESTART_S = 0.25
 """Step back of the vehicle's clock that no reordering of datagrams explains."""
@@ -110,27 +108,11 @@ def _heartbeat(view: VehicleView, message: Any, now_s: float) -> VehicleView:
         last_heartbeat_s=now_s,
         mode=mode,
         custom_mode=message.custom_mode,
-        mission=_mission_flown(view, mode, armed),
+        mission=mission_fold.after_heartbeat(view, mode, armed),
         armed=armed,
         ever_armed=view.ever_armed or armed,
         system_status=message.system_status,
     )
-
-
-def _mission_flown(view: VehicleView, mode: str, armed: bool) -> Mission:
-    """Return the mission with what a heartbeat shows of its end, for a vehicle that reports no state of the mission.
-
-    PX4 does not report a final return as reached: it changes the mode as soon as that item is the current one.
-    """
-    mission, roles = view.mission, view.autopilot.roles
-    if armed and not view.armed:
-        return mission._replace(flies_last=False, has_ended=False)
-    if armed and mission.is_at_last and mode == roles.get(Role.MISSION):
-        return mission._replace(flies_last=True)
-    has_landed = view.armed and not armed and view.mode == roles.get(Role.RETURN)
-    if has_landed and mission.is_at_last and not mission.flies_last:
-        return mission._replace(has_ended=True)
-    return mission
 
 
 def mode_name(view: VehicleView, custom_mode: int) -> str:
@@ -284,31 +266,6 @@ def _extended_state(view: VehicleView, message: Any, _now_s: float) -> VehicleVi
     return view._replace(landed_state=message.landed_state)
 
 
-def _plan_number(view: VehicleView, seq: int) -> int | None:
-    """Return the number in the plan of an item of the vehicle's mission; None for the home of ArduPilot."""
-    number = seq - view.autopilot.mission_begins_with_home
-    return number if number >= 0 else None
-
-
-def _mission_current(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    total = None if message.total == _NO_NUMBER else message.total
-    state = message.mission_state or None
-    reached = view.mission.reached
-    if total is not None and reached is not None and reached >= total:
-        reached = None  # of a former mission
-    current = _plan_number(view, message.seq) or 0
-    mission = view.mission._replace(current=current, total=total, reached=reached, state=state)
-    if not mission.is_at_last:
-        mission = mission._replace(flies_last=False, has_ended=False)
-    return view._replace(mission=mission)
-
-
-def _item_reached(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    mission = view.mission._replace(reached=_plan_number(view, message.seq))
-    is_last = mission.reached is not None and mission.reached + 1 == mission.total
-    return view._replace(mission=mission._replace(has_ended=mission.has_ended or is_last))
-
-
 def _rotors(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     return _with_rotors(view, message.index, message.rpm)
 
@@ -371,8 +328,11 @@ _FOLDS: dict[str, Callable[[VehicleView, Any, float], VehicleView]] = {
     "POSITION_TARGET_LOCAL_NED": _position_target,
     "VFR_HUD": _hud,
     "EXTENDED_SYS_STATE": _extended_state,
-    "MISSION_CURRENT": _mission_current,
-    "MISSION_ITEM_REACHED": _item_reached,
+    "MISSION_CURRENT": mission_fold.after_current,
+    "MISSION_ITEM_REACHED": mission_fold.after_reached,
+    "MISSION_COUNT": mission_fold.after_count,
+    "MISSION_ITEM": mission_fold.after_item,
+    "MISSION_ITEM_INT": mission_fold.after_item,
     "ESC_STATUS": _rotors,
     "ESC_TELEMETRY_1_TO_4": _esc_telemetry,
     "ESC_TELEMETRY_5_TO_8": _esc_telemetry,

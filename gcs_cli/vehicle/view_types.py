@@ -92,10 +92,20 @@ class Mission(NamedTuple):
     reached: int | None = None
     state: int | None = None
     """None if the vehicle does not report it, as PX4."""
-    flies_last: bool = False
-    """True once the vehicle was in its mission mode at the last item, in this flight."""
+    has_begun: bool = False
+    """True once the vehicle was in its mission mode, in this flight."""
     has_ended: bool = False
-    """True once the vehicle has reached the last item in this flight, or has landed after it."""
+    """True once the vehicle has reported the mission as complete, or without a state, the last item of it as reached
+    in a flight that was observed; False when it begins again."""
+    has_returned: bool = False
+    """True once the vehicle has changed from its mission mode at the last item to its return mode; False if it leaves
+    that mode, or disarms, in the air."""
+    return_item: int | None = None
+    """The last return among the items that the vehicle has sent."""
+    items_id: int | None = None
+    """The id of the mission whose items the vehicle has sent: MISSION_COUNT.opaque_id, 0 without ids."""
+    mission_id: int | None = None
+    """MISSION_CURRENT.mission_id, 0 without ids."""
 
     @property
     def is_at_last(self) -> bool:
@@ -103,14 +113,25 @@ class Mission(NamedTuple):
         return self.current is not None and bool(self.total) and self.current + 1 == self.total
 
     @property
+    def ends_with_return(self) -> bool:
+        """True if the vehicle has sent the items of this mission, and the last one is a return to launch."""
+        is_last = self.return_item is not None and self.return_item + 1 == self.total
+        return is_last and self.items_id == self.mission_id
+
+    @property
+    def is_flown(self) -> bool:
+        """True once the mission was flown to its end, or to an unreported final return, until it begins again."""
+        return self.has_ended or (self.state is None and self.has_returned and self.ends_with_return)
+
+    @property
     def complete(self) -> bool:
         """True if the vehicle reports the mission as complete, or, if it reports no state, has flown its last item."""
-        return self.state == MISSION_COMPLETE or (self.state is None and self.has_ended and self.is_at_last)
+        return self.state == MISSION_COMPLETE or (self.state is None and self.is_flown and self.is_at_last)
 
     @property
     def is_end_unknown(self) -> bool:
         """True at the last item of a vehicle that reports no state and was not observed to fly it."""
-        return self.state is None and self.is_at_last and not self.has_ended
+        return self.state is None and self.is_at_last and not self.is_flown
 
     @property
     def item_text(self) -> str:

@@ -47,7 +47,7 @@ IN_PROCESS = {
 def warm_child(arguments: list[str], *, stdout: IO[bytes], **_: Any) -> Program:
     """Start a child of ``gcs fly`` from the server that has imported the programs."""
     module = arguments.index("-m") + 1
-    child = Program(arguments[module], arguments[module + 1 :], log=stdout)
+    child = Program(arguments[module], arguments[module + 1 :], listens=True, log=stdout)
     child.stdout.close()  # all goes to the log
     return child
 
@@ -125,7 +125,8 @@ class Reader:
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_commands_of_a_page_run_as_shown(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    warm = SimpleNamespace(Popen=warm_child, DEVNULL=subprocess.DEVNULL, STDOUT=subprocess.STDOUT)
+    names = {name: getattr(subprocess, name) for name in ("DEVNULL", "PIPE", "STDOUT")}
+    warm = SimpleNamespace(Popen=warm_child, **names)
     monkeypatch.setattr(gcs_cli.fly.processes, "subprocess", warm)
     reader = Reader(tmp_path)
     reader.follow(page)

@@ -7,10 +7,15 @@ from pathlib import Path
 
 import pytest
 
+from flightstack.mavlink.dialect import mavlink
 from flightstack.testing.instances import free_instance
+from gcs_cli.clients.log_client import LogEntry
+from gcs_cli.transfers import log_calls
 from tests.support.commands import gcs
+from tests.support.fake_vehicle import FakeVehicle
 from tests.support.process import Process
 from tests.support.sample_logs import small_tlog, small_ulog
+from tests.support.told import told
 from tests.support.vehicle_processes import vehicle
 
 
@@ -112,3 +117,44 @@ def test_replay_ends_with_the_log(logs: Path) -> None:
     ended = gcs("replay", logs / "b.tlog", "--instance", instance, "--speed", 1000)
     assert ended.returncode == 0
     assert ended.stdout.splitlines()[-1] == "replay ended at 3.9 s"
+
+
+def test_download_of_all_logs_goes_on_after_one_that_exists(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    logs = tuple(LogEntry(number, 3, 0) for number in range(3))
+    monkeypatch.setattr(log_calls, "fetch_list", lambda _: logs)
+    monkeypatch.setattr(log_calls, "fetch_files", lambda _: ())
+    monkeypatch.setattr(log_calls, "fetch_log", lambda *_: b"new")
+    grown = tmp_path / "log_1.ulg"
+    grown.write_bytes(b"ab")
+    result = told(FakeVehicle(), "log", "download", "--all", "-o", tmp_path)
+    assert (result.returncode, grown.read_bytes()) == (1, b"ab")
+    assert result.stderr.startswith(f"gcs: {grown}: exists already with another size: ")
+    assert [(tmp_path / f"log_{number}.ulg").read_bytes() for number in (0, 2)] == [b"new", b"new"]
+    assert told(FakeVehicle(), "log", "download", "--all", "--overwrite", "-o", tmp_path).returncode == 0
+    assert grown.read_bytes() == b"new"
+
+
+def test_logs_of_ardupilot_are_named_bin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(log_calls, "fetch_list", lambda _: (LogEntry(1, 3, 0),))
+    monkeypatch.setattr(log_calls, "fetch_files", lambda _: ())
+    monkeypatch.setattr(log_calls, "fetch_log", lambda *_: b"new")
+    vehicle = FakeVehicle(autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA)
+    assert told(vehicle, "log", "download", "-o", tmp_path).returncode == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["log_1.bin"]
+
+
+@pytest.mark.parametrize("cause", ["armed", "grown", "finished"])
+def test_download_of_a_log_that_is_being_written_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cause: str
+) -> None:
+    sizes = iter([3, 9] if cause == "grown" else [3, 3])
+    monkeypatch.setattr(log_calls, "fetch_list", lambda _: (LogEntry(1, next(sizes), 0),))
+    monkeypatch.setattr(log_calls, "fetch_files", lambda _: ())
+    monkeypatch.setattr(log_calls, "fetch_log", lambda *_: b"new")
+    vehicle = FakeVehicle()
+    vehicle.armed = cause == "armed"
+    result = told(vehicle, "log", "download", "-o", tmp_path)
+    assert result.returncode == 0
+    assert ("still writing this log" in result.stdout) == (cause != "finished")

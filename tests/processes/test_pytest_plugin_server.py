@@ -64,7 +64,7 @@ def outside(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytes
 def vehicle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     folder = tmp_path_factory.mktemp("vehicle")
     setup = Setup(vehicle="x_quad", params={"MIS_TAKEOFF_ALT": 4.0})
-    with Server(setup, folder, speed=10.0, faults=["battery level 0.6 @0.5"]) as started:
+    with Server(setup, folder, speed=4.0, faults=["battery level 0.6 @0.5"]) as started:
         yield started
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import sys
 from collections.abc import Iterator
@@ -16,6 +17,7 @@ from tests.support.vehicle_processes import VehicleProcesses, vehicle
 
 SQUARE = Path(__file__).parents[2] / "missions" / "square.plan"
 OPTIONS = ("--log", "none", "--state", "none")
+CURSOR_S = re.compile(r"−\d+\.\d+ s")
 SPEED = 4
 """Times real time: flights are short, and the screen shows each part of them."""
 
@@ -38,6 +40,12 @@ def watching(link: str, folder: Path, screen: str = "fly", **options: str) -> It
         view.wait_for_end()
 
 
+def wait_for_messages(view: Terminal, *texts: str) -> None:
+    """Wait for ``texts`` on the screen Messages: the toasts with them disappear after some seconds."""
+    view.press("5")
+    view.wait("s Severity", *texts)
+
+
 def test_vehicle_flies_to_a_place_on_the_map(flown: VehicleProcesses, tmp_path: Path) -> None:
     with watching(flown.link, tmp_path) as view:
         view.wait("A Arm")
@@ -48,19 +56,20 @@ def test_vehicle_flies_to_a_place_on_the_map(flown: VehicleProcesses, tmp_path: 
         view.press("T")
         view.wait("Take off:", "altitude")
         view.press("Enter")
-        view.wait("at 5 m after", "in air")
+        view.wait("in air", without="Take off:")
+        wait_for_messages(view, "at 5 m after")
         view.press("2")
         view.wait("⌂", "setpoint", "home")
         view.press("Right", "Right", "g")
         view.wait("Fly quadrotor", "at the current altitude")
         view.press("y")
-        view.wait("at 47.39", " after ", without="Fly quadrotor")
+        wait_for_messages(view, "at 47.39")
         view.press("C-p")
         view.wait("Search for commands")
         view.type("Land")
         view.wait("Land here")
         view.press("Enter")
-        view.wait("landed and disarmed after", "DISARMED")
+        view.wait("landed and disarmed after", "DISARMED", without="Search for commands")
 
 
 def test_mission_is_edited_uploaded_paused_and_resumed(flown: VehicleProcesses, tmp_path: Path) -> None:
@@ -77,16 +86,19 @@ def test_mission_is_edited_uploaded_paused_and_resumed(flown: VehicleProcesses, 
         view.press("Enter")
         view.wait("4.5", "NOT UPLOADED", without="altitude [m]")
         view.press("u")
-        view.wait("mission of 6 items equal", without="NOT UPLOADED")
+        wait_for_messages(view, "mission of 6 items equal")
+        view.press("3")
+        view.wait("WAYPOINT", without="NOT UPLOADED")
         view.press("s")
         view.wait("Start the mission?")
         view.press("y")
         view.wait("MISSION", " ARMED ", "▶", "✓")
         view.press("p")
-        view.wait("HOLD", "holding the position after")
-        view.press("s")
-        view.wait("MISSION", "mission resumed after")
+        view.wait(" HOLD ")
+        wait_for_messages(view, "holding the position after")
+        view.press("3", "s")
         view.wait("✓    4 WAYPOINT", "DISARMED")
+        wait_for_messages(view, "mission resumed after")
 
 
 def test_parameter_is_changed_marked_and_saved(flown: VehicleProcesses, tmp_path: Path) -> None:
@@ -106,7 +118,7 @@ def test_parameter_is_changed_marked_and_saved(flown: VehicleProcesses, tmp_path
         view.press("C-u")
         view.type("tuned.params")
         view.press("Enter")
-        view.wait("parameters saved to tuned.params")
+        wait_for_messages(view, "parameters saved to tuned.params")
     assert "MIS_TAKEOFF_ALT\t6.5" in (tmp_path / "tuned.params").read_text()
 
 
@@ -122,11 +134,12 @@ def test_plot_is_paused_and_read_at_the_cursor(flown: VehicleProcesses, tmp_path
         view.press("Space")
         view.wait("paused: the space bar continues")
         view.press("Left")
-        paused = view.wait("−0.").splitlines()
+        paused = view.wait_until(CURSOR_S.search, "time of the cursor").splitlines()
         later = view.wait("ATTITUDE.roll", without=paused[0]).splitlines()
         assert later[2:20] == paused[2:20]  # the rows above the toasts
         view.press("S-Left")
-        view.wait("−6.")
+        (cursor_s,) = CURSOR_S.findall("\n".join(paused))
+        view.wait("ATTITUDE.roll", without=cursor_s)
 
 
 def test_view_reports_the_loss_and_the_return_of_a_vehicle(tmp_path: Path) -> None:
@@ -171,6 +184,8 @@ def test_all_vehicles_take_one_order_while_the_window_shrinks(tmp_path: Path) ->
             view.wait("COMMANDS TO ALL 2")
             view.press("D")
             view.wait("Disarm: all 2 vehicles")
-            view.resize(200, 50)
             view.press("y")
-            view.wait("DISARMED", "Last 2 minutes", f"{ids[0]}: disarmed after", f"{ids[1]}: disarmed after")
+            view.wait("DISARMED", without="Disarm: all 2 vehicles")
+            view.resize(200, 50)
+            view.wait("Last 2 minutes")
+            wait_for_messages(view, f"{ids[0]}: disarmed after", f"{ids[1]}: disarmed after")

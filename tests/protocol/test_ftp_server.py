@@ -171,8 +171,10 @@ def test_a_burst_waits_for_a_congested_peer_and_answers_do_not() -> None:
     dialogue.congested.add(GCS)
     dialogue.tell(Packet(20, 0, Opcode.BURST_READ_FILE, 239))
     assert not dialogue.answers(10)
+    assert not dialogue.server.is_busy
     assert dialogue.ask(Opcode.NONE, sequence=30).opcode == Opcode.ACK
     dialogue.congested.clear()
+    assert dialogue.server.is_busy
     assert dialogue.answers()[0].offset == 0
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 
 import pytest
 
@@ -11,7 +11,12 @@ from flightstack.mavlink.link import Address, Link, Message
 from flightstack.services.logs.log_server import LogServer
 from flightstack.transports.memory import LOSSLESS, Conditions
 from gcs_cli.clients.log_client import LogClient, LogDone, LogEntry, LogFailed
+from gcs_cli.errors import NO_ANSWER, CliError
+from gcs_cli.link.connection import Connection
+from gcs_cli.link.endpoint import parse_endpoint
+from gcs_cli.transfers import log_calls
 from gcs_cli.transfers.log_calls import kept_logs, oldest_first
+from gcs_cli.vehicle.view_types import VehicleView
 from tests.protocol.file_harness import GCS, LOSSY, VEHICLE, Ether, MemoryLogs, Station, content
 from tests.support.tools import NIGHTLY
 
@@ -200,7 +205,9 @@ def test_log_data_waits_for_a_congested_peer_and_not_for_others() -> None:
     assert [peer for peer, _ in server.poll(0.0)] == [other, other]
     for second in range(60):
         assert server.poll(float(second)) == []
+    assert not server.is_busy
     congested.clear()
+    assert server.is_busy
     assert [(peer, message.ofs) for peer, message in server.poll(60.0)] == [(GCS, 0), (GCS, 90)]
 
 
@@ -231,13 +238,41 @@ def test_log_list_of_px4_ends_with_the_last_id(seed: int) -> None:
     assert listed(vehicle, LOSSY if seed else LOSSLESS, seed) == (0, 1, 2, 3)
 
 
+def silent_client(start: Callable[[LogClient], object], *, is_linked: bool = True) -> LogClient:
+    """Return a client at its end with a vehicle that answers TIMESYNC if ``is_linked``, and no request for a list."""
+    client = LogClient(VEHICLE, is_silent_without_logs=True)
+    start(client)
+    for tenth in range(100):
+        for message in client.poll(tenth / 10):
+            if message.get_type() == "TIMESYNC" and is_linked:
+                client.receive(as_received(mavlink.MAVLink_timesync_message(7, message.ts1)), tenth / 10)
+        client.receive(as_received(mavlink.MAVLink_timesync_message(7, 7)), tenth / 10)  # for another client
+    return client
+
+
 def test_silence_without_logs_is_an_empty_list_as_of_px4() -> None:
-    for start in (LogClient.start_list, lambda client: client.start_erase(3)):
-        client = LogClient(VEHICLE, is_silent_without_logs=True)
-        start(client)
-        for tenth in range(100):
-            client.poll(tenth / 10)
-        assert client.result == LogDone()
+    assert silent_client(LogClient.start_list, is_linked=False).result == LogDone()
+
+
+def test_silence_after_an_erase_is_an_empty_list_if_the_vehicle_answers() -> None:
+    assert silent_client(lambda client: client.start_erase(3)).result == LogDone()
+
+
+def test_silence_after_an_erase_confirms_nothing_if_the_vehicle_does_not_answer() -> None:
+    result = silent_client(lambda client: client.start_erase(3), is_linked=False).result
+    assert result == LogFailed("the vehicle (system 1) does not confirm it", silent=True)
+
+
+def test_silence_after_the_text_of_an_erase_is_an_empty_list() -> None:
+    client = LogClient(VEHICLE, is_silent_without_logs=True)
+    client.start_erase(3)
+    client.poll(0.0)
+    client.receive(
+        as_received(mavlink.MAVLink_statustext_message(mavlink.MAV_SEVERITY_NOTICE, b"3 logs erased")), 0.1
+    )
+    for tenth in range(2, 100):
+        client.poll(tenth / 10)
+    assert client.result == LogDone()
 
 
 def test_silence_in_a_list_that_has_begun_is_no_empty_list() -> None:
@@ -261,6 +296,20 @@ def test_log_that_begins_after_an_erase_was_not_left_by_it() -> None:
     before = (LogEntry(1, 500, 0), LogEntry(2, 900, 0))
     assert kept_logs(before, (LogEntry(1, 0, 0),)) == ()
     assert kept_logs(before, (LogEntry(2, 950, 0), LogEntry(3, 10, 0))) == (LogEntry(2, 950, 0),)
+
+
+def test_list_that_fails_after_a_download_leaves_it_open_if_the_log_grows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fetch_list(connection: object) -> tuple[LogEntry, ...]:
+        raise CliError("log list: the vehicle did not answer", NO_ANSWER)
+
+    monkeypatch.setattr(log_calls, "fetch_list", fetch_list)
+    newest = entry_of("open.ulg")
+    with Connection(parse_endpoint("udpout:127.0.0.1:1")) as connection:
+        assert log_calls.is_growing(connection, newest, (newest,)) is None
+        connection.session.view = VehicleView(armed=True)
+        assert log_calls.is_growing(connection, newest, (newest,)) is True
 
 
 def erased(vehicle: Vehicle, conditions: Conditions = LOSSLESS, seed: int = 0) -> LogDone | LogFailed | None:

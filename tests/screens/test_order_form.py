@@ -9,9 +9,9 @@ from flightstack.mavlink.dialect import mavlink
 from gcs_cli.tui.app import WatchApp
 from gcs_cli.tui.orders import Field, FieldError
 from gcs_cli.vehicle.view_types import Identity
-from tests.screens.test_watch_app import GROUNDED, asked, play
 from tests.support.pilots import type_ahead
 from tests.support.screens import shown
+from tests.support.watch_plays import GROUNDED, asked, play
 from tests.support.watch_states import BARE
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
-
 import pytest
 from textual.color import Color
 from textual.pilot import Pilot
@@ -16,31 +14,9 @@ from gcs_cli.tui.palette import DARK, LIGHT
 from gcs_cli.tui.screens import SCREENS, ScreenEntry
 from gcs_cli.vehicle.view_types import Identity, VehicleView
 from tests.support.pictures import check_picture
-from tests.support.pilots import run_story
 from tests.support.screens import shown
-from tests.support.still_feed import StillFeed
+from tests.support.watch_plays import GROUNDED, Story, asked, play
 from tests.support.watch_states import FULL, flown_history
-
-GROUNDED = FULL._replace(armed=False, landed_state=1)
-Story = Callable[[WatchApp, Pilot], Awaitable[None]]
-
-
-def play(story: Story, view: VehicleView = FULL, size: tuple[int, int] = (80, 24)) -> StillFeed:
-    """Run the application with ``story``; return its feed."""
-    feed = StillFeed(view)
-
-    app = WatchApp(feed)
-
-    async def begin(pilot: Pilot[None]) -> None:
-        await pilot.pause()
-        await story(app, pilot)
-
-    run_story(app, begin, size=size, notifications=True)
-    return feed
-
-
-def asked(feed: StillFeed) -> list[str]:
-    return [action.name for action in feed.actions]
 
 
 @pytest.mark.parametrize("entry", SCREENS, ids=lambda entry: entry.mode)

@@ -12,9 +12,9 @@ from textual.widgets import Input
 from gcs_cli.tui.app import WatchApp
 from gcs_cli.tui.confirm import Confirm
 from gcs_cli.tui.order_form import OrderForm
-from tests.screens.test_watch_app import GROUNDED, asked, play
 from tests.support.pilots import type_ahead
 from tests.support.screens import shown
+from tests.support.watch_plays import GROUNDED, asked, play
 
 
 def test_keys_typed_ahead_reach_the_form_that_opens() -> None:

@@ -12,7 +12,7 @@ import shutil
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -72,15 +72,19 @@ class Terminal:
         return "\n".join(self._call("capture-pane", "-p", "-e"))
 
     def wait(self, *texts: str, without: str = "\0") -> str:
-        """Return the screen when it has all ``texts`` and not ``without``; look at it after each output."""
+        """Return the screen when it has all ``texts`` and not ``without``."""
+        return self.wait_until(
+            lambda shown: all(text in shown for text in texts) and without not in shown, str(texts)
+        )
+
+    def wait_until(self, holds: Callable[[str], object], what: str) -> str:
+        """Return the screen when ``holds`` is true of it; look at it after each output."""
         end_s = time.monotonic() + HANG_S
-        while True:
-            shown = self.screen
-            if all(text in shown for text in texts) and without not in shown:
-                return shown
-            assert time.monotonic() < end_s, f"never {texts}:\n{shown}"
+        while not holds(shown := self.screen):
+            assert time.monotonic() < end_s, f"never {what}:\n{shown}"
             while not self._line().startswith("%output"):
-                assert not self.ended, f"ended without {texts}"
+                assert not self.ended, f"ended without {what}"
+        return shown
 
     def press(self, *keys: str) -> None:
         """Press keys by tmux's names, such as ``Enter``, ``C-p`` or ``A``."""

@@ -54,3 +54,14 @@ def test_example_is_a_valid_command_line(name: str, line: str) -> None:
         path.append(word)
         context = group.make_context(word, words, parent=context)
     assert " ".join(path) == name
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in COMMANDS if any(p.name == "yes" for p in COMMANDS[name].params)]
+)
+def test_help_of_command_that_asks_names_its_option(name: str) -> None:
+    assert "--yes" in COMMANDS[name].help
+
+
+def test_negative_number_needs_no_separator() -> None:
+    assert not [line for lines in EXAMPLES.values() for line in lines if " -- " in line]

@@ -96,30 +96,43 @@ def test_later_transports_are_opened_once_nothing_arrives(monkeypatch: pytest.Mo
     assert several.due_s() is None
 
 
-def test_running_instances_are_those_whose_port_is_in_use() -> None:
+def test_used_instances_are_those_whose_port_is_in_use(monkeypatch: pytest.MonkeyPatch) -> None:
     last = INSTANCES - 1
     with UdpSocket(LOOPBACK, vehicle_ground_port(last)):
-        assert last in opening.running_instances()
-    assert last not in opening.running_instances()
+        monkeypatch.setattr(opening, "UdpSocket", None)  # a port that is bound in order to look is in use
+        assert last in opening.used_instances()
+    assert last not in opening.used_instances()
+
+
+def test_ports_in_use_are_those_of_the_table_of_the_system() -> None:
+    table = (
+        "   sl  local_address rem_address   st tx_queue\n"
+        "  134: 0100007F:4786 00000000:0000 07 00000000:00000000\n"
+        " 9229: 00000000:38D6 00000000:0000 07 00000000:00000000\n"
+        "  broken\n"
+    )
+    assert opening.ports_in_use(table) == {18310, 14550}
+    assert opening.ports_in_use("") == set()
 
 
 @pytest.mark.parametrize(
-    ("running", "advice"),
+    ("used", "advice"),
     [
         ([], "start one with `gcs sim`, or give its address with --connect"),
-        ([3], "instance 3 runs on this machine: choose it with --instance 3"),
-        ([0, 7], "instances 0, 7 run on this machine: choose one with --instance"),
+        ([3], "the port of instance 3 is in use on this machine: choose it with --instance 3"),
+        ([0, 7], "the ports of instances 0, 7 are in use on this machine: choose one with --instance"),
         (
             list(range(1, 20)),
-            "instances 1, 2, 3, 4, 5, 6, 7, 8 … run on this machine: choose one with --instance",
+            "the ports of instances 1, 2, 3, 4, 5, 6, 7, 8 … are in use on this machine: "
+            "choose one with --instance",
         ),
     ],
     ids=["none", "one", "two", "many"],
 )
-def test_missing_vehicle_is_reported_with_those_that_run(
-    running: list[int], advice: str, monkeypatch: pytest.MonkeyPatch
+def test_missing_vehicle_is_reported_with_the_instances_in_use(
+    used: list[int], advice: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(opening, "running_instances", lambda: running)
+    monkeypatch.setattr(opening, "used_instances", lambda: used)
     connection = Connection(parse_endpoint("udp:127.0.0.1:1"), line=MemoryLine(HERE))
     with connection, pytest.raises(CliError) as raised:
         connection.wait_for_vehicle(0.0)

@@ -141,6 +141,11 @@ def test_get_of_a_misspelt_name_suggests_similar_ones(vehicle: ParamVehicle) -> 
     assert "did you mean MPC_XY_CRUISE" in told(vehicle, "set", "MPC_XY_CRUSE", "3").stderr
 
 
+def test_misspelt_name_downloads_no_list(vehicle: ParamVehicle) -> None:
+    vehicle.ignored.add("PARAM_REQUEST_LIST")
+    assert "did you mean MPC_XY_CRUISE?" in told(vehicle, "get", "MPC_XY_CRUIS").stderr
+
+
 def test_get_takes_patterns(vehicle: ParamVehicle) -> None:
     result = told(vehicle, "get", "mpc_*", "MPC_XY_CRUISE", "--json")
     names = [json.loads(line)["name"] for line in result.stdout.splitlines()]

@@ -5,10 +5,13 @@ from __future__ import annotations
 import pytest
 
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Address, Link
 from gcs_cli.actions.action import Action, NotReadyError
 from gcs_cli.actions.in_flight import hold
 from gcs_cli.actions.in_mission import jump, pause, resume
+from gcs_cli.actions.run import ActionRun
 from gcs_cli.autopilots.autopilot import Role
+from gcs_cli.clients.command_client import MESSAGE_TRIES
 from gcs_cli.vehicle.view_types import MISSION_COMPLETE, Identity, Mission, Vector, VehicleView
 
 PX4 = Identity(1, 1, mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4)
@@ -46,6 +49,33 @@ def test_jump_is_done_when_the_vehicle_reports_the_item() -> None:
         assert step.effect is not None
         assert not step.effect(view)
         assert step.effect(view._replace(mission=Mission(current=3)))
+
+
+def jump_messages(current_after: int) -> int:
+    """Return how often jump(3) sends MISSION_SET_CURRENT before the vehicle reports ``current_after``, and later."""
+    before = view_in(Role.MISSION)
+    views = [before._replace(mission=Mission(current=1))]
+    own = Address(255, 190)
+    run = ActionRun(jump(3), lambda: views[0], 0.0, own)
+    assert [message.get_type() for message in run.poll(0.0)] == ["COMMAND_LONG"]
+    ack = mavlink.MAVLink_command_ack_message(
+        mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, mavlink.MAV_RESULT_UNSUPPORTED, 0, 0, *own
+    )
+    (received,) = Link(*own).decode(Link(1, 1).encode(ack))
+    run.receive(received, 0.0)
+    sent = []
+    for tenth in range(100):
+        sent += run.poll(tenth / 10)
+        views[0] = before._replace(mission=Mission(current=current_after))
+    return [message.get_type() for message in sent].count("MISSION_SET_CURRENT")
+
+
+def test_jump_repeats_its_message_a_few_times() -> None:
+    assert jump_messages(current_after=1) == MESSAGE_TRIES
+
+
+def test_jump_past_an_item_that_is_no_waypoint_is_not_repeated() -> None:
+    assert jump_messages(current_after=4) == 1
 
 
 @pytest.mark.parametrize(

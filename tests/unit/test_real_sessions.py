@@ -9,26 +9,28 @@ from __future__ import annotations
 import lzma
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 
 from flightstack.mavlink.link import Link
-from gcs_cli.actions.conditions import Completion, is_ready, parse_condition
+from gcs_cli.actions.conditions import is_ready, parse_condition
 from gcs_cli.link.tlog import decode_records
 from gcs_cli.vehicle.vehicle_view import update
-from gcs_cli.vehicle.view_types import MISSION_ACTIVE, MISSION_COMPLETE, Identity, Mission, VehicleView
+from gcs_cli.vehicle.view_types import VehicleView
 
 DATA = Path(__file__).parents[1] / "data"
 
 
-def views(name: str) -> list[VehicleView]:
-    """Return the state of the vehicle after each frame of a recording."""
+def views(name: str, without: Sequence[str] = ()) -> list[VehicleView]:
+    """Return the state of the vehicle after each frame of a recording, except for messages of these types."""
     link, view, seen = Link(0, 0, keeps_unknown=True), VehicleView(), []
     records = list(decode_records(lzma.decompress((DATA / f"{name}.tlog.xz").read_bytes())))
     for record in records:
         for message in link.decode(record.frame):
+            if message.get_type() in without:
+                continue
             view = update(view, message, (record.time_us - records[0].time_us) / 1e6)
             seen.append(view)
     return seen
@@ -85,28 +87,24 @@ def test_px4_reports_its_state() -> None:
     assert values(seen, lambda view: view.on_ground)[:3] == [None, True, False]
 
 
-@pytest.mark.parametrize("ends_with_return", [True, False])
-def test_px4_mission_without_a_state_is_complete_at_its_return(ends_with_return: bool) -> None:
+def test_px4_mission_without_a_state_is_complete_at_its_return() -> None:
     """PX4 f2471861 sends no MISSION_STATE, and does not report the return as reached."""
-    seen, completion = views("px4_sih_flight"), Completion(ends_with_return)
-    held = [completion.holds(view) for view in seen]
-    if not ends_with_return:
-        assert not any(held)
-        assert "does not report the state" in parse_condition("complete").value(seen[-1])
-        return
+    seen, complete = views("px4_sih_flight"), parse_condition("complete")
+    held = [complete.holds(view) for view in seen]
     first = held.index(True)
     assert (seen[first - 1].mode, seen[first].mode, seen[first].mission.current) == ("MISSION", "RTL", 3)
-    landed = seen[-1]._replace(armed=False, landed_state=1, mode="HOLD")
-    assert completion.holds(landed)
-    assert Completion(ends_with_return).holds(landed)  # a client that connects later
+    assert all(held[first:])
+    assert values(seen, lambda view: view.mission.is_end_unknown) == [False, True, False]
 
 
-def test_completed_mission_counts_until_it_begins_again() -> None:
-    """PX4 clears the state when the vehicle disarms."""
-    view, completion = VehicleView(identity=Identity(1, 1, 2, 12)), Completion()
-    states = (MISSION_ACTIVE, MISSION_COMPLETE, 2, MISSION_ACTIVE)
-    views = [view._replace(mission=Mission(0, 3, None, state)) for state in states]
-    assert [completion.holds(view) for view in views] == [False, True, True, False]
+def test_px4_mission_whose_items_are_unknown_is_of_unknown_end() -> None:
+    seen, complete = (
+        views("px4_sih_flight", without=("MISSION_COUNT", "MISSION_ITEM_INT")),
+        parse_condition("complete"),
+    )
+    assert not any(complete.holds(view) for view in seen)
+    assert seen[-1].mission.is_end_unknown
+    assert "does not report the state" in complete.value(seen[-1])
 
 
 def test_px4_has_a_position_while_it_stands() -> None:

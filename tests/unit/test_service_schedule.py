@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import math
 import random
+import select
+import socket
 
 import pytest
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.ftp_messages import Opcode, Packet, ftp_message
-from flightstack.mavlink.link import Address
+from flightstack.mavlink.link import SILENT_AFTER_S, Address
+from flightstack.process.connections import serve_while_idle
+from flightstack.process.process_config import Ended, ProcessConfig
 from flightstack.services.registry import Schedule
+from flightstack.transports.tcp import TcpClient
+from flightstack.transports.vehicle_ports import PortsConfig
 from tests.support.hub_net import ALICE, BOB, Net, Station
 
 VEHICLE = Address(7, 1)
@@ -63,21 +69,46 @@ def test_mission_item_wakes_only_its_service() -> None:
     assert (mission.polled_s, other.polled_s) == ([0.0, 1.0, 2.0], [0.0, 2.0])
 
 
+def begin_burst(net: Net) -> Station:
+    """Return a client in the middle of a burst."""
+    client = net.join(ALICE)
+    path = b"etc/extras/parameters.json"
+    client.send(ftp_message(VEHICLE, Packet(0, 0, Opcode.OPEN_FILE_RO, len(path), data=path)))
+    net.poll()
+    assert not net.hub.sends_files
+    client.send(ftp_message(VEHICLE, Packet(2, 0, Opcode.BURST_READ_FILE, 239)))
+    net.poll()
+    return client
+
+
 def test_hub_sends_files_until_the_end_of_a_burst() -> None:
     net = Net()
-    alice = net.join(ALICE)
-    path = b"etc/extras/parameters.json"
-
-    def request(number: int, opcode: Opcode, size: int, data: bytes = b"") -> None:
-        alice.send(ftp_message(VEHICLE, Packet(number, 0, opcode, size, data=data)))
-        net.poll()
-
-    request(0, Opcode.OPEN_FILE_RO, len(path), path)
-    assert not net.hub.sends_files
-    request(2, Opcode.BURST_READ_FILE, 239)
+    begin_burst(net)
     assert net.hub.sends_files
     net.run(1.0)
     assert not net.hub.sends_files
+
+
+def test_hub_sends_no_files_to_a_client_that_vanished_in_a_burst() -> None:
+    net = Net()
+    begin_burst(net)
+    net.now_s += SILENT_AFTER_S + 0.1
+    net.poll()
+    assert not net.hub.sends_files
+
+
+def test_hung_simulator_is_detected_while_files_are_sent() -> None:
+    net = Net()
+    begin_burst(net)
+    ports = PortsConfig(0, (), ("127.0.0.1", 1), "127.0.0.1", 0)
+    process = ProcessConfig("127.0.0.1", 1, 0.01, ports, None, False, None)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        simulator = TcpClient.connect(*server.getsockname(), 10.0, lambda: None)
+        poller = select.poll()
+        poller.register(simulator, select.POLLIN)
+        with pytest.raises(Ended, match=r"simulator lost at t=0.000 s: no state for 0.01 s"):
+            serve_while_idle(simulator, poller, net.stack, process, lambda: None)
+        simulator.close()
 
 
 def test_parameter_changed_without_a_message_is_announced() -> None:

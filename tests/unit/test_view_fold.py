@@ -15,28 +15,9 @@ from flightstack.mavlink.link import Link
 from gcs_cli.vehicle.status_texts import PIECE_TIMEOUT_S
 from gcs_cli.vehicle.vehicle_view import update
 from gcs_cli.vehicle.view_types import TEXTS_KEPT, VehicleView
+from tests.support.folded_vehicle import Vehicle, heartbeat
 
 NAN, INF = math.nan, math.inf
-MISSION_MODE, RETURN_MODE = 4 << 16 | 4 << 24, 4 << 16 | 5 << 24
-
-
-class Vehicle:
-    """Sends messages as one system and folds them."""
-
-    def __init__(self, system_id: int = 1, component_id: int = 1) -> None:
-        self.link = Link(system_id, component_id)
-        self.view = VehicleView()
-
-    def send(self, message: Any, now_s: float = 1.0) -> VehicleView:
-        for decoded in Link(0, 0).decode(self.link.encode(message)):
-            self.view = update(self.view, decoded, now_s)
-        return self.view
-
-
-def heartbeat(
-    base: int = 1, mode: int = MISSION_MODE, state: int = 4, autopilot: int = 12, kind: int = 2
-) -> Any:
-    return mavlink.MAVLink_heartbeat_message(kind, autopilot, base, mode, state, 3)
 
 
 @pytest.fixture
@@ -262,8 +243,8 @@ def _raw_frame(message_id: int, payload: bytes) -> Any:
 
 ardupilot_dialect()
 FOLDED = [
-    0, 1, 2, 24, 30, 32, 33, 42, 46, 74, 83, 85, 147, 148, 162, 168, 193, 230, 231, 242, 245, 253, 291, 435, 11030,
-    11031, 53002,
+    0, 1, 2, 24, 30, 32, 33, 39, 42, 44, 46, 73, 74, 83, 85, 147, 148, 162, 168, 193, 230, 231, 242, 245, 253, 291, 435,
+    11030, 11031, 53002,
 ]  # fmt: skip
 
 
@@ -320,41 +301,6 @@ def test_charge_at_arming_is_kept_until_disarmed(vehicle: Vehicle) -> None:
 
 def test_fence_breach_is_folded(vehicle: Vehicle) -> None:
     assert vehicle.send(mavlink.MAVLink_fence_status_message(1, 1, 3, 0)).fence_breached
-
-
-def px4_flight(vehicle: Vehicle, *, last_leg_s: int) -> VehicleView:
-    """Fly three items, the last one for ``last_leg_s`` heartbeats in the mission mode, then return and land.
-
-    As PX4, which reports no state of the mission.
-    """
-    armed = 129
-    vehicle.send(mavlink.MAVLink_mission_current_message(1, 3, 0))
-    vehicle.send(heartbeat(armed))
-    vehicle.send(mavlink.MAVLink_mission_item_reached_message(1))
-    vehicle.send(mavlink.MAVLink_mission_current_message(2, 3, 0))
-    for _ in range(last_leg_s):
-        vehicle.send(heartbeat(armed))
-    vehicle.send(heartbeat(armed, RETURN_MODE))
-    assert not vehicle.view.mission.complete
-    return vehicle.send(heartbeat())
-
-
-def test_mission_that_ends_with_a_return_is_complete_after_landing(vehicle: Vehicle) -> None:
-    assert px4_flight(vehicle, last_leg_s=0).mission.complete
-    assert not vehicle.send(heartbeat(129)).mission.complete  # the next flight
-
-
-def test_mission_that_is_left_on_its_last_leg_is_not_complete(vehicle: Vehicle) -> None:
-    assert not px4_flight(vehicle, last_leg_s=3).mission.complete
-
-
-def test_mission_is_complete_at_its_last_item_until_another_is_current(vehicle: Vehicle) -> None:
-    vehicle.send(heartbeat(129))
-    vehicle.send(mavlink.MAVLink_mission_current_message(2, 3, 0))
-    assert vehicle.send(mavlink.MAVLink_mission_item_reached_message(2)).mission.complete
-    assert vehicle.send(mavlink.MAVLink_mission_current_message(2, 3, 0)).mission.complete
-    assert not vehicle.send(mavlink.MAVLink_mission_current_message(0, 3, 0)).mission.complete
-    assert not vehicle.send(mavlink.MAVLink_mission_current_message(2, 3, 0)).mission.complete
 
 
 def test_vehicle_of_this_project_is_distinguished_from_px4(vehicle: Vehicle) -> None:

@@ -100,8 +100,9 @@ class FtpServer:
 
     @property
     def is_busy(self) -> bool:
-        """True while a burst is in progress."""
-        return any(client.is_streaming for client in self._clients.values())
+        """True while a burst is in progress to a peer with room."""
+        clients = self._clients.items()
+        return any(client.is_streaming and self._has_room(peer) for (peer, _), client in clients)
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
         """Take a message from ``peer``. Ignore all but requests to this vehicle."""

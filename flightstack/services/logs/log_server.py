@@ -95,8 +95,8 @@ class LogServer:
 
     @property
     def is_busy(self) -> bool:
-        """True while data is left to send."""
-        return any(client.is_busy for client in self._clients.values())
+        """True while data is left to send to a peer with room."""
+        return any(client.is_busy and self._has_room(peer) for (peer, _), client in self._clients.items())
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
         """Take a message from ``peer``. Ignore other protocols and other targets."""

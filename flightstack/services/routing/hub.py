@@ -122,7 +122,7 @@ class GroundHub:
 
     @property
     def sends_files(self) -> bool:
-        """True while data of files or logs is left to send."""
+        """True while data of files or logs is left to send to a peer with room."""
         return any(service.is_busy for service in self._file_services)
 
     def _missions(self) -> MissionService:

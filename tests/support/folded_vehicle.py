@@ -1,0 +1,32 @@
+"""Messages of a vehicle folded into its view, through pymavlink's encoder and decoder."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Link
+from gcs_cli.vehicle.vehicle_view import update
+from gcs_cli.vehicle.view_types import VehicleView
+
+HOLD_MODE, MISSION_MODE, RETURN_MODE = (4 << 16 | sub << 24 for sub in (3, 4, 5))
+"""Modes of PX4."""
+
+
+class Vehicle:
+    """Sends messages as one system and folds them."""
+
+    def __init__(self, system_id: int = 1, component_id: int = 1) -> None:
+        self.link = Link(system_id, component_id)
+        self.view = VehicleView()
+
+    def send(self, message: Any, now_s: float = 1.0) -> VehicleView:
+        for decoded in Link(0, 0).decode(self.link.encode(message)):
+            self.view = update(self.view, decoded, now_s)
+        return self.view
+
+
+def heartbeat(
+    base: int = 1, mode: int = MISSION_MODE, state: int = 4, autopilot: int = 12, kind: int = 2
+) -> Any:
+    return mavlink.MAVLink_heartbeat_message(kind, autopilot, base, mode, state, 3)
