@@ -8,9 +8,13 @@ from typing import Any
 from textual.binding import Binding
 from textual.keys import format_key
 
+from flightstack.mavlink.dialect import mavlink
 from gcs_cli.tui.app import WatchApp
-from gcs_cli.tui.orders import ORDERS
+from gcs_cli.tui.orders import ORDERS, Field
 from gcs_cli.tui.screens import SCREENS
+from gcs_cli.vehicle.view_types import Identity, VehicleView
+
+_PX4 = VehicleView(identity=Identity(1, 1, mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4))
 
 
 def keys_page(note: str) -> str:
@@ -18,9 +22,7 @@ def keys_page(note: str) -> str:
     lines = ["# Keys of gcs watch", "", note, "", "Capital letters command the vehicle, on every screen:", ""]
     lines += ["| key | order | effect | values |", "|---|---|---|---|"]
     for order in ORDERS:
-        values = ", ".join(
-            field.name + (" (optional)" if field.is_optional else "") for field in order.fields
-        )
+        values = ", ".join(field.name + _omission(field) for field in order.fields)
         lines.append(f"| `{order.key}` | {order.title} | {order.help} | {values} |")
     lines += ["", "On every screen:", "", "| key | effect |", "|---|---|"]
     lines += [f"| `{entry.key}` | Screen {entry.title}: {entry.summary} |" for entry in SCREENS]
@@ -31,6 +33,13 @@ def keys_page(note: str) -> str:
         if own:
             lines += ["", f"On {entry.title}:", "", "| key | effect |", "|---|---|", *_rows(own)]
     return "\n".join(lines) + "\n"
+
+
+def _omission(field: Field) -> str:
+    """Return a note if the value may be omitted."""
+    if field.is_optional(VehicleView()):
+        return " (optional)"
+    return f" (optional on PX4, empty: {field.omitted})" if field.is_optional(_PX4) else ""
 
 
 def _rows(bindings: Iterable[Any]) -> list[str]:

@@ -30,10 +30,14 @@ def store(out: np.ndarray[Any, np.dtype[np.float64]], values: Any) -> None:
         out[index] = values[index]
 
 
+def _is_vector(kind: Any) -> bool:
+    return isinstance(kind, numba.types.Array) and kind.ndim == 1
+
+
 @type_callable(as_tuple)
 def _type_as_tuple(_: Any) -> Any:
     def result(array: Any, count: Any) -> Any:
-        if isinstance(array, numba.types.Array) and isinstance(count, numba.types.IntegerLiteral):
+        if _is_vector(array) and isinstance(count, numba.types.IntegerLiteral):
             return numba.types.UniTuple(array.dtype, count.literal_value)
         return None
 
@@ -41,13 +45,18 @@ def _type_as_tuple(_: Any) -> Any:
 
 
 @type_callable(store)
-def _type_store(_: Any) -> Any:
+def _type_store(context: Any) -> Any:
     def result(out: Any, values: Any) -> Any:
-        if isinstance(out, numba.types.Array) and isinstance(
-            values, numba.types.Array | numba.types.BaseTuple
-        ):
-            return numba.types.none
-        return None
+        if not (_is_vector(out) and out.mutable):
+            return None
+        if isinstance(values, numba.types.BaseTuple):
+            items = values.types
+        elif _is_vector(values):
+            items = (values.dtype,)
+        else:
+            return None
+        is_convertible = all(context.can_convert(item, out.dtype) is not None for item in items)
+        return numba.types.none if is_convertible else None
 
     return result
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import gc
 import importlib
-import os
 from collections.abc import Callable
 from functools import cached_property
 from types import FunctionType
@@ -19,13 +18,22 @@ from typing import Any, ClassVar, TypeVar
 
 import numba
 from numba.core.caching import FunctionCache
+from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
 from numba.extending import register_jitable
 from numba.np import linalg
 
 from flightstack.core import portable_math
 from flightstack.core.kernel_cache import directory, is_own
-from flightstack.core.kernel_compiler import KernelCompiler, PartCache, PartCompiler
+
+_TESTED_NUMBA = {(0, minor) for minor in range(60, 69)}
+"""Versions whose compiler ``kernel_compiler`` extends; another compiles the same in a longer time."""
+
+KernelCompiler: type[Compiler] = Compiler
+PartCompiler: type[Compiler] = Compiler
+PartCache: type[FunctionCache] = FunctionCache
+if numba.version_info.short in _TESTED_NUMBA:
+    from flightstack.core.kernel_compiler import KernelCompiler, PartCache, PartCompiler
 
 
 def _import_without_scipy() -> None:
@@ -64,9 +72,12 @@ class _Kernel(CPUDispatcher):  # type: ignore[misc]  # Numba has no types
     def _enable_cache(self, dispatcher: CPUDispatcher, cache: type[FunctionCache]) -> None:
         if not is_own(self.py_func.__module__):
             return
-        if "NUMBA_CACHE_DIR" not in os.environ:  # Numba reads this setting for each function
-            numba.config.CACHE_DIR = str(directory(self._modules, numba.__version__))
-        dispatcher._cache = cache(dispatcher.py_func)
+        others = numba.config.CACHE_DIR
+        numba.config.CACHE_DIR = str(directory(self._modules, numba.__version__))
+        try:
+            dispatcher._cache = cache(dispatcher.py_func)
+        finally:
+            numba.config.CACHE_DIR = others
 
     @cached_property
     def part(self) -> CPUDispatcher:

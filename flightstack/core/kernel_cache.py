@@ -14,6 +14,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Iterable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -85,13 +86,14 @@ def digest(top: Path, module_names: Iterable[str], version: str) -> str:
 
 @cache
 def _base() -> Path:
-    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "flightstack" / "kernels"
-    try:
+    caches = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    base = Path(caches) / "flightstack" / "kernels"
+    with suppress(OSError):
         base.mkdir(parents=True, exist_ok=True)
         _remove_old(base)
-    except OSError:  # read-only home: compile in each process
-        return Path(tempfile.mkdtemp(prefix="flightstack-kernels-"))
-    return base
+    if os.access(base, os.W_OK):
+        return base
+    return Path(tempfile.mkdtemp(prefix="flightstack-kernels-"))  # compile in each process
 
 
 def _remove_old(base: Path) -> None:

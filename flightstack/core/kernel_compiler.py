@@ -15,6 +15,7 @@ from numba.core import types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult, Flags
+from numba.core.environment import lookup_environment
 from numba.core.typing.templates import AbstractTemplate, Signature, infer_global, signature
 
 _DEFAULTS = {name: option.default for name, option in Flags.options.items()}
@@ -32,8 +33,10 @@ class _Flags(Flags):  # type: ignore[misc]  # Numba has no types
         return {**_DEFAULTS, **self._values, "no_cpython_wrapper": True}
 
 
-class KernelCompiler(Compiler):  # type: ignore[misc]
-    """Compiles a function that Python calls."""
+class _Compiler(Compiler):  # type: ignore[misc]
+    """Compiles a function with flags and operators of this module."""
+
+    active = 0  # compilations, one within the other; one thread at a time, under Numba's lock
 
     def __init__(
         self,
@@ -47,8 +50,29 @@ class KernelCompiler(Compiler):  # type: ignore[misc]
     ) -> None:
         super().__init__(typingctx, targetctx, library, args, return_type, _Flags(flags), locals)
 
+    def compile_extra(self, func: Any) -> CompileResult:
+        """Compile ``func``."""
+        _Compiler.active += 1
+        try:
+            return super().compile_extra(func)
+        finally:
+            _Compiler.active -= 1
 
-class PartCompiler(KernelCompiler):
+
+class KernelCompiler(_Compiler):
+    """Compiles a function that Python calls."""
+
+    def compile_extra(self, func: Any) -> CompileResult:
+        """Compile ``func`` and set the environments of all functions that it includes."""
+        result = super().compile_extra(func)
+        names = (variable.name for variable in result.library._final_module.global_variables)
+        environments = tuple(filter(None, map(lookup_environment, names)))
+        for environment in environments:
+            result.library.codegen.set_env(environment.env_name, environment)
+        return result._replace(referenced_envs=environments)  # keeps them alive
+
+
+class PartCompiler(_Compiler):
     """Compiles a function that compiled functions call."""
 
     def define_pipelines(self) -> Any:
@@ -69,7 +93,7 @@ class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
 
     @property
     def codegen(self) -> Any:
-        """Setter of the function's environment, which is part of the machine code."""
+        """Setter of the function's environment, a variable in the machine code of each kernel."""
         return _NO_ENVIRONMENT
 
     def serialize_using_object_code(self) -> Any:
@@ -121,13 +145,16 @@ class PartCache(FunctionCache):  # type: ignore[misc]
 
 
 class _FloatOperator(AbstractTemplate):  # type: ignore[misc]
-    """Type of an operator with two floats, found before Numba asks NumPy for a matching ufunc."""
+    """Type of an operator with two floats, found before Numba asks NumPy for a matching ufunc.
+
+    Templates are for all of a process: outside the compilation of a kernel this one leaves the type to Numba.
+    """
 
     metadata = {"target": "cpu"}  # noqa: RUF012  # sorts it before those for all targets
     result: Any = types.float64
 
     def generic(self, args: tuple[Any, ...], kws: dict[str, Any]) -> Signature | None:
-        if kws or args != (types.float64, types.float64):
+        if not _Compiler.active or kws or args != (types.float64, types.float64):
             return None
         return signature(self.result, *args)
 

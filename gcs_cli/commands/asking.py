@@ -28,9 +28,8 @@ def confirm(question: str, yes: bool, connection: Connection | None = None) -> N
     if sys.stdin is None or not sys.stdin.isatty():
         raise CliError(f"{question}: add --yes", USAGE)
     with contextlib.nullcontext() if connection is None else kept_alive(connection):
-        typer.echo(
-            f"{question}. Continue? [y/N]: ", nl=False, err=True
-        )  # typer.confirm writes a space to stdout
+        # typer.confirm writes a space to stdout
+        typer.echo(f"{question}. Continue? [y/N]: ", nl=False, err=True)
         answer = sys.stdin.readline()
     if answer.strip().lower() not in ("y", "yes"):
         raise CliError("cancelled: nothing was changed")

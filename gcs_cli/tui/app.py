@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Literal
 from textual import work
 from textual.app import App, SystemCommand
 from textual.binding import Binding
-from textual.events import Event, Key
+from textual.events import Event, InputEvent, Paste
 from textual.screen import Screen
 
 from flightstack.core.enums import Severity
@@ -98,8 +98,8 @@ class WatchApp(App[None]):
         self.set_interval(1 / REDRAWS_HZ, self.redraw)
 
     async def on_event(self, event: Event) -> None:
-        """Handle an event; a key of the user waits for the effect of the one before."""
-        if isinstance(event, Key) and not event.is_forwarded:
+        """Handle an event; an input of the user waits for the effect of the one before."""
+        if isinstance(event, InputEvent | Paste) and not event.is_forwarded:
             self._keys.put(event)
         else:
             await super().on_event(event)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from itertools import pairwise, zip_longest
 from typing import TYPE_CHECKING, TypeAlias, cast
@@ -16,12 +16,13 @@ from textual.strip import Strip
 from textual.widget import Widget
 
 from gcs_cli.tui.palette import Palette
+from gcs_cli.tui.runs import Runs
 from gcs_cli.vehicle.view_types import VehicleView
 
 if TYPE_CHECKING:
     from gcs_cli.tui.app import WatchApp
 
-Draw: TypeAlias = Callable[[VehicleView, float, int, int, Palette], list[Text]]
+Draw: TypeAlias = Callable[[VehicleView, float, int, int, Palette], Sequence[Text | Runs]]
 """Draws a vehicle's state as of a time [s] in a number of columns and rows."""
 
 
@@ -37,9 +38,11 @@ class Drawing(Widget):
         super().__init__(id=id)
         self.every = every
         self._draw = draw
-        self._lines: list[Text] = []
+        self._lines: Sequence[Text | Runs] = []
         self._strips: list[Strip] = []
         self._background = Style()
+        self._palette: Palette | None = None
+        """The palette of ``_background``; None if the style has changed since."""
         self.border_title = title or None
 
     def show(self, view: VehicleView, now_s: float) -> None:
@@ -47,10 +50,13 @@ class Drawing(Widget):
         width, height = self.content_size
         if width <= 0 or height <= 0:
             return
-        lines = self._draw(view, now_s, width, height, watch_app(self).palette)
-        background = self.rich_style
-        if background != self._background:
-            self._background, self._lines, self._strips = background, [], []
+        colours = watch_app(self).palette
+        lines = self._draw(view, now_s, width, height, colours)
+        if colours is not self._palette:  # rich_style collects the styles of all ancestors
+            self._palette, background = colours, self.rich_style
+            if background != self._background:
+                self._background, self._lines, self._strips = background, [], []
+        background = self._background
         strips = []
         changed = []
         for y, (new, old) in enumerate(zip_longest(lines, self._lines)):
@@ -63,6 +69,11 @@ class Drawing(Widget):
         self._lines, self._strips = lines, strips
         if changed:
             self.refresh(*changed)
+
+    def notify_style_update(self) -> None:
+        """Read the style again at the next drawing."""
+        self._palette = None
+        super().notify_style_update()
 
     def on_resize(self, _event: Resize) -> None:
         """Draw in the new size."""
@@ -78,8 +89,10 @@ class Drawing(Widget):
         )
 
 
-def strip_of(line: Text, base: Style) -> Strip:
+def strip_of(line: Text | Runs, base: Style) -> Strip:
     """Return the segments of a line over the style ``base``; a later span covers an earlier one."""
+    if isinstance(line, Runs):
+        return Strip([Segment(text, _combined(base, style)) for text, style in line if text])
     plain, spans = line.plain, line.spans
     edges = sorted({0, len(plain), *(span.start for span in spans), *(span.end for span in spans)})
     segments = []

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 
-from rich.text import Text
-
 from gcs_cli.tui.horizon import heading_tape, horizon
 from gcs_cli.tui.palette import Palette
 from gcs_cli.tui.panels import ground_speed, height_m
+from gcs_cli.tui.runs import Run, Runs
 from gcs_cli.vehicle.numbers import UNKNOWN
 from gcs_cli.vehicle.view_types import Euler, VehicleView
 
@@ -18,7 +17,7 @@ _FAST_M_S = 20.0
 _TARGETS_FROM_ROWS = 15
 
 
-def flight_display(view: VehicleView, _now_s: float, width: int, height: int, colours: Palette) -> list[Text]:
+def flight_display(view: VehicleView, _now_s: float, width: int, height: int, colours: Palette) -> list[Runs]:
     """Draw the display in ``width`` × ``height`` cells."""
     figures = [_angles(view.attitude, width, colours, f"bold {colours.text}")]
     if height >= _TARGETS_FROM_ROWS:
@@ -33,11 +32,12 @@ def flight_display(view: VehicleView, _now_s: float, width: int, height: int, co
         target_height_m = None if place is None else -place.z
     speeds = _tape(speed_m_s, target_m_s, rows, 0.5 if (speed_m_s or 0.0) < _FAST_M_S else 1.0, colours)
     heights = _tape(height_m(view), target_height_m, rows, 1.0, colours, on_right=True)
-    lines = [Text.assemble(*parts) for parts in zip(speeds, picture, heights, strict=True)]
+    lines = [
+        Runs((*left, *middle, *right)) for left, middle, right in zip(speeds, picture, heights, strict=True)
+    ]
     yaw_rad = None if view.attitude is None else view.attitude.yaw_rad
     tape = heading_tape(yaw_rad, max(1, width - 2 * _TAPE), colours)
-    ends = Text(f"{'m/s':>6}  ", colours.muted), Text(f"  {'m':<6}", colours.muted)
-    lines += [Text.assemble(ends[0], tape, ends[1]), *figures]
+    lines += [Runs([(f"{'m/s':>6}  ", colours.muted), *tape, (f"  {'m':<6}", colours.muted)]), *figures]
     return lines
 
 
@@ -48,13 +48,12 @@ def _tape(
     step: float,
     colours: Palette,
     on_right: bool = False,
-) -> list[Text]:
+) -> list[Runs]:
     """Draw a scale with ``value`` at the middle row, and a mark at ``target``."""
     middle = rows // 2
     if value is None or not abs(value) < 1e6:
-        blank = Text(" " * _TAPE)
-        lines = [blank] * rows
-        lines[middle] = Text(f"{UNKNOWN:^{_TAPE}}", colours.muted)
+        lines = [Runs([(" " * _TAPE, "")])] * rows
+        lines[middle] = Runs([(f"{UNKNOWN:^{_TAPE}}", colours.muted)])
         return lines
     base = round(value / step)
     marked = None
@@ -69,34 +68,30 @@ def _tape(
     return lines
 
 
-def _tick(label: str, is_target: bool, colours: Palette, on_right: bool) -> Text:
+def _tick(label: str, is_target: bool, colours: Palette, on_right: bool) -> Runs:
     if on_right:
         mark, style = ("◂", f"bold {colours.target}") if is_target else ("├", colours.muted)
-        return Text.assemble((mark, style), (f" {label:<{_TAPE - 2}}", colours.muted), no_wrap=True)
+        return Runs([(mark, style), (f" {label:<{_TAPE - 2}}", colours.muted)])
     mark, style = ("▸", f"bold {colours.target}") if is_target else ("┤", colours.muted)
-    return Text.assemble((f"{label:>{_TAPE - 2}} ", colours.muted), (mark, style), no_wrap=True)
+    return Runs([(f"{label:>{_TAPE - 2}} ", colours.muted), (mark, style)])
 
 
-def _value(text: str, is_target: bool, colours: Palette, on_right: bool) -> Text:
+def _value(text: str, is_target: bool, colours: Palette, on_right: bool) -> Runs:
     box = f"bold {colours.background} on {colours.text}"
     pointer = colours.target if is_target else colours.text
     if on_right:
-        return Text.assemble(("◀", pointer), (f" {text:<{_TAPE - 2}}", box), no_wrap=True)
-    return Text.assemble((f"{text:>{_TAPE - 2}} ", box), ("▶", pointer), no_wrap=True)
+        return Runs([("◀", pointer), (f" {text:<{_TAPE - 2}}", box)])
+    return Runs([(f"{text:>{_TAPE - 2}} ", box), ("▶", pointer)])
 
 
-def _angles(angles: Euler | None, width: int, colours: Palette, style: str, label: str = "") -> Text:
+def _angles(angles: Euler | None, width: int, colours: Palette, style: str, label: str = "") -> Runs:
     names, gap = (("roll", "pitch", "yaw"), "   ") if width >= 40 else (("R", "P", "Y"), " ")
-    text = Text(no_wrap=True, overflow="crop")
-    if label:
-        text.append(f"{label}  ", colours.muted)
+    runs: list[Run] = [(f"{label}  ", colours.muted)] if label else []
     for index, name in enumerate(names):
         degrees = None if angles is None else math.degrees(angles[index])
         shown = UNKNOWN
         if degrees is not None:
             shown = f"{round(degrees) % 360:03d}°" if index == 2 else f"{round(degrees, 1) + 0.0:+.1f}°"
-        text.append(f"{name} ", colours.muted)
-        text.append(shown, style)
-        text.append(gap if index < 2 else "")
-    text.pad_left(max(0, (width - len(text)) // 2))
-    return text
+        runs += [(f"{name} ", colours.muted), (shown, style), (gap if index < 2 else "", "")]
+    length = sum(len(text) for text, _ in runs)
+    return Runs([(" " * ((width - length) // 2), ""), *runs])

@@ -124,9 +124,8 @@ class History:
         with self._lock:
             before = self._streams.get(key._replace(instance=None))
             if before is not None and is_unknown(before.last) and not is_unknown(message):
-                del self._streams[
-                    before.key
-                ]  # the dialect of an autopilot is known from its first heartbeat on
+                # the dialect of an autopilot is known from its first heartbeat on
+                del self._streams[before.key]
             stream = self._streams.get(key)
             if stream is None:
                 if len(self._streams) >= MOST_STREAMS:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any, TypeAlias
 
 import numpy as np
 from rich.style import Style
-from rich.text import Text
 
 from gcs_cli.tui.palette import DARK, Palette
+from gcs_cli.tui.runs import Run, Runs
 from gcs_cli.vehicle.view_types import Euler
 
 _Codes: TypeAlias = np.ndarray[Any, np.dtype[np.uint8]]
@@ -26,12 +26,38 @@ _LABEL_GAP_DEG = 2.0
 _COMPASS = {0: "N", 45: "NE", 90: "E", 135: "SE", 180: "S", 225: "SW", 270: "W", 315: "NW"}
 
 
-def horizon(attitude: Euler | None, width: int, height: int, colours: Palette = DARK) -> list[Text]:
-    """Draw the horizon as seen from the vehicle in ``width`` × ``height`` cells, two pixels to a cell."""
+def horizon(attitude: Euler | None, width: int, height: int, colours: Palette = DARK) -> list[Runs]:
+    """Draw the horizon as seen from the vehicle in ``width`` × ``height`` cells, two pixels to a cell.
+
+    Cells of the same colours are joined: runs are drawn faster than cells.
+    """
     codes = _pixels(attitude, width, 2 * height)
-    marks = _marks(attitude, width, height)
     shades = (colours.sky, colours.ground, _LADDER, _LINE, _NO_DATA)
-    return [_row(codes[2 * row], codes[2 * row + 1], marks.get(row, {}), shades) for row in range(height)]
+    lower = codes[1::2]
+    pairs = codes[::2].astype(np.int16) * len(shades) + lower
+    marks = {
+        (row, column): mark
+        for row, of_row in _marks(attitude, width, height).items()
+        for column, mark in of_row.items()
+        if 0 <= column < width
+    }
+    for row, column in marks:
+        pairs[row, column] = -1 - column  # a run of its own
+    is_start = np.ones(pairs.shape, dtype=np.bool_)
+    is_start[:, 1:] = pairs[:, 1:] != pairs[:, :-1]
+    starts = np.flatnonzero(is_start)
+    rows: list[list[Run]] = [[] for _ in range(height)]
+    looks = _looks(shades)
+    edges = [*starts.tolist(), pairs.size]
+    for (start, end), pair in zip(pairwise(edges), pairs.ravel()[starts].tolist(), strict=True):
+        row, column = divmod(start, width)
+        if pair < 0:
+            mark, colour = marks[row, column]
+            rows[row].append((mark, _style(colour, shades[lower[row, column]], bold=True)))
+        else:
+            block, style = looks[pair]
+            rows[row].append((block * (end - start), style))
+    return [Runs(row) for row in rows]
 
 
 def _scale(height: int) -> float:
@@ -81,26 +107,15 @@ def _place(
     return math.floor(width / 2 + right / scale), math.floor((height - above / scale) / 2)
 
 
-def _row(upper: _Codes, lower: _Codes, marks: dict[int, tuple[str, str]], shades: tuple[str, ...]) -> Text:
-    """Join cells of the same colours: runs are drawn faster than cells."""
-    text = Text(no_wrap=True, end="")
-    pairs = upper.astype(np.int16) * len(shades) + lower
-    for column in marks:
-        if 0 <= column < len(pairs):
-            pairs[column] = -1 - column  # a run of its own
-    edges = [0, *(np.flatnonzero(np.diff(pairs)) + 1).tolist(), len(pairs)]
-    for start, end in pairwise(edges):
-        above, below = int(upper[start]), int(lower[start])
-        if start in marks and end == start + 1:
-            mark, colour = marks[start]
-            text.append(mark, _style(colour, shades[below], bold=True))
-        elif above == below:
-            text.append(" " * (end - start), _style(shades[above], shades[above]))
-        elif above > below:  # the code of the thinner thing is the higher one
-            text.append("▀" * (end - start), _style(shades[above], shades[below]))
-        else:
-            text.append("▄" * (end - start), _style(shades[below], shades[above]))
-    return text
+@cache
+def _looks(shades: tuple[str, ...]) -> list[tuple[str, Style]]:
+    """Return character and style of each pair of an upper and a lower code."""
+    looks = []
+    for above, below in product(range(len(shades)), repeat=2):
+        block = " " if above == below else "▀" if above > below else "▄"
+        thin, wide = max(above, below), min(above, below)  # the code of the thinner thing is the higher one
+        looks.append((block, _style(shades[thin], shades[wide])))
+    return looks
 
 
 @cache
@@ -108,10 +123,10 @@ def _style(colour: str, background: str, bold: bool = False) -> Style:
     return Style(color=colour, bgcolor=background, bold=bold)
 
 
-def heading_tape(yaw_rad: float | None, width: int, colours: Palette = DARK) -> Text:
+def heading_tape(yaw_rad: float | None, width: int, colours: Palette = DARK) -> Runs:
     """Draw a compass strip, 3° a character, with the heading in figures at its middle."""
     if yaw_rad is None:
-        return Text("—".center(width), style=colours.muted, no_wrap=True)
+        return Runs([("—".center(width), colours.muted)])
     heading = math.degrees(yaw_rad) % 360
     cells = [" "] * width
     for column in range(width):
@@ -121,13 +136,11 @@ def heading_tape(yaw_rad: float | None, width: int, colours: Palette = DARK) -> 
             cells[column : column + len(label)] = list(label)
         elif degrees % 15 == 0 and cells[column] == " ":
             cells[column] = "·"
-    text = Text("".join(cells[:width]), colours.text, no_wrap=True)
+    strip = "".join(cells[:width])
     if width < 12:
-        text.stylize("bold reverse", width // 2, width // 2 + 1)
-        return text
-    figures = f" {round(heading) % 360:03d}° "
-    start = width // 2 - 3
-    strip = text[:start]
-    strip.append(figures, f"bold {colours.background} on {colours.accent}")
-    strip.append_text(text[start + len(figures) :])
-    return strip
+        start, figures, style = width // 2, strip[width // 2], f"bold reverse {colours.text}"
+    else:
+        start, figures = width // 2 - 3, f" {round(heading) % 360:03d}° "
+        style = f"bold {colours.background} on {colours.accent}"
+    left, right = strip[:start], strip[start + len(figures) :]
+    return Runs([(left, colours.text), (figures, style), (right, colours.text)])

@@ -150,7 +150,7 @@ class InspectorScreen(WatchScreen):
             f"Rate of {name}",
             "0 stops it, empty: the default",
             lambda rate: on_vehicle.set_message_rate(number, name, rate),
-            (Field("rate", "Hz", smallest=0.0, largest=1000.0, is_optional=True),),
+            (Field("rate", "Hz", smallest=0.0, largest=1000.0, is_optional=lambda _view: True),),
         )
         values = await self.app.push_screen_wait(OrderForm(order, app.feed.view))
         if values is not None:

@@ -35,7 +35,7 @@ class JobScreen(WatchScreen):
 
     @property
     def is_working(self) -> bool:
-        """Whether an action of this screen has not ended: a job, or a question that may begin one."""
+        """True if an action of this screen has not ended: a job, or a question that may begin one."""
         return any(worker.node is self and not worker.is_finished for worker in self.workers)
 
     @property
@@ -55,10 +55,12 @@ class JobScreen(WatchScreen):
         system_id: int | None,
         *,
         ends_in_order: bool = False,
+        failure: str = "",
     ) -> Value | None:
         """Return the result of a job on the vehicle with this system id; see ``Feed.submit``.
 
-        None if it failed, if another vehicle is selected, or if another job has not ended: the reason is shown.
+        None if it failed, if another vehicle is selected, or if another job has not ended: the reason is shown,
+        after ``failure``.
         """
         if self.doing:
             self.notify(f"{self.doing} has not ended", severity="warning")
@@ -70,7 +72,7 @@ class JobScreen(WatchScreen):
         try:
             return await asyncio.wrap_future(feed.submit(job, system_id, ends_in_order=ends_in_order))
         except (CliError, ConfigError) as error:
-            feed.tell(str(error), Severity.ERROR)
+            feed.tell(f"{failure}: {error}" if failure else str(error), Severity.ERROR)
             return None
         finally:
             self.doing = ""

@@ -1,43 +1,53 @@
-"""Keys of the user, handled one after the other."""
+"""Keys, pasted texts and mouse events of the user, handled one after the other."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Awaitable, Callable
-from typing import Any
+from typing import Any, TypeAlias
 
 from textual.app import App
 from textual.dom import DOMNode
-from textual.events import Key
+from textual.events import InputEvent, Key, MouseUp, Paste
+
+from gcs_cli.tui.confirm import Confirm
 
 _ROUNDS = 2
 """A key is handled in the first round; a message of the widget, such as the end of an input, in the second."""
-_LOST_S = 0.5
-"""A widget that is removed meanwhile never answers."""
+_CHECK_S = 0.5
+"""Interval of the check for a widget that was removed meanwhile: it never answers."""
+
+UserEvent: TypeAlias = InputEvent | Paste
 
 
 class KeyQueue:
-    """Keeps each key until the effect of the one before.
+    """Keeps each event until the effect of the one before; a question takes no event from before it was drawn.
 
     Textual gives a key to the widget that has the focus when the key arrives, and calls the bindings later. So keys
     that follow ``/`` closely would not reach the search field that it opens: they would command the vehicle.
     """
 
-    def __init__(self, app: App[Any], handle: Callable[[Key], Awaitable[None]]) -> None:
+    def __init__(self, app: App[Any], handle: Callable[[UserEvent], Awaitable[None]]) -> None:
         self._app = app
         self._handle = handle
-        self._keys: asyncio.Queue[Key] = asyncio.Queue()
+        self._events: asyncio.Queue[UserEvent] = asyncio.Queue()
 
-    def put(self, key: Key) -> None:
-        """Handle ``key`` after the former ones."""
-        self._keys.put_nowait(key)
+    def put(self, event: UserEvent) -> None:
+        """Handle ``event`` after the former ones."""
+        self._events.put_nowait(event)
 
     async def run(self) -> None:
-        """Handle keys until cancelled."""
+        """Handle events until cancelled."""
         while True:
-            await self._handle(await self._keys.get())
-            for _ in range(_ROUNDS):
-                await self._settle()
+            event = await self._events.get()
+            screen = self._app.screen if self._app.screen_stack else None
+            if isinstance(screen, Confirm) and not screen.is_answered_by(event):
+                continue
+            await self._handle(event)
+            if isinstance(event, Key | Paste | MouseUp):
+                for _ in range(_ROUNDS):
+                    await self._settle()
 
     async def _settle(self) -> None:
         """Wait until the focused widget, those around it and the application have handled their messages."""
@@ -45,9 +55,8 @@ class KeyQueue:
         while node is not None:
             handled = asyncio.Event()
             if node.call_later(handled.set):
-                try:
-                    await asyncio.wait_for(handled.wait(), _LOST_S)
-                except TimeoutError:
-                    return
+                while not handled.is_set() and node.is_running:
+                    with contextlib.suppress(TimeoutError):
+                        await asyncio.wait_for(handled.wait(), _CHECK_S)
             node = node.parent if isinstance(node.parent, DOMNode) else None
         await asyncio.sleep(0)  # an action that asks begins as a task

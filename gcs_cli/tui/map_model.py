@@ -100,9 +100,11 @@ def _others(history: History, system_id: int | None, frame: LocalFrame) -> list[
 
 
 def _craft_of(aircraft: Aircraft, view: VehicleView, frame: LocalFrame) -> Craft:
-    """Return an aircraft with its altitude above the vehicle."""
+    """Return an aircraft with its altitude above the vehicle, or its pressure altitude (PA)."""
     name = aircraft.name
-    if aircraft.altitude_m is not None and view.geo is not None:
+    if aircraft.altitude_m is not None and not aircraft.is_geometric:
+        name += f" PA {aircraft.altitude_m:.0f} m"
+    elif aircraft.altitude_m is not None and view.geo is not None:
         name += f" {aircraft.altitude_m - view.geo.altitude_m:+.0f} m"
     place = place_of(frame, aircraft.latitude_deg, aircraft.longitude_deg)
     return Craft(place, aircraft.heading_deg, name, is_traffic=True)

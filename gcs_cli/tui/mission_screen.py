@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from rich.text import Text
 from textual import on, work
@@ -15,10 +15,9 @@ from textual.widgets import Static
 
 from flightstack.core.enums import Severity
 from flightstack.core.geodesy import GeoPoint
-from flightstack.plan import MissionItem, Plan
+from flightstack.plan import PLAN_NAMES, MissionItem, MissionType, Plan
 from gcs_cli.actions import in_flight, in_mission
 from gcs_cli.actions.action import Action
-from gcs_cli.errors import CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.plans import edit
 from gcs_cli.plans.formats.files import SUFFIXES, load_any, save_any
@@ -45,6 +44,13 @@ from gcs_cli.tui.row_list import RowList, title_text
 from gcs_cli.vehicle.view_types import VehicleView
 
 _ALTITUDE_M = 5.0
+
+
+class Comparison(NamedTuple):
+    """Result of the comparison of a plan with the vehicle's."""
+
+    sentence: str
+    is_equal: bool
 
 
 class MissionScreen(JobScreen):
@@ -152,7 +158,10 @@ class MissionScreen(JobScreen):
         if draft.is_changed:
             left.append(" NOT UPLOADED ", f"bold {colours.background} on {colours.warning}")
             left.append(" ")
-        left.append(summary(self._table, self._progress), colours.text)
+        if plans.has_mission or self.items or draft.is_changed:
+            left.append(summary(self._table, self._progress), colours.text)
+        elif plans.loading != PLAN_NAMES[MissionType.MISSION]:
+            left.append("mission unknown", colours.text)
         parts = [f"fence: {len(draft.plan.fence)}"] if draft.plan.fence else []
         parts += [f"rally points: {len(draft.plan.rally)}"] if draft.plan.rally else []
         right = Text(", ".join(parts), colours.muted)
@@ -270,10 +279,10 @@ class MissionScreen(JobScreen):
             question = f"The plan of vehicle {draft.system_id} was edited. Upload it to vehicle {system_id}?"
             if not await self.ask(question, "Upload"):
                 return
-        found = await self.run_job("checking", partial(problems_on_vehicle, plan=plan), system_id)
-        if found is None:
+        checked = await self.run_job("checking", partial(problems_on_vehicle, plan=plan), system_id)
+        if checked is None:
             return
-        problems, unchecked = found
+        problems, unchecked = checked
         if unchecked:
             watch_app(self).feed.tell(unchecked)
         if problems:
@@ -288,12 +297,23 @@ class MissionScreen(JobScreen):
         )
         if uploaded is None:
             return
-        said = await self.run_job("reading back", partial(self._compare, plan=plan), system_id)
-        if said is not None:
-            self.draft = self.draft.uploaded(system_id) if self.draft.to_upload() == plan else self.draft
-            watch_app(self).plans.reload()
-            watch_app(self).feed.tell(f"uploaded: {said}")
+        edited = self.draft
+        sent = self.draft = edited.uploaded(system_id) if edited.to_upload() == plan else edited
+        watch_app(self).plans.reload()
+        self._redraw()
+        found = await self._read_back(plan, system_id, "uploaded")
+        if found is not None and not found.is_equal and self.draft is sent:
+            self.draft = edited
             self._redraw()
+
+    async def _read_back(self, plan: Plan, system_id: int | None, done: str) -> Comparison | None:
+        """Compare ``plan`` with the vehicle's and show the result after ``done``; None if it is unknown."""
+        job = partial(self._compare, plan=plan)
+        found = await self.run_job("reading back", job, system_id, failure=f"{done}, not compared")
+        if found is not None:
+            severity = Severity.NOTICE if found.is_equal else Severity.ERROR
+            watch_app(self).feed.tell(f"{done}: {found.sentence}", severity)
+        return found
 
     @property
     def _selected_id(self) -> int | None:
@@ -309,23 +329,19 @@ class MissionScreen(JobScreen):
         self.progress = uploads.progress
         return "interrupted" if watch_app(self).feed.is_stopping else ""
 
-    def _compare(self, connection: Connection, plan: Plan) -> str:
-        """Return the parts that are equal on the vehicle; raise CliError with the differences."""
+    def _compare(self, connection: Connection, plan: Plan) -> Comparison:
+        """Return the differences of the vehicle's plan, or the parts that are equal."""
         compared = plan_transfers.compare_with_vehicle(connection, parts_to_send(plan))
         lines = [f"{part.name}: {difference.sentence}" for part, found in compared for difference in found]
         if lines:
-            raise CliError(f"the vehicle's plan differs: {some_of(lines)}")
-        return ", ".join(f"{part.name} of {len(part.items)} items equal" for part, _ in compared)
+            return Comparison(f"the vehicle's plan differs: {some_of(lines)}", is_equal=False)
+        equal = ", ".join(f"{part.name} of {len(part.items)} items equal" for part, _ in compared)
+        return Comparison(equal, is_equal=True)
 
     @work
     async def action_verify(self) -> None:
         """Compare the vehicle's plan with the list."""
-        plan = self.draft.to_upload()
-        said = await self.run_job(
-            "reading back", lambda connection: self._compare(connection, plan), self._selected_id
-        )
-        if said is not None:
-            watch_app(self).feed.tell(f"verified: {said}")
+        await self._read_back(self.draft.to_upload(), self._selected_id, "verified")
 
     @work
     async def action_download(self) -> None:

@@ -22,7 +22,6 @@ class OrderForm(ModalScreen[list[Any] | None]):
     OrderForm { align: center middle; }
     OrderForm > Vertical { width: 60; max-width: 90%; height: auto; border: round $accent; padding: 0 2;
                            background: $surface; }
-    OrderForm Label { width: 1fr; }
     OrderForm Input { margin-bottom: 1; }
     OrderForm Label { width: 100%; }
     OrderForm .title { text-style: bold; color: $accent; margin-bottom: 1; }
@@ -81,6 +80,6 @@ def _title(field: Field, view: VehicleView) -> str:
         parts.append(f"[{field.unit}]")
     if field.choices is not None:
         parts.append(f"({', '.join(field.choices(view))})")
-    if field.is_optional:
-        parts.append("(optional)")
+    if field.is_optional(view):
+        parts.append(f"(empty: {field.omitted})" if field.omitted else "(optional)")
     return " ".join(parts)

@@ -22,7 +22,10 @@ class Field(NamedTuple):
     default: str = ""
     smallest: float = -1e9
     largest: float = 1e9
-    is_optional: bool = False
+    is_optional: Callable[[VehicleView], bool] = lambda _view: False
+    """True if this vehicle does not need the value."""
+    omitted: str = ""
+    """What the vehicle uses instead of an omitted value."""
     choices: Callable[[VehicleView], Sequence[str]] | None = None
     """The valid words; None: a number."""
 
@@ -30,7 +33,7 @@ class Field(NamedTuple):
         """Return the value of ``text``, None for an omitted one; raise ``FieldError``."""
         text = text.strip()
         if not text:
-            if self.is_optional:
+            if self.is_optional(view):
                 return None
             raise FieldError(f"{self.name}: give a value")
         if self.choices is not None:
@@ -110,7 +113,15 @@ def question_for(
     return "\n".join([f"{title}: {count} vehicles ({ids})?", *questions])
 
 
-_ALTITUDE = Field("altitude", "m above home", smallest=0.1, largest=10_000.0, is_optional=True)
+def _always(_view: VehicleView) -> bool:
+    return True
+
+
+def _has_takeoff_altitude(view: VehicleView) -> bool:
+    return view.autopilot.has_takeoff_altitude
+
+
+_ALTITUDE = Field("altitude", "m above home", smallest=0.1, largest=10_000.0, is_optional=_always)
 ORDERS = (
     Order(
         "arm", "A", "Arm", "Start the rotors", on_vehicle.arm, (), _asks_to_arm, lambda v: not v.armed, True
@@ -130,9 +141,9 @@ ORDERS = (
         "takeoff",
         "T",
         "Take off",
-        "Arm and climb to an altitude above home; without one, the vehicle's own",
+        "Arm and climb to an altitude above home",
         in_flight.takeoff,
-        (_ALTITUDE._replace(default="5"),),
+        (_ALTITUDE._replace(default="5", is_optional=_has_takeoff_altitude, omitted="the vehicle's own"),),
         applies=lambda view: not in_air(view),
         in_footer=True,
     ),
@@ -165,7 +176,7 @@ ORDERS = (
         "Speed",
         "Set the ground speed; without a value, the default",
         in_flight.speed,
-        (Field("speed", "m/s", smallest=0.1, largest=100.0, is_optional=True),),
+        (Field("speed", "m/s", smallest=0.1, largest=100.0, is_optional=_always),),
     ),
     Order(
         "yaw",
@@ -210,7 +221,7 @@ ORDERS = (
         (
             Field("part", choices=lambda _view: list(on_vehicle.failure_units())),
             Field("failure", choices=lambda _view: list(on_vehicle.failure_types())),
-            Field("instance", "0: all", smallest=0.0, largest=255.0, is_optional=True),
+            Field("instance", "0: all", smallest=0.0, largest=255.0, is_optional=_always),
         ),
         lambda view: f"Inject a failure into {vehicle_name(view)}? It may crash.",
     ),

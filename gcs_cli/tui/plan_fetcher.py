@@ -53,6 +53,11 @@ class PlanFetcher:
         """Name of the plan that is being downloaded, or an empty text."""
         return "" if self._loading is None else PLAN_NAMES[self._loading[0]]
 
+    @property
+    def has_mission(self) -> bool:
+        """True if the mission of the vehicle has been downloaded; it may have no items."""
+        return MissionType.MISSION in self._items
+
     def reload(self) -> None:
         """Download all plans again."""
         self._seen.clear()
@@ -88,8 +93,8 @@ class PlanFetcher:
         error = future.exception()
         if error is None:
             self._problems.pop(kind, None)
-            if self._items.get(kind, ()) != future.result():
-                self._items[kind] = future.result()
+            former, self._items[kind] = self._items.get(kind, ()), future.result()
+            if self._items[kind] != former:
                 mission, fence, rally = (self._items.get(each, ()) for each in _ID_FIELDS)
                 self.plan = Plan(mission, fence=fence, rally=rally)
         elif isinstance(error, CliError):

@@ -8,20 +8,23 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 
 KEPT_S = 30.0
-"""An aircraft that is not reported for this time has left."""
+"""An aircraft that does not transmit for this time has left."""
 _MOST_AIRCRAFT = 200
 
 
 class Aircraft(NamedTuple):
-    """Position, altitude above the sea and heading of an aircraft; None: unknown."""
+    """Position, altitude and heading of an aircraft; None: unknown."""
 
     name: str
     """Its callsign, else its ICAO address."""
     latitude_deg: float
     longitude_deg: float
     altitude_m: float | None
+    """Above the sea if it is geometric, else pressure altitude."""
     heading_deg: float | None
-    received_s: float
+    heard_s: float
+    """Time of the aircraft's last transmission."""
+    is_geometric: bool = False
 
 
 class Traffic:
@@ -49,13 +52,14 @@ class Traffic:
             message.lon / 1e7,
             message.altitude / 1e3 if has_altitude else None,
             message.heading / 100 if has_heading else None,
-            now_s,
+            now_s - message.tslc,
+            message.altitude_type == mavlink.ADSB_ALTITUDE_TYPE_GEOMETRIC,
         )
 
     def aircraft(self, now_s: float) -> list[Aircraft]:
-        """Return the aircraft that were reported within ``KEPT_S``."""
+        """Return the aircraft that transmitted within ``KEPT_S``."""
         return [each for each in list(self._aircraft.values()) if _is_near(each, now_s)]
 
 
 def _is_near(aircraft: Aircraft, now_s: float) -> bool:
-    return now_s - aircraft.received_s <= KEPT_S
+    return now_s - aircraft.heard_s <= KEPT_S

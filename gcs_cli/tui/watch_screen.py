@@ -71,6 +71,12 @@ class WatchScreen(Screen[None]):
     def __init__(self, mode: str) -> None:
         super().__init__()
         self.mode = mode
+        self._is_composed = False
+        self._drawings: list[Drawing] = []
+
+    def on_mount(self) -> None:
+        """Find the drawings once: all widgets are mounted now, and stay."""
+        self._drawings = list(self.query(Drawing))
 
     def compose(self) -> ComposeResult:
         """Yield the frame around the body."""
@@ -96,14 +102,15 @@ class WatchScreen(Screen[None]):
     def show(self, view: VehicleView, now_s: float) -> None:
         """Draw the state of the selected vehicle; by default in each ``Drawing``."""
         redraw = watch_app(self).redraws
-        for drawing in self.query(Drawing):
+        for drawing in self._drawings or self.query(Drawing):
             if redraw % drawing.every == 0:
                 drawing.show(view, now_s)
 
     @property
     def is_composed(self) -> bool:
         """True if the widgets of the body exist; a screen is resumed and redrawn before."""
-        return bool(self.query("#body > *"))
+        self._is_composed = self._is_composed or bool(self.query("#body > *"))
+        return self._is_composed
 
     def on_screen_resume(self) -> None:
         """Draw the state that arrived while another screen was open."""

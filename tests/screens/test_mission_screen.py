@@ -14,7 +14,6 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.plan import Command, Frame, Plan
 from gcs_cli.actions.in_mission import jump
 from gcs_cli.errors import FAILED, CliError
-from gcs_cli.plans.check import Problem
 from gcs_cli.tui.app import WatchApp
 from gcs_cli.tui.confirm import Confirm
 from gcs_cli.tui.entry_form import EntryForm
@@ -191,6 +190,36 @@ def test_mission_of_the_vehicle_at_three_sizes(size):
     drive(story, size)
 
 
+def test_mission_is_not_absent_while_it_downloads():
+    async def story(pilot, app, screen):
+        text = "\n".join(shown(app))
+        assert "downloading the mission" in text
+        assert "no mission" not in text
+        answer(app, CliError("no answer", FAILED))
+        screen.show(FLYING, 10.0)
+        await pilot.pause()
+        text = "\n".join(shown(app))
+        assert "mission unknown" in text
+        assert "no mission" not in text
+        app.plans.reload()
+        for _ in range(3):
+            screen.show(FLYING, 10.0)
+            if app.plans.loading:
+                answer(app, ())
+        screen.show(FLYING, 10.0)
+        await pilot.pause()
+        assert "no mission" in "\n".join(shown(app))
+
+    app = WatchApp(StillFeed(FLYING))
+
+    async def begin(pilot: Pilot[None]) -> None:
+        await pilot.press("3")
+        await pilot.pause()
+        await story(pilot, app, app.screen)
+
+    run_story(app, begin)
+
+
 def test_edits_mark_the_plan_and_undo_restores_it():
     async def story(pilot, app, screen):
         await pilot.press("down", "J")
@@ -238,45 +267,6 @@ def test_quit_asks_before_edits_are_lost(key):
         await pilot.press("g")
         await pilot.pause()
         assert isinstance(app.screen, Confirm)  # a download would drop them too
-
-    drive(story)
-
-
-def test_upload_checks_asks_while_armed_and_reads_back():
-    async def story(pilot, app, screen):
-        await pilot.press("d", "u")
-        await pilot.pause()
-        answer(app, ([Problem("mission", 0, "item 0 is too far")], ""))
-        await pilot.pause()
-        assert "mission: item 0 is too far" in "\n".join(shown(app))
-        await pilot.press("y")
-        await pilot.pause()
-        assert "The vehicle is armed" in "\n".join(shown(app))
-        await pilot.press("y")
-        await pilot.pause()
-        answer(app, True)
-        await pilot.pause()
-        answer(app, "mission of 4 items equal")
-        await pilot.pause()
-        assert said(app) == ["uploaded: mission of 4 items equal"]
-        assert not screen.draft.is_changed
-        assert len(screen.items) == 4
-
-    drive(story)
-
-
-def test_refused_upload_keeps_the_edits():
-    async def story(pilot, app, screen):
-        await pilot.press("d", "u")
-        await pilot.pause()
-        answer(app, ([], ""))
-        await pilot.pause()
-        await pilot.press("y")
-        await pilot.pause()
-        answer(app, CliError("upload of the mission refused: item 2", FAILED))
-        await pilot.pause()
-        assert said(app) == ["upload of the mission refused: item 2"]
-        assert screen.draft.is_changed
 
     drive(story)
 
@@ -345,21 +335,5 @@ def test_mission_orders_to_all_vehicles_ask(key):
         await pilot.press("y")
         await pilot.pause()
         assert app.feed.acted_on == [1, 7]
-
-    drive(story)
-
-
-def test_upload_to_another_vehicle_than_the_edited_one_asks():
-    async def story(pilot, app, screen):
-        await pilot.press("d")
-        app.feed.shown = FLYING._replace(identity=Identity(7, 1, 2, 12))
-        await pilot.press("u")
-        await pilot.pause()
-        assert "The plan of vehicle 1 was edited. Upload it to vehicle 7?" in " ".join(
-            "\n".join(shown(app)).split()
-        )
-        await pilot.press("y")
-        await pilot.pause()
-        assert app.feed.job_targets[-1] == 7
 
     drive(story)

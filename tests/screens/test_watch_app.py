@@ -9,13 +9,14 @@ from textual.pilot import Pilot
 from flightstack.core.enums import Severity
 from gcs_cli.tui.app import WatchApp
 from gcs_cli.tui.feed import Notice
-from gcs_cli.tui.orders import ORDERS, Field, FieldError
+from gcs_cli.tui.orders import ORDERS
+from gcs_cli.tui.palette import DARK, LIGHT
 from gcs_cli.tui.screens import SCREENS, ScreenEntry
 from gcs_cli.vehicle.view_types import Identity, VehicleView
 from tests.support.pictures import check_picture
 from tests.support.screens import shown
 from tests.support.watch_plays import GROUNDED, Story, asked, play
-from tests.support.watch_states import BARE, FULL, flown_history
+from tests.support.watch_states import FULL, flown_history
 
 
 @pytest.mark.parametrize("entry", SCREENS, ids=lambda entry: entry.mode)
@@ -183,39 +184,6 @@ def test_set_home_asks_in_flight() -> None:
     assert asked(play(keys("O", "y"))) == ["set-home"]
 
 
-def test_a_form_asks_for_values_and_names_what_is_wrong() -> None:
-    async def story(app: WatchApp, pilot: Pilot) -> None:
-        await pilot.press("T")
-        await pilot.pause()
-        await pilot.press("backspace", *"high", "enter")
-        await pilot.pause()
-        assert "altitude: high is not a number" in "\n".join(shown(app))
-        await pilot.press(*["backspace"] * 4, *"12", "enter")
-        await pilot.pause()
-
-    feed = play(story, GROUNDED)
-    assert [action.facts for action in feed.actions] == [{"altitude_m": 12.0}]
-
-
-def test_help_of_an_order_is_shown_whole_in_its_form() -> None:
-    async def story(app: WatchApp, pilot: Pilot) -> None:
-        await pilot.press("T")
-        await pilot.pause()
-        assert "without one, the vehicle's own" in " ".join(" ".join(shown(app)).replace("│", " ").split())
-
-    play(story, GROUNDED)
-
-
-def test_escape_leaves_a_form_without_an_order() -> None:
-    async def story(_app: WatchApp, pilot: Pilot) -> None:
-        await pilot.press("G")
-        await pilot.pause()
-        await pilot.press("4", "escape")
-        await pilot.pause()
-
-    assert asked(play(story)) == []
-
-
 def test_orders_are_in_the_command_palette() -> None:
     async def story(app: WatchApp, pilot: Pilot) -> None:
         await pilot.press("ctrl+p")
@@ -284,15 +252,6 @@ def test_keys_of_orders_and_screens_are_unique() -> None:
     assert all(order.key.isupper() for order in ORDERS)
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [("", "altitude: give a value"), ("x", "altitude: x is not a number"), ("99", "altitude: give 1 to 9")],
-)
-def test_a_field_names_an_invalid_value(text: str, said: str) -> None:
-    with pytest.raises(FieldError, match=said):
-        Field("altitude", smallest=1.0, largest=9.0).parse(text, BARE)
-
-
 def test_a_theme_changes_the_colours_of_drawings() -> None:
     async def story(app: WatchApp, pilot: Pilot) -> None:
         dark = app.palette
@@ -302,6 +261,22 @@ def test_a_theme_changes_the_colours_of_drawings() -> None:
         app.theme = "nord"
         await pilot.pause()
         assert app.palette.text.startswith("#")
+
+    play(story)
+
+
+def test_background_of_a_drawing_follows_the_theme() -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        backgrounds = []
+        for theme in ("gcs-dark", "gcs-light"):
+            app.theme = theme
+            await pilot.pause()
+            app.redraws = 0
+            app.redraw()
+            await pilot.pause()
+            [segment, *_] = app.screen.query_one("#position").render_line(0)
+            backgrounds.append(segment.style.bgcolor.name)
+        assert backgrounds == [palette.background for palette in (DARK, LIGHT)]
 
     play(story)
 

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
+
 import pytest
+from textual.events import Key, Paste
 from textual.pilot import Pilot
 from textual.widgets import Input
 
 from gcs_cli.tui.app import WatchApp
+from gcs_cli.tui.confirm import Confirm
+from gcs_cli.tui.order_form import OrderForm
 from tests.support.pilots import type_ahead
 from tests.support.screens import shown
 from tests.support.watch_plays import GROUNDED, asked, play
@@ -33,6 +38,44 @@ def test_words_typed_ahead_are_searched_and_command_nothing(screen: str) -> None
         assert app.screen.query_one("#search", Input).value == "LAY"
 
     assert asked(play(story)) == []
+
+
+@pytest.mark.parametrize("typed", [("X", "y"), ("X", "left", "enter")])
+def test_keys_typed_before_a_question_do_not_answer_it(typed: tuple[str, ...]) -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await type_ahead(pilot, *typed)
+        assert isinstance(app.screen, Confirm)
+        await pilot.press("y")
+        await pilot.pause()
+
+    async def ahead(app: WatchApp, pilot: Pilot) -> None:
+        await type_ahead(pilot, *typed)
+        assert app.feed.actions == []
+
+    assert asked(play(ahead)) == []
+    assert asked(play(story)) == ["terminate"]
+
+
+def test_pasted_text_waits_for_the_keys_before_it() -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        for event in (Key("6", "6"), Key("slash", "/"), Paste("LAY")):
+            app.post_message(event)
+        await pilot.pause()
+        await pilot.pause()
+        assert app.screen.query_one("#search", Input).value == "LAY"
+
+    assert asked(play(story)) == []
+
+
+def test_key_waits_for_a_slow_screen() -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await type_ahead(pilot, "T")
+        app.screen.call_later(asyncio.sleep, 2.0)
+        await type_ahead(pilot, "enter", "S")
+        await pilot.pause(3.0)
+        assert isinstance(app.screen, OrderForm)
+
+    assert [action.facts for action in play(story, GROUNDED).actions] == [{"altitude_m": 5.0}]
 
 
 @pytest.mark.parametrize("width", [60, 80])

@@ -9,7 +9,6 @@ import sys
 import tomllib
 from pathlib import Path
 
-import numba
 import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_are
@@ -21,6 +20,7 @@ from flightstack.control.controller_loading import (
     form_problem,
     load_controller,
 )
+from flightstack.control.mixer import mix
 from flightstack.core.contract import LoopRow
 from flightstack.core.errors import ConfigError
 from flightstack.params.config import StackConfig
@@ -236,9 +236,8 @@ def test_the_command_takes_an_installed_controller_and_lists_them_for_an_unknown
 def test_a_controller_that_is_gone_leaves_the_others_compilable(installed: Path) -> None:
     """Our functions' caches name no type of a user's package: Numba would import it to read any of them."""
     build(StackConfig(controller="lqr"), lambda: None)
-    indices = list(
-        Path(numba.config.CACHE_DIR).parent.rglob("*.nbi")
-    )  # a directory for each state of sources
+    digests = Path(mix.stats.cache_path).parents[1]  # a directory for each state of sources
+    indices = list(digests.rglob("*.nbi"))
     kernels = [path for path in indices if "inner_kernel__lqr" in path.name]
     assert kernels
     for path in indices:

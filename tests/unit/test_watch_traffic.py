@@ -19,11 +19,17 @@ NOW_S = 100.0
 VALID = mavlink.ADSB_FLAGS_VALID_COORDS | mavlink.ADSB_FLAGS_VALID_ALTITUDE | mavlink.ADSB_FLAGS_VALID_HEADING
 
 
-def report(address: int = 0x3C6444, callsign: bytes = b"DLH4AB", flags: int = VALID):
+def report(
+    address: int = 0x3C6444,
+    callsign: bytes = b"DLH4AB",
+    flags: int = VALID,
+    altitude_type: int = mavlink.ADSB_ALTITUDE_TYPE_GEOMETRIC,
+    silent_s: int = 0,
+):
     geo = FRAME.to_geo(Vector3(40.0, 30.0, 0.0))
     lat, lon = round(geo.latitude_deg * 1e7), round(geo.longitude_deg * 1e7)
     return mavlink.MAVLink_adsb_vehicle_message(
-        address, lat, lon, 0, 613_000, 9000, 0, 0, callsign, 0, 1, flags, 0
+        address, lat, lon, altitude_type, 613_000, 9000, 0, 0, callsign, 0, silent_s, flags, 0
     )
 
 
@@ -37,6 +43,20 @@ def test_aircraft_is_drawn_with_its_altitude_above_the_vehicle() -> None:
     assert "→DLH4AB +120 m" in draw_map(scene, Viewport(width=80, height=40), DARK).text().plain
 
 
+def test_pressure_altitude_is_not_compared_with_the_vehicle() -> None:
+    traffic = Traffic()
+    traffic.record(report(altitude_type=mavlink.ADSB_ALTITUDE_TYPE_PRESSURE_QNH), NOW_S)
+    (craft,) = MapModel().scene(VIEW, History(), Plan(()), traffic.aircraft(NOW_S)).others
+    assert craft.name == "DLH4AB PA 613 m"
+
+
+def test_age_of_an_aircraft_counts_from_its_own_transmission() -> None:
+    traffic = Traffic()
+    traffic.record(report(silent_s=20), NOW_S)
+    assert traffic.aircraft(NOW_S + KEPT_S - 20.0)
+    assert not traffic.aircraft(NOW_S + KEPT_S - 19.0)
+
+
 def test_aircraft_leaves_the_map_when_it_is_not_reported() -> None:
     traffic = Traffic()
     traffic.record(report(), NOW_S)
@@ -45,7 +65,7 @@ def test_aircraft_leaves_the_map_when_it_is_not_reported() -> None:
 
 
 def test_traffic_does_not_change_the_extent_of_the_map() -> None:
-    far = Aircraft("far", 48.0, 9.0, None, None, NOW_S)
+    far = Aircraft("far", 48.0, 9.0, None, heading_deg=None, heard_s=NOW_S)
     model = MapModel()
     alone = model.scene(VIEW, History(), Plan(())).extent()
     assert (model.scene(VIEW, History(), Plan(()), [far]).extent() == alone).all()

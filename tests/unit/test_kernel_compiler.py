@@ -1,0 +1,147 @@
+"""Functions that kernels call: compiled as parts of the kernel, and Numba's compiler in other uses."""
+
+from __future__ import annotations
+
+import gc
+import os
+import subprocess
+import sys
+
+import numba
+import numpy as np
+import pytest
+from numba.core import event
+
+from flightstack.core import compiled as module
+from flightstack.core import geometry, kernel_compiler
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import Quaternion
+from flightstack.core.geometry import quaternion_product
+from flightstack.core.portable_math import tan
+
+JIT = pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
+
+
+@JIT
+def test_kernels_call_parts_without_a_wrapper_for_python() -> None:
+    @compiled
+    def used(x: float) -> float:
+        return x + 1.0
+
+    @compiled
+    def using(x: float) -> float:
+        return used(x)
+
+    assert using(1.0) == 2.0
+    assert used.overloads == {}
+    (part,) = used.part.overloads.values()
+    assert part.library.get_pointer_to_function(part.fndesc.llvm_func_name) == 0
+    assert used(2.0) == 3.0
+    assert gc.isenabled()
+
+
+@JIT
+def test_cached_part_is_included_in_another_kernel() -> None:
+    loaded = module._Kernel(quaternion_product.py_func, frozenset({geometry.__name__}))
+
+    @compiled
+    def square(a: Quaternion) -> Quaternion:
+        return loaded(a, a)
+
+    turn = Quaternion(0.0, 1.0, 0.0, 0.0)
+    quaternion_product.part.compile((numba.typeof(turn), numba.typeof(turn)))  # writes the cache
+    assert square(turn) == (-1.0, 0.0, 0.0, 0.0)
+    assert sum(loaded.part.stats.cache_hits.values()) == 1
+
+
+@JIT
+def test_kernel_and_part_share_the_functions_that_they_call() -> None:
+    class Listener(event.Listener):  # type: ignore[misc]
+        def on_start(self, event: event.Event) -> None:
+            compilations.append(event.data["dispatcher"].py_func.__name__)
+
+        def on_end(self, event: event.Event) -> None: ...
+
+    @compiled
+    def used(x: np.float32) -> float:
+        return tan(x)
+
+    @compiled
+    def using(x: np.float32) -> float:
+        return tan(x) - used(x)
+
+    compilations: list[str] = []
+    with event.install_listener("numba:compile", Listener()):
+        assert using(np.float32(0.5)) == 0.0
+    assert compilations.count("used__part") == compilations.count("tan") == compilations.count("sin_cos") == 1
+
+
+@JIT
+def test_operators_of_floats_and_integers_have_numbas_types() -> None:
+    @compiled
+    def results(x: float, n: int) -> tuple[float, float, int, bool]:
+        return x * x, x / n, n * n, x < n
+
+    assert results(3.0, 2) == (9.0, 1.5, 4, False)
+    (signature,) = results.nopython_signatures
+    kinds = (numba.float64, numba.float64, numba.int64, numba.boolean)
+    assert signature.return_type == numba.types.Tuple(kinds)
+
+
+@compiled
+def printed(x: float) -> float:
+    print("value", x)
+    return x
+
+
+@compiled
+def checked(x: float) -> float:
+    if x < 0.0:
+        raise ValueError("negative value", x)
+    return x
+
+
+@compiled
+def reported(x: float) -> float:
+    return checked(printed(x))
+
+
+def test_compiled_function_called_by_a_kernel_prints(capsys: pytest.CaptureFixture[str]) -> None:
+    assert reported(2.5) == 2.5
+    assert capsys.readouterr().out == "value 2.5\n"
+
+
+def test_compiled_function_called_by_a_kernel_raises_with_values() -> None:
+    with pytest.raises(ValueError, match="negative value") as raised:
+        reported(-1.0)
+    assert raised.value.args == ("negative value", -1.0)
+
+
+@JIT
+def test_operators_of_other_numba_users_are_typed_by_numba(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernel_compiler._FloatOperator, "result", numba.boolean)
+    twice = numba.njit(lambda x: x + x)
+    assert twice(1.5) == 3.0
+
+
+UNTESTED_NUMBA = """
+import sys
+import numba
+numba.version_info = numba.version_info._replace(short=(9, 0))
+from flightstack.core.array_items import store
+from flightstack.core.compiled import compiled
+@compiled
+def half(x):
+    print("value", x)
+    return 0.5 * x
+@compiled
+def quarter(x):
+    return half(half(x))
+print(quarter(6.0), "flightstack.core.kernel_compiler" in sys.modules)
+"""
+
+
+@JIT
+def test_an_untested_numba_compiles_with_its_own_compiler() -> None:
+    done = subprocess.run([sys.executable, "-c", UNTESTED_NUMBA], capture_output=True, text=True, check=True)
+    assert done.stdout == "value 6.0\nvalue 3.0\n1.5 False\n"
