@@ -21,7 +21,7 @@ static fs_vector3 clipped(const fs_vector3 *v, fs_real limit)
 
 /* attitude_reference.py:61 */
 void fs_attitude_reference_step(const fs_reference_memory *memory, const fs_quaternion *target,
-    const fs_reference_params *params, fs_real dt_s, fs_reference_memory *passed_out,
+    const fs_reference_params *params, fs_real dt_s, fs_reference_memory *advanced_out,
     fs_attitude_reference *attitude_reference_out)
 {
     if (params->bandwidth_rad_s <= FS_LIT(0.0)) {
@@ -35,7 +35,7 @@ void fs_attitude_reference_step(const fs_reference_memory *memory, const fs_quat
             .q_rad_s = FS_LIT(0.0),
             .r_rad_s = FS_LIT(0.0),
         };
-        *passed_out = passed;
+        *advanced_out = passed;
         *attitude_reference_out = (fs_attitude_reference){*target, zero, zero};
         return;
     }
@@ -75,7 +75,7 @@ void fs_attitude_reference_step(const fs_reference_memory *memory, const fs_quat
         .q_rad_s = rates.y,
         .r_rad_s = rates.z,
     };
-    *passed_out = advanced;
+    *advanced_out = advanced;
     *attitude_reference_out = (fs_attitude_reference){attitude, rates, acceleration};
 }
 

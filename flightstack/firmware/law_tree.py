@@ -50,7 +50,7 @@ def generated_files(controller: AttitudeController) -> dict[str, str]:
 
     try:
         texts = core_files(with_built_in(controller))
-    except (OutsideSubsetError, ValueError) as error:
+    except (OutsideSubsetError, TypeError, ValueError) as error:
         raise ConfigError("--controller", controller.name, f"has no C: {error}") from None
     if any(_LAW_MATH in text for text in texts.values()):
         texts[_LAW_MATH] = (firmware_root() / "laws" / _LAW_MATH).read_text(encoding="ascii")

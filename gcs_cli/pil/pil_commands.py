@@ -9,6 +9,7 @@ from typing import Any
 
 from rich.console import Console
 
+from flightstack.firmware.law_parity import VECTORS, differing_steps
 from flightstack.firmware.law_tree import controller_named, generated_names, is_built_in, write_tree
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.fly.fly_display import FlyConsole
@@ -59,14 +60,22 @@ def run_generate(name: str, out: Path | None, as_json: bool) -> None:
         write_tree(controller, folder)
     except OSError as error:
         raise CliError(f"{folder}: cannot be written: {error.strerror}", USAGE) from None
-    step = sorted(generated_names(controller))
+    names, differing = sorted(generated_names(controller)), differing_steps(controller)
     if as_json:
-        print(json.dumps({"controller": name, "directory": str(folder), "files": step}), flush=True)
-        return
-    console = FlyConsole(highlight=False)
-    console.print(f"firmware with {name}: {folder}/", markup=False, highlight=False, soft_wrap=True)
-    for file in step:
-        console.print(f"  core/{file}", markup=False, highlight=False, soft_wrap=True)
+        result = {"controller": name, "directory": str(folder), "files": names, "steps_compared": VECTORS}
+        print(json.dumps({**result, "steps_differing": differing}), flush=True)
+    else:
+        console = FlyConsole(highlight=False)
+        lines = [f"firmware with {name}: {folder}/", *(f"  core/{file}" for file in names)]
+        lines.append(
+            f"C in double against Python: {VECTORS} random steps, {differing} of them with other bits"
+        )
+        for line in lines:
+            console.print(line, markup=False, highlight=False, soft_wrap=True)
+    if differing:
+        raise CliError(
+            f"--controller {name}: its C and its Python differ in {differing} of {VECTORS} steps", FAILED
+        )
 
 
 def run_doctor(

@@ -16,11 +16,12 @@ from flightstack.control.attitude_reference import attitude_reference_step, in_b
 from flightstack.control.position_pid import position_pid_step
 from flightstack.core import geometry, portable_math
 from flightstack.core.contract import Vector3, Wrench
+from flightstack.firmware.generator.call_c import CFunction, Vectors, differences
 from flightstack.firmware.generator.unit import Program
 from flightstack.guidance.trajectory import setpoint_of, trajectory_step
 from flightstack.params.vehicle import load_vehicle
 from tests.parity.generated_laws import LAWS
-from tests.support.generated_c import CFunction, Vectors, compile_program, differences, in_python
+from tests.support.generated_c import compile_program, in_python
 from tests.support.plugin_site import example_module
 from tests.support.rotor_sets import ring
 

@@ -8,9 +8,10 @@ from pathlib import Path
 
 from hypothesis import HealthCheck, Phase, given, settings
 
+from flightstack.firmware.generator.call_c import CFunction, Vectors, differences
 from flightstack.firmware.generator.unit import Program
 from tests.parity.random_programs import HEAD, function, programs
-from tests.support.generated_c import CFunction, Vectors, compile_program, differences, in_python
+from tests.support.generated_c import compile_program, in_python
 from tests.support.tools import NIGHTLY
 
 PROGRAMS = 500 if NIGHTLY else 50

@@ -5,35 +5,21 @@ from __future__ import annotations
 import ctypes
 import math
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from types import FunctionType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from flightstack.core.contract import MAX_ROTORS
 from flightstack.firmware.build import EXACT, firmware_root, host_compiler
-from flightstack.firmware.generator.law import Function, python_function
-from flightstack.firmware.generator.types import (
-    BOOL,
-    INT,
-    NOTHING,
-    REAL,
-    ROTORS,
-    Array,
-    Record,
-    Several,
-    Type,
-    has_rotors,
-)
+from flightstack.firmware.generator.law import python_function
 from flightstack.firmware.generator.unit import Program, write
 
 WARNINGS = (
     "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wconversion", "-Wshadow", "-Wstrict-prototypes",
     "-Wmissing-prototypes", "-Wundef", "-Wvla", "-Wcast-qual", "-Wpointer-arith",
 )  # fmt: skip
-EDGES = [0.0, -0.0, math.nan, math.inf, -math.inf, 5e-324, -1e-310, 1e308, -1e308, 1e-30, 1.0, -1.0]
 
 
 def compile_program(program: Program, folder: Path, real: str = "double") -> ctypes.CDLL:
@@ -49,83 +35,6 @@ def compile_program(program: Program, folder: Path, real: str = "double") -> cty
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return ctypes.CDLL(str(library))
-
-
-def _layout(kind: Type) -> Any:
-    """Return the ctypes type of a value."""
-    if isinstance(kind, Array):
-        made: Any = ctypes.c_double
-        for size in reversed(kind.shape):
-            made = made * (MAX_ROTORS if size == ROTORS else int(size))
-        return made
-    if isinstance(kind, Record):
-        fields = [(f"_{name}", _layout(inner)) for name, inner in kind.fields.items()]
-        head = [("rotors", ctypes.c_int32)] if has_rotors(kind) else []
-        return type(kind.kind.__name__, (ctypes.Structure,), {"_fields_": [*head, *fields]})
-    return {REAL: ctypes.c_double, INT: ctypes.c_int32, BOOL: ctypes.c_bool, NOTHING: None}[kind]  # type: ignore[index]
-
-
-def _fill(kind: Type, place: Any, value: Any) -> None:
-    """Write the fields of a structure, or the items of an array."""
-    if isinstance(kind, Array):
-        for at, item in enumerate(value):
-            if len(kind.shape) > 1:
-                _fill(Array(kind.shape[1:]), place[at], item)
-            else:
-                place[at] = item
-        return
-    assert isinstance(kind, Record)
-    for (name, inner), item in zip(kind.fields.items(), value, strict=True):
-        if isinstance(inner, Record | Array):
-            _fill(inner, getattr(place, f"_{name}"), item)
-        else:
-            setattr(place, f"_{name}", item)
-
-
-def _flat(kind: Type, value: Any) -> list[float]:
-    """Return the numbers of a C value."""
-    if isinstance(kind, Record):
-        return [
-            number
-            for name, inner in kind.fields.items()
-            for number in _flat(inner, getattr(value, f"_{name}"))
-        ]
-    return [float(getattr(value, "value", value))]
-
-
-class CFunction:
-    """A generated function, called with Python's values."""
-
-    def __init__(self, library: ctypes.CDLL, function: Function) -> None:
-        self.function = function
-        self._call = getattr(library, function.c_name)
-        self._layouts = [_layout(parameter.type) for parameter in function.parameters]
-        self._outputs = [(kind, _layout(kind)) for _, kind in function.outputs]
-        result = function.result
-        self._call.restype = None if isinstance(result, Several) else _layout(result)
-
-    def __call__(self, *values: Any, rotors: int = 0) -> list[float]:
-        """Return the numbers of the results; arrays are written in place."""
-        arguments, held = [], []
-        for parameter, layout, value in zip(self.function.parameters, self._layouts, values, strict=True):
-            if isinstance(parameter.type, Record | Array):
-                place = layout()
-                _fill(parameter.type, place, value)
-                if has_rotors(parameter.type):
-                    place.rotors = rotors
-                held.append((parameter.type, place, value))
-                arguments.append(ctypes.byref(place))
-            else:
-                arguments.append(layout(value))
-        arguments += [ctypes.c_int32(rotors)] if self.function.needs_rotors else []
-        outputs = [(kind, layout()) for kind, layout in self._outputs]
-        returned = self._call(*arguments, *(ctypes.byref(place) for _, place in outputs))
-        for kind, place, value in held:
-            if isinstance(kind, Array):
-                value[...] = np.ctypeslib.as_array(place)[tuple(slice(0, size) for size in value.shape)]
-        if outputs:
-            return [number for kind, place in outputs for number in _flat(kind, place)]
-        return [] if returned is None else _flat(self.function.result, returned)
 
 
 # ------------------------------------------------------------------ Python without Numba
@@ -163,49 +72,3 @@ def in_python(target: Any, known: dict[Any, Any] | None = None) -> Callable[...,
             names[name] = value
     names |= {"math": _MATH, "float": np.float64}
     return copy
-
-
-def flattened(value: Any) -> list[float]:
-    """Return the numbers of nested tuples."""
-    if isinstance(value, tuple):
-        return [number for item in value for number in flattened(item)]
-    return [] if value is None else [float(value)]
-
-
-class Vectors:
-    """Random and boundary values of a function's parameters."""
-
-    def __init__(self, seed: int, edges: float = 0.1) -> None:
-        self._random, self._edges = np.random.default_rng(seed), edges
-
-    def value(self, kind: Type) -> Any:
-        """Return a value: NumPy's floats, so that divisions by zero do not raise."""
-        if isinstance(kind, Record):
-            return kind.kind(*(self.value(inner) for inner in kind.fields.values()))
-        if isinstance(kind, Array):
-            return np.array([self.value(REAL) for _ in range(math.prod(map(int, kind.shape)))]).reshape(
-                kind.shape
-            )
-        if kind is INT:
-            return int(self._random.integers(-3, 4))
-        if kind is BOOL:
-            return bool(self._random.integers(0, 2))
-        if self._random.random() < self._edges:
-            return np.float64(self._random.choice(EDGES))
-        return np.float64(self._random.normal() * self._random.choice([1e-3, 1.0, 1.0, 30.0]))
-
-    def arguments(self, function: Function) -> list[Any]:
-        """Return arguments of a function."""
-        return [self.value(parameter.type) for parameter in function.parameters]
-
-
-def differences(c: CFunction, python: Callable[..., Any], vectors: Sequence[Sequence[Any]]) -> list[Any]:
-    """Return the vectors for which C and Python differ in a bit; a NaN equals any NaN."""
-    found = []
-    with np.errstate(all="ignore"):
-        for values in vectors:
-            wanted, made = np.array(flattened(python(*values))), np.array(c(*values))
-            equal = (wanted.view(np.int64) == made.view(np.int64)) | (np.isnan(wanted) & np.isnan(made))
-            if not equal.all():
-                found.append((values, wanted.tolist(), made.tolist()))
-    return found

@@ -11,12 +11,14 @@ import pytest
 from flightstack.control.attitude_controller import AttitudeController
 from flightstack.control.controller_loading import load_controller
 from flightstack.core.errors import ConfigError
+from flightstack.firmware.law_parity import differing_steps
 from flightstack.firmware.law_tree import firmware_for, generated_names, law_tree, write_tree
 from flightstack.firmware.sources import firmware_root, source_hash
 from gcs_cli.errors import CliError
 from gcs_cli.pil import pil_commands
 from tests.parity import generated_laws
 from tests.support.plugin_site import example_module
+from tests.support.tools import NIGHTLY
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -85,11 +87,32 @@ def test_generate_writes_firmware_and_names_the_laws_files(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr(pil_commands, "controller_named", lambda _: lqr)
+    monkeypatch.setattr(pil_commands, "differing_steps", lambda _: 0)
     pil_commands.run_generate("lqr", tmp_path / "out", as_json=True)
     told = json.loads(capsys.readouterr().out)
     assert told["files"] == ["lqr_controller.c", "lqr_controller.h"]
+    assert told["steps_differing"] == 0
     assert (tmp_path / "out" / "ports" / "f28377s" / "CMakeLists.txt").exists()
     monkeypatch.setattr(pil_commands, "controller_named", load_controller)
     with pytest.raises(CliError, match="--controller pid: the firmware has it already"):
         pil_commands.run_generate("pid", tmp_path / "other", as_json=False)
     shutil.rmtree(tmp_path / "out")
+
+
+def test_generate_fails_if_the_bits_differ(
+    lqr: AttitudeController, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pil_commands, "controller_named", lambda _: lqr)
+    monkeypatch.setattr(pil_commands, "differing_steps", lambda _: 3)
+    with pytest.raises(CliError, match="differ in 3 of 1000 steps"):
+        pil_commands.run_generate("lqr", tmp_path / "out", as_json=False)
+
+
+def test_memory_of_other_types_than_float_is_refused(lqr: AttitudeController) -> None:
+    with pytest.raises(ConfigError, match="field rates of IndiMemory is no float"):
+        law_tree(lqr._replace(memory_type=generated_laws.IndiMemory))
+
+
+@pytest.mark.skipif(not NIGHTLY, reason="compiles the law with Numba")
+def test_generated_step_has_the_bits_of_the_compiled_one(lqr: AttitudeController) -> None:
+    assert differing_steps(lqr) == 0

@@ -16,7 +16,7 @@ from flightstack.control.attitude_reference import (
 from flightstack.control.position_pid import PositionMemory, PositionParams, position_pid_step
 from flightstack.core import contract, geometry
 from flightstack.firmware.generator.text import fold, identifier, indented
-from flightstack.firmware.generator.types import record_name
+from flightstack.firmware.generator.types import REAL, Record, record_name
 from flightstack.firmware.generator.unit import Program, structure
 from flightstack.firmware.numbers import TargetNumber, declared, default_numbers, law_name
 
@@ -66,6 +66,8 @@ _STEP = (
 
 def core_files(controllers: Sequence[AttitudeController]) -> dict[str, str]:
     """Return the text of every generated file of ``core`` by name; raise OutsideSubsetError, ConfigError."""
+    for controller in controllers:
+        check_floats(controller)
     numbers = declared(controllers)
     check_names(numbers)
     program = law_program(controllers)
@@ -261,6 +263,14 @@ def _switch(signature: str, places: dict[int, str], prefix: str, otherwise: str)
     return "\n".join(
         [signature, "{", "    switch (index) {", *cases, f"    default: return {otherwise};", "    }", "}"]
     )
+
+
+def check_floats(controller: AttitudeController) -> None:
+    """Raise ValueError if memory or parameters of a controller have other fields than floats."""
+    for kind in (controller.memory_type, controller.params_type):
+        for field, inner in Record(kind).fields.items():
+            if inner is not REAL:
+                raise ValueError(f"field {field} of {kind.__name__} is no float")
 
 
 def check_names(numbers: Sequence[TargetNumber]) -> None:

@@ -176,13 +176,10 @@ def _output_names(node: ast.FunctionDef, result: Several) -> list[str]:
     """Return names of the results: those of the last return statement, else the types, else numbers."""
     count = len(result.items)
     made: list[str | None] = [None] * count
-    for inner in ast.walk(node):
-        if (
-            isinstance(inner, ast.Return)
-            and isinstance(inner.value, ast.Tuple)
-            and len(inner.value.elts) == count
-        ):
-            made = [element.id if isinstance(element, ast.Name) else None for element in inner.value.elts]
+    returns = [inner.value for inner in ast.walk(node) if isinstance(inner, ast.Return)]
+    for value in sorted((value for value in returns if value is not None), key=lambda value: value.lineno):
+        if isinstance(value, ast.Tuple) and len(value.elts) == count:
+            made = [element.id if isinstance(element, ast.Name) else None for element in value.elts]
     kinds = [
         snake_case(kind.kind.__name__) if isinstance(kind, Record) else "result" for kind in result.items
     ]

@@ -62,6 +62,7 @@ ADVICE: dict[str, str] = {
     "libm function": "use flightstack.core.portable_math, whose bits are the same on every processor",
     "function call": "call functions marked @compiled, NamedTuples, min, max, abs, float, int, and functions of math",
     "function without source": "define it in a file",
+    "two functions of one name": "rename one: their modules share a prefix in C",
     "recursion": "use a bounded loop",
     "arguments": "pass every argument of the function once",
     "method call": "use a function or an expression",

@@ -168,6 +168,7 @@ class Program:
         """Header of each record that is not declared by its unit."""
         self._functions: dict[Callable[..., Any], Function] = {}
         self._open: list[Callable[..., Any]] = []
+        self._public: dict[str, Callable[..., Any]] = {}
 
     def add(self, target: Any) -> Function:
         """Translate a function and all that it calls; raise OutsideSubsetError."""
@@ -191,6 +192,9 @@ class Program:
             translate(function, unit)
             self._open.pop()
             unit.functions.append(function)
+            if not function.is_private and self._public.setdefault(function.c_name, python) is not python:
+                detail = f"second function {function.name}"
+                raise function.refusal(function.node, "two functions of one name", detail)
             for kind in _types(function):
                 self._declare(kind, unit)
         self._functions[python] = function
