@@ -38,8 +38,8 @@ Functions marked `@compiled`, with annotations. Types come from annotations and 
 | `_private` function | `static` |
 | docstring, comments | comments, in ASCII; each function names its line of Python |
 
-Division by zero gives infinity or NaN, as in compiled Python. `math.floor` of NaN stays NaN. `int` of a float
-saturates at 2³¹ in C.
+Division by zero gives infinity or NaN, as in compiled Python. `math.floor` of NaN is NaN, and −2⁶³ in compiled
+Python. `int` of a float saturates at 2³¹ in C.
 
 ## Refused
 

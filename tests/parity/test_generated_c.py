@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from flightstack.control.attitude_pid import attitude_pid_step
 from flightstack.control.attitude_reference import attitude_reference_step, in_body_frame
 from flightstack.control.position_pid import position_pid_step
 from flightstack.core import geometry, portable_math
+from flightstack.core.compiled import compiled
 from flightstack.core.contract import Vector3, Wrench
 from flightstack.firmware.generator.call_c import CFunction, Vectors, differences
 from flightstack.firmware.generator.unit import Program
@@ -24,6 +26,7 @@ from tests.parity.generated_laws import LAWS
 from tests.support.generated_c import compile_program, in_python
 from tests.support.plugin_site import example_module
 from tests.support.rotor_sets import ring
+from tests.support.tools import NIGHTLY
 
 COUNT = 150
 OWN: dict[str, Callable[..., Any]] = {
@@ -47,6 +50,11 @@ OWN: dict[str, Callable[..., Any]] = {
 EVERY = {**OWN, **LAWS, "LQR": example_module().step}
 
 
+@compiled
+def whole_numbers(x: float, y: float) -> tuple[float, float, float, float]:
+    return math.floor(x) * 1.0, math.floor(x / y) + 0.5, float(int(y)), math.copysign(x, -y)
+
+
 class Built:
     """All laws in one library."""
 
@@ -55,6 +63,7 @@ class Built:
         self.functions = {name: program.add(law) for name, law in EVERY.items()}
         self.mix = program.add(mixing.mix)
         self.speed = program.add(mixing.relative_rotor_speed)
+        self.whole = program.add(whole_numbers)
         self.library = compile_program(program, folder)
 
 
@@ -95,3 +104,62 @@ def test_generated_mixer_has_pythons_bits(vehicle: str, built: Built) -> None:
             made = mix(wrench, rotors, speeds[1], work[1], rotors=n)
             assert np.array([wanted[0], *wanted[1]]).tobytes() == np.array(made).tobytes()
             assert speeds[0].tobytes() == speeds[1].tobytes()
+
+
+def test_whole_numbers_are_pythons(built: Built) -> None:
+    sizes = [
+        0.0,
+        -0.0,
+        0.3,
+        -0.3,
+        0.5,
+        -0.5,
+        1.0,
+        -1.0,
+        2.0**31 - 200.0,
+        1e9 + 0.5,
+        2.0**52 - 0.5,
+        -(2.0**52) + 0.5,
+    ]
+    samples = [
+        (np.float64(x), np.float64(y)) for x in [*sizes, 2.0**53, -1e300] for y in sizes if abs(y) < 2.0**31
+    ]
+    assert not differences(CFunction(built.library, built.whole), in_python(whole_numbers), samples)
+
+
+def test_functions_of_exponents_are_pythons_at_the_ends_of_their_range(built: Built) -> None:
+    random = np.random.default_rng(5)
+    samples = [
+        [np.float64(x)] for x in (*random.uniform(-746.0, 710.0, 400), *np.linspace(-745.2, -707.0, 200))
+    ]
+    exponential = CFunction(built.library, built.functions["exponential"])
+    assert not differences(exponential, in_python(portable_math.exp), samples)
+    numbers = [[np.float64(10.0**x)] for x in random.uniform(-323.0, 308.0, 400)]
+    logarithm = CFunction(built.library, built.functions["logarithm"])
+    assert not differences(
+        logarithm, in_python(portable_math.log), [*numbers, [np.float64(5e-324)], [np.float64(1.0)]]
+    )
+
+
+def test_difference_in_the_last_bit_is_found(built: Built) -> None:
+    distance = CFunction(built.library, built.functions["distance"])
+    python = in_python(portable_math.distance)
+    sample = [[np.float64(0.1), np.float64(0.2), np.float64(0.3)]]
+    assert not differences(distance, python, sample)
+    assert differences(distance, lambda *values: np.nextafter(python(*values), 9.0), sample)
+
+
+@pytest.mark.skipif(not NIGHTLY, reason="compiles each law with Numba")
+@pytest.mark.parametrize("name", [*LAWS, "LQR", "trajectory"])
+def test_generated_law_has_the_bits_of_numba(name: str, built: Built) -> None:
+    function = built.functions[name]
+    vectors = Vectors(9, edges=0.0 if name == "trajectory" else 0.02)  # compiled, math.floor of NaN is -2**63
+    samples = [vectors.arguments(function) for _ in range(500)]
+    assert not differences(CFunction(built.library, function), EVERY[name], samples)
+
+
+def test_generated_laws_compile_without_a_warning_in_float(tmp_path: Path) -> None:
+    program = Program()
+    for law in EVERY.values():
+        program.add(law)
+    compile_program(program, tmp_path, "float")

@@ -18,7 +18,7 @@ from flightstack.firmware.generator.unit import Program, write
 
 WARNINGS = (
     "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wconversion", "-Wshadow", "-Wstrict-prototypes",
-    "-Wmissing-prototypes", "-Wundef", "-Wvla", "-Wcast-qual", "-Wpointer-arith",
+    "-Wmissing-prototypes", "-Wundef", "-Wvla", "-Wcast-qual", "-Wpointer-arith", "-Wdouble-promotion",
 )  # fmt: skip
 
 
