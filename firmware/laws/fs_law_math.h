@@ -28,7 +28,7 @@
 
 static inline bool fs_is_nan(fs_real value)
 {
-    return !(value >= FS_LIT(0.0)) && !(value < FS_LIT(0.0));
+    return !(fs_abs(value) <= FS_INFINITY);
 }
 
 /* The largest whole number that is not above value; +0 for -0, as of Python's integers. */
@@ -117,13 +117,15 @@ static inline void fs_frexp(fs_real number, fs_real *mantissa, int32_t *power)
         exponent = -FS_LAW_DIGITS - 1;
     }
     for (step = (FS_LAW_EXPONENT + 1) / 2; step > 0; step /= 2) {
+        int32_t shift = 0;
         if (size >= fs_power_of_two(step)) {
-            size *= fs_power_of_two(-step);
-            exponent += step;
-        } else if (size < fs_power_of_two(1 - step)) {
-            size *= fs_power_of_two(step);
-            exponent -= step;
+            shift = step;
         }
+        if (size < fs_power_of_two(1 - step)) {
+            shift = -step;
+        }
+        size *= fs_power_of_two(-shift);
+        exponent += shift;
     }
     if (size < FS_LIT(1.0)) {
         size *= FS_LIT(2.0);

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import pytest
 
+from flightstack.firmware.generator.unit import Program, write
 from tests.firmware.static_support import (
     CPPCHECK,
     FAKE_DRIVERLIB,
@@ -19,6 +20,7 @@ from tests.firmware.static_support import (
     code_lines,
     run,
 )
+from tests.parity import generated_laws
 from tests.support.tools import missing
 
 CHECKED = (*PORTABLE, "ports/f28377s")
@@ -111,6 +113,26 @@ def test_no_listed_deviation_is_out_of_date(findings: list[Finding], deviations:
         for pattern in deviation.files:
             narrow = deviation._replace(files=[pattern])
             assert any(narrow.covers(finding) for finding in findings), (deviation.rule, pattern)
+
+
+LAWS_MAY = {
+    "8.7": "A public function of Python is public in C, also if one file uses it.",
+    "8.9": "A table of a module stands above the functions, as in Python.",
+}
+
+
+def test_generated_laws_of_users_have_no_other_findings(deviations: list[Deviation], tmp_path: Path) -> None:
+    program = Program()
+    for law in generated_laws.LAWS.values():
+        program.add(law)
+    folder = tmp_path / "laws"
+    write(program.written(), folder)
+    shutil.copy(FIRMWARE / "laws" / "fs_law_math.h", folder)
+    others = [f"--suppress=*:{path}/*" for path in (FIRMWARE / "core", CPPCHECK / "include")]
+    found = cppcheck(tmp_path, "--addon=misra", f"-I{folder}", f"-I{FIRMWARE / 'core'}", *others, folder)
+    assert len(found) > 50
+    own = [finding for finding in found if finding.rule.removeprefix(MISRA) not in LAWS_MAY]
+    assert [finding for finding in own if not any(d.covers(finding) for d in deviations)] == []
 
 
 def test_no_source_silences_cppcheck() -> None:

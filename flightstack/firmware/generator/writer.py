@@ -218,10 +218,7 @@ class Writer:
     def array(self, name: str, kind: Array, is_zero: bool) -> None:
         """Add the declaration of a local array."""
         sizes = "".join(f"[{c_size(size)}]" for size in kind.shape)
-        zero = "FS_LIT(0.0)"
-        for _ in kind.shape:
-            zero = f"{{{zero}}}"
-        self.line(f"fs_real {name}{sizes}{f' = {zero}' if is_zero else ''};")
+        self.line(f"fs_real {name}{sizes}{' = {0}' if is_zero else ''};")
 
     def remark(self, text: str, since: int) -> None:
         """Add a comment of the source to the line written since then, or above the lines."""
