@@ -22,7 +22,9 @@ from gcs_cli.pil import run as pil_run
 from gcs_cli.pil.flight_samples import read_samples
 from gcs_cli.pil.result import Flown
 from tests.support.commands import Ended, gcs
+from tests.support.plugin_site import install
 from tests.support.process import children_of
+from tests.support.tools import NIGHTLY
 
 LONG_S = 120.0  # a bound for a busy machine that compiles the kernels anew
 MISSIONS = Path(__file__).parents[2] / "missions"
@@ -86,6 +88,24 @@ def test_three_flights_are_flown_compared_and_reported(flown: Path) -> None:
     assert result["profile"]["unit"] == "ns"
     for name in ("pil.html", "mil/report.html", "sil/flight.ulg", "pil/pil-link.json"):
         assert (flown / name).stat().st_size > 0, name
+
+
+@emulation
+@pytest.mark.skipif(not NIGHTLY, reason="compiles a law for Numba, the host and the Cortex-M4F")
+def test_user_controller_flies_on_the_emulated_target(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    site = tmp_path / "site"
+    site.mkdir()
+    install(site)
+    monkeypatch.syspath_prepend(str(site))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(site), os.environ.get("PYTHONPATH", "")]))
+    done = fly(tmp_path / "out", "emulated", "--controller", "lqr", "--fail-over")
+    assert done.returncode == DONE, done.stdout + done.stderr
+    assert "C    of lqr: " in done.stdout
+    result = result_of(tmp_path / "out")
+    assert largest(result, "SIL–PIL") == 0.0
+    assert result["conditions"]["controller"] == "lqr"
 
 
 @emulation
