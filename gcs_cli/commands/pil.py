@@ -84,7 +84,7 @@ def generate(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Write the firmware with a controller of your own, as C for a board."""
+    """Write the firmware with your own controller as C."""
     from gcs_cli.pil.pil_commands import run_generate
 
     run_generate(controller, out, as_json)

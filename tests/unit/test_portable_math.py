@@ -127,6 +127,7 @@ NOT_FLIGHT = (
     "sim_bridge/render/",  # pictures
     "flightstack/services/telemetry/motion.py",  # what ground stations are shown
     "flightstack/core/geometry_bulk.py",  # reports
+    "flightstack/firmware/generator/",  # before a flight
     "flightstack/flight_log/poses_file.py",  # pictures
     "flightstack/testing/flight.py",  # figures of a flown flight
     "flightstack/testing/expectations.py",
