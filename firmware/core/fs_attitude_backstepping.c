@@ -16,7 +16,7 @@
  * attitude_backstepping.py:51
  */
 static fs_real axis(fs_real error, fs_real rate, fs_real rate_d, fs_real acceleration_d, fs_real c_outer,
-    fs_real c_inner)
+                    fs_real c_inner)
 {
     const fs_real e1 = error;
     const fs_real e2 = rate - rate_d - c_outer * e1;
@@ -25,7 +25,8 @@ static fs_real axis(fs_real error, fs_real rate, fs_real rate_d, fs_real acceler
 
 /* attitude_backstepping.py:64 */
 void fs_attitude_backstepping_step(const fs_backstepping_memory *memory, const fs_attitude_inputs *inputs,
-    const fs_backstepping_params *params, fs_real dt_s, fs_backstepping_memory *memory_out, fs_vector3 *torque_out)
+                                   const fs_backstepping_params *params, fs_real dt_s,
+                                   fs_backstepping_memory *memory_out, fs_vector3 *torque_out)
 {
     (void)dt_s;
     const fs_vector3 *error = &inputs->error_rad;

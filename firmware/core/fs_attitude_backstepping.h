@@ -14,6 +14,7 @@
  * attitude_backstepping.py:64
  */
 void fs_attitude_backstepping_step(const fs_backstepping_memory *memory, const fs_attitude_inputs *inputs,
-    const fs_backstepping_params *params, fs_real dt_s, fs_backstepping_memory *memory_out, fs_vector3 *torque_out);
+                                   const fs_backstepping_params *params, fs_real dt_s,
+                                   fs_backstepping_memory *memory_out, fs_vector3 *torque_out);
 
 #endif

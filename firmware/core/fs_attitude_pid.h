@@ -14,6 +14,6 @@ fs_real fs_integrated(fs_real integral, fs_real error, fs_real saturation, fs_re
  * attitude_pid.py:64
  */
 void fs_attitude_pid_step(const fs_pid_memory *memory, const fs_attitude_inputs *inputs, const fs_pid_params *params,
-    fs_real dt_s, fs_pid_memory *memory_out, fs_vector3 *torque_out);
+                          fs_real dt_s, fs_pid_memory *memory_out, fs_vector3 *torque_out);
 
 #endif

@@ -21,8 +21,8 @@ static fs_vector3 clipped(const fs_vector3 *v, fs_real limit)
 
 /* attitude_reference.py:61 */
 void fs_attitude_reference_step(const fs_reference_memory *memory, const fs_quaternion *target,
-    const fs_reference_params *params, fs_real dt_s, fs_reference_memory *advanced_out,
-    fs_attitude_reference *attitude_reference_out)
+                                const fs_reference_params *params, fs_real dt_s, fs_reference_memory *advanced_out,
+                                fs_attitude_reference *attitude_reference_out)
 {
     if (params->bandwidth_rad_s <= FS_LIT(0.0)) {
         const fs_vector3 zero = {FS_LIT(0.0), FS_LIT(0.0), FS_LIT(0.0)};

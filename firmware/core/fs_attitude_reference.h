@@ -19,8 +19,8 @@
  * attitude_reference.py:61
  */
 void fs_attitude_reference_step(const fs_reference_memory *memory, const fs_quaternion *target,
-    const fs_reference_params *params, fs_real dt_s, fs_reference_memory *advanced_out,
-    fs_attitude_reference *attitude_reference_out);
+                                const fs_reference_params *params, fs_real dt_s, fs_reference_memory *advanced_out,
+                                fs_attitude_reference *attitude_reference_out);
 
 /*
  * Rotate the reference's rates and acceleration from its own body frame to the vehicle's. attitude_reference.py:105

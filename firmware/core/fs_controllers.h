@@ -12,7 +12,7 @@ void fs_controllers_reset(fs_controller_memory *memory);
  * Return 0 if the next memory is not finite.
  */
 uint16_t fs_controllers_step(uint16_t controller, const fs_controller_memory *memory,
-    const fs_attitude_inputs *inputs, const fs_controller_params *params, fs_real dt_s,
-    fs_controller_memory *memory_out, fs_vector3 *torque_out);
+                             const fs_attitude_inputs *inputs, const fs_controller_params *params, fs_real dt_s,
+                             fs_controller_memory *memory_out, fs_vector3 *torque_out);
 
 #endif

@@ -79,9 +79,9 @@ static inline fs_quaternion fs_rotation_over(const fs_vector3 *rates, fs_real dt
     fs_real scale;
     if (square <= FS_SMALL_SQUARE) { /* Taylor's series of cosine and of sine by angle: no norm needed */
         const fs_real cosine = (square * (FS_LIT(1.0) / FS_LIT(40320.0)) - FS_LIT(1.0) / FS_LIT(720.0)) * square +
-            FS_LIT(1.0) / FS_LIT(24.0);
+                               FS_LIT(1.0) / FS_LIT(24.0);
         sine = ((square * (FS_LIT(1.0) / FS_LIT(362880.0)) - FS_LIT(1.0) / FS_LIT(5040.0)) * square +
-            FS_LIT(1.0) / FS_LIT(120.0)) * square - FS_LIT(1.0) / FS_LIT(6.0);
+                FS_LIT(1.0) / FS_LIT(120.0)) * square - FS_LIT(1.0) / FS_LIT(6.0);
         w = FS_LIT(1.0) - (FS_LIT(0.5) * square - square * (square * cosine));
         scale = half_dt + half_dt * (square * sine);
     } else {

@@ -58,7 +58,7 @@ static fs_real fit_thrust(const fs_real base[FS_MAX_ROTORS], fs_real thrust_n, c
 
 /* Return the largest k in [0, 1] for which low <= base + k*direction <= high holds for every rotor. mixer.py:153 */
 static fs_real largest_scale(const fs_real base[FS_MAX_ROTORS], const fs_real direction[FS_MAX_ROTORS],
-    const fs_real low[FS_MAX_ROTORS], const fs_real high[FS_MAX_ROTORS], int32_t rotors)
+                             const fs_real low[FS_MAX_ROTORS], const fs_real high[FS_MAX_ROTORS], int32_t rotors)
 {
     fs_real scale = FS_LIT(1.0);
     for (int32_t i = 0; i < rotors; i++) {
@@ -80,7 +80,7 @@ static fs_real signed_root(fs_real square)
 
 /* Mix for rotors that differ, or if effectiveness does not invert allocation. mixer.py:198 */
 static fs_wrench fit(const fs_wrench *wrench, const fs_mixer *mixer, fs_real rotor_speed_rad_s[FS_MAX_ROTORS],
-    fs_real work[3][FS_MAX_ROTORS])
+                     fs_real work[3][FS_MAX_ROTORS])
 {
     const int32_t n = mixer->rotors;
     fs_real *base = work[0];
@@ -122,7 +122,7 @@ static fs_wrench fit(const fs_wrench *wrench, const fs_mixer *mixer, fs_real rot
  * mixer.py:92
  */
 static void allocate(const fs_wrench *wrench, const fs_mixer *mixer, fs_real work[3][FS_MAX_ROTORS],
-    bool *is_free_out, bool *is_thrust_limited_out)
+                     bool *is_free_out, bool *is_thrust_limited_out)
 {
     fs_real *base = work[0];
     fs_real *turn = work[1];
@@ -154,7 +154,7 @@ static void allocate(const fs_wrench *wrench, const fs_mixer *mixer, fs_real wor
  * mixer.py:112
  */
 static void limit_even(fs_real thrust_n, const fs_mixer *mixer, fs_real work[3][FS_MAX_ROTORS], fs_real *scale_out,
-    fs_real *thrust_n_out)
+                       fs_real *thrust_n_out)
 {
     fs_real *base = work[0];
     fs_real *lift = work[2];
@@ -200,7 +200,7 @@ static fs_real largest_yaw_scale(const fs_mixer *mixer, fs_real work[3][FS_MAX_R
 
 /* mixer.py:223 */
 fs_wrench fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, fs_real rotor_speed_rad_s[FS_MAX_ROTORS],
-    fs_real work[3][FS_MAX_ROTORS])
+                 fs_real work[3][FS_MAX_ROTORS])
 {
     if (mixer->is_inverse == FS_LIT(0.0)) {
         return fit(wrench, mixer, rotor_speed_rad_s, work);
@@ -241,7 +241,7 @@ fs_wrench fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, fs_real rotor_s
 
 /* mixer.py:254 */
 fs_real fs_relative_rotor_speed(const fs_real rotor_speed_rad_s[FS_MAX_ROTORS], const fs_real spin[FS_MAX_ROTORS],
-    int32_t rotors)
+                                int32_t rotors)
 {
     fs_real total = FS_LIT(0.0);
     for (int32_t i = 0; i < rotors; i++) {

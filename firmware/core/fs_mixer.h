@@ -34,10 +34,10 @@ typedef struct {
  * mixer.py:223
  */
 fs_wrench fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, fs_real rotor_speed_rad_s[FS_MAX_ROTORS],
-    fs_real work[3][FS_MAX_ROTORS]);
+                 fs_real work[3][FS_MAX_ROTORS]);
 
 /* Return Omega_r of the paper: counter-clockwise minus clockwise rotor speeds [rad/s]. mixer.py:254 */
 fs_real fs_relative_rotor_speed(const fs_real rotor_speed_rad_s[FS_MAX_ROTORS], const fs_real spin[FS_MAX_ROTORS],
-    int32_t rotors);
+                                int32_t rotors);
 
 #endif

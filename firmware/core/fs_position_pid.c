@@ -10,7 +10,8 @@
 
 /* position_pid.py:56 */
 static void horizontal_demand(const fs_position_memory *memory, const fs_vehicle_state *state,
-    const fs_position_setpoint *setpoint, const fs_position_params *params, fs_real *north_out, fs_real *east_out)
+                              const fs_position_setpoint *setpoint, const fs_position_params *params,
+                              fs_real *north_out, fs_real *east_out)
 {
     const fs_vector3 *p = &state->position_ned_m;
     const fs_vector3 *v = &state->velocity_ned_m_s;
@@ -33,7 +34,7 @@ static void horizontal_demand(const fs_position_memory *memory, const fs_vehicle
  * position_pid.py:121
  */
 static fs_quaternion attitude_along(fs_real forward, fs_real right, fs_real upward, fs_real half_yaw_sine,
-    fs_real half_yaw_cosine)
+                                    fs_real half_yaw_cosine)
 {
     const fs_real level_square = forward * forward + upward * upward;
     const fs_real level = fs_sqrt(level_square);
@@ -58,7 +59,7 @@ static fs_quaternion attitude_along(fs_real forward, fs_real right, fs_real upwa
 
 /* position_pid.py:146 */
 static fs_attitude_target target_for(fs_real north, fs_real east, fs_real lift, fs_real yaw_rad,
-    const fs_vehicle_state *state, const fs_position_params *params)
+                                     const fs_vehicle_state *state, const fs_position_params *params)
 {
     const fs_real upward = fs_max(lift, FS_LIT(0.5) * params->gravity_m_s2);
     fs_real half_sine;
@@ -86,8 +87,8 @@ static fs_real bounded(fs_real value, fs_real limit)
 
 /* position_pid.py:72 */
 void fs_position_pid_step(const fs_position_memory *memory, const fs_vehicle_state *state,
-    const fs_position_setpoint *setpoint, const fs_position_params *params, fs_real dt_s, fs_real thrust_saturation,
-    fs_position_memory *memory_out, fs_attitude_target *target_out)
+                          const fs_position_setpoint *setpoint, const fs_position_params *params, fs_real dt_s,
+                          fs_real thrust_saturation, fs_position_memory *memory_out, fs_attitude_target *target_out)
 {
     fs_real north;
     fs_real east;
@@ -96,7 +97,7 @@ void fs_position_pid_step(const fs_position_memory *memory, const fs_vehicle_sta
     const fs_real vz = state->velocity_ned_m_s.z;
     const fs_real error_z = setpoint->position_ned_m.z - z;
     const fs_real down = setpoint->acceleration_ned_m_s2.z + params->kp_z * error_z +
-        params->kd_z * (setpoint->velocity_ned_m_s.z - vz) + memory->z;
+                         params->kd_z * (setpoint->velocity_ned_m_s.z - vz) + memory->z;
     fs_real lift = params->gravity_m_s2 - down; /* upward specific force */
     const fs_real most = params->max_thrust_n / params->mass_kg;
     const fs_real least = params->min_thrust_n / params->mass_kg;

@@ -21,7 +21,7 @@
  * position_pid.py:72
  */
 void fs_position_pid_step(const fs_position_memory *memory, const fs_vehicle_state *state,
-    const fs_position_setpoint *setpoint, const fs_position_params *params, fs_real dt_s, fs_real thrust_saturation,
-    fs_position_memory *memory_out, fs_attitude_target *target_out);
+                          const fs_position_setpoint *setpoint, const fs_position_params *params, fs_real dt_s,
+                          fs_real thrust_saturation, fs_position_memory *memory_out, fs_attitude_target *target_out);
 
 #endif

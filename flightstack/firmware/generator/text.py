@@ -28,6 +28,10 @@ RESERVED = frozenset(
 """Keywords of C and its compilers, and functions that compilers know."""
 
 
+_START = re.compile(r"(return |[^=;(]* [-+*/]?= )")
+"""Beginning of a statement, to the end of which an expression is aligned."""
+_FARTHEST = 64
+"""Column up to which lines are aligned."""
 _BREAKS = {",": 0, "&": 1, "|": 0, "?": 3, ":": 3, "+": 4, "-": 4, "*": 7, "/": 7, "=": 9}
 """Cost of a break after a sign."""
 
@@ -75,14 +79,22 @@ def comment(text: str, indent: str = "") -> list[str]:
 
 
 def fold(text: str, indent: str = "") -> list[str]:
-    """Return a statement in lines of at most ``WIDTH`` characters, broken at the outermost spaces."""
+    """Return a statement in lines of at most ``WIDTH`` characters; what is broken is aligned to its bracket."""
     lines, lead = [], indent
+    start = _START.match(text)
+    columns = [len(indent) + (start.end() if start else 4)]
     while len(lead) + len(text) > WIDTH:
         at = _break(text, WIDTH - len(lead))
         if at is None:
             break
         lines.append(lead + text[:at])
-        text, lead = text[at + 1 :], f"{indent}    "
+        for column, sign in enumerate(lines[-1][len(lead) :], start=len(lead) + 1):
+            if sign in "([{":
+                columns.append(column)
+            elif sign in ")]}":
+                columns.pop()
+        is_far = columns[-1] > _FARTHEST
+        text, lead = text[at + 1 :], " " * (len(indent) + 8 if is_far else columns[-1])
     return [*lines, lead + text]
 
 
