@@ -178,7 +178,7 @@ class MracParams(NamedTuple):
 
 
 STEPS = 4
-LEAKAGE = 1e-3
+LEAKAGE = np.float64(1e-3)
 
 
 @compiled

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,18 +13,26 @@ import pytest
 
 from flightstack.control import mixer as mixing
 from flightstack.control.attitude_backstepping import attitude_backstepping_step
+from flightstack.control.attitude_controller import AttitudeController
 from flightstack.control.attitude_pid import attitude_pid_step
 from flightstack.control.attitude_reference import attitude_reference_step, in_body_frame
 from flightstack.control.position_pid import position_pid_step
 from flightstack.core import geometry, portable_math
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import Vector3, Wrench
+from flightstack.firmware.build import EXACT
+from flightstack.firmware.c_loops import LoopsSetup
 from flightstack.firmware.generator.call_c import CFunction, Vectors, differences
 from flightstack.firmware.generator.unit import Program
+from flightstack.firmware.sources import firmware_root
+from flightstack.firmware.targets import make_loops
 from flightstack.guidance.trajectory import setpoint_of, trajectory_step
+from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
+from tests.firmware.core_support import run_tool
+from tests.parity import generated_laws as laws
 from tests.parity.generated_laws import LAWS
-from tests.support.generated_c import compile_program, in_python
+from tests.support.generated_c import WARNINGS, compile_program, in_python
 from tests.support.plugin_site import example_module
 from tests.support.rotor_sets import ring
 from tests.support.tools import NIGHTLY
@@ -163,3 +172,50 @@ def test_generated_laws_compile_without_a_warning_in_float(tmp_path: Path) -> No
     for law in EVERY.values():
         program.add(law)
     compile_program(program, tmp_path, "float")
+    if shutil.which("avr-gcc"):  # an int of 16 bits
+        root = firmware_root()
+        flags = [
+            "-mmcu=atmega1284p",
+            "-ffreestanding",
+            *EXACT,
+            *WARNINGS,
+            *(f"-I{root / n}" for n in ("core", "laws")),
+        ]
+        for source in sorted(tmp_path.glob("*.c")):
+            run_tool(["avr-gcc", *flags, "-c", source, "-o", tmp_path / "law.o"])
+
+
+def controller(name: str, values: tuple[float, ...], *parts: Any) -> AttitudeController:
+    """Return a controller of a law of ``generated_laws`` with these parameters."""
+    step, memory, params, initial = parts
+    return AttitudeController(name, step, memory, params, initial, lambda vehicle, gains: values)
+
+
+CONTROLLERS = [
+    controller("neural", (0.2,), laws.neural_step, laws.GeometricMemory, laws.NeuralParams, (0.0,)),
+    controller(
+        "sliding", (4.0, 3.0, 2.0, 0.1, 0.01, 0.01, 0.02), laws.sliding_mode_step, laws.SlidingMemory,
+        laws.SlidingParams, (0.0, 0.0, 0.0),
+    ),
+    controller("mrac", (10.0, 0.7, 0.5, 3.0), laws.mrac_step, laws.MracMemory, laws.MracParams, (0.0,) * 4),
+]  # fmt: skip
+
+
+@pytest.mark.skipif(not NIGHTLY, reason="compiles the firmware for the Cortex-M4F with each law")
+@pytest.mark.parametrize("law", CONTROLLERS, ids=lambda law: law.name)
+def test_generated_law_has_the_same_bits_on_the_emulated_target(law: AttitudeController) -> None:
+    setup = LoopsSetup(load_vehicle("x_quad"), law, open_gains("tuned"), 0.6, 500.0, 100.0, 5)
+    here, there = (make_loops(loops, setup) for loops in ("c", "emulated"))
+    rows, random = (np.zeros(48), np.zeros(48)), np.random.default_rng(1)
+    for loops in (here, there):
+        loops.reset(np.array([0.0] * 6 + [1.0] + [0.0] * 6))
+    for tick in range(600):
+        attitude = np.array([1.0, *random.normal(0.0, 0.1, 3)])
+        attitude /= np.linalg.norm(attitude)
+        state = np.concatenate([random.normal(size=6), attitude, random.normal(0.0, 0.5, 3)])
+        setpoint = random.normal(size=11)
+        for loops, row in zip((here, there), rows, strict=True):
+            loops.step(state, setpoint, np.zeros(8, np.float32), tick % 5 == 0, row)
+        assert rows[0].tobytes() == rows[1].tobytes(), tick
+    here.close()
+    there.close()

@@ -108,6 +108,7 @@ REFUSED = {
     "pass": "result",
     "x + 1.0\nreturn x": "statement",
     "return 99999999999 * x": "constant",
+    "return 1e39 * x": "constant",
     "b = np.zeros(n)\nreturn x": "array of unknown shape",
     "GAINS[0] = x\nreturn x": "assignment to an attribute",
     "return a + a": "array value",

@@ -20,6 +20,8 @@ from flightstack.firmware.generator.types import (
     Record,
     Several,
     Type,
+    c_size,
+    c_type,
     is_record,
 )
 from flightstack.firmware.generator.values import (
@@ -224,8 +226,6 @@ def _is_literal(node: ast.expr | None) -> bool:
 
 def c_prototype(function: Function, is_inline: bool = False) -> str:
     """Return the declaration of a function in C, without a semicolon."""
-    from flightstack.firmware.generator.types import c_size, c_type  # noqa: PLC0415
-
     parts = []
     for parameter in function.parameters:
         name, kind = identifier(parameter.name), parameter.type

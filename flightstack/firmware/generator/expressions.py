@@ -7,6 +7,7 @@ import math
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from flightstack.core.float32 import LARGEST_FLOAT32
 from flightstack.firmware.generator.calls import Calls
 from flightstack.firmware.generator.law import Function
 from flightstack.firmware.generator.subset import construct_of
@@ -109,6 +110,8 @@ class Expressions:
                 raise self.function.refusal(node, "constant", f"integer {value} beyond 32 bits")
             return int_literal(value)
         if isinstance(value, float):
+            if LARGEST_FLOAT32 < abs(value) < math.inf:
+                raise self.function.refusal(node, "constant", f"float {value} beyond 32 bits")
             return real_literal(value)
         raise self.function.refusal(node, construct_of(node))
 

@@ -22,7 +22,6 @@ from flightstack.firmware.generator.types import (
     Several,
     Type,
     annotated,
-    is_record,
     prefix_of,
 )
 
@@ -185,8 +184,3 @@ def _output_names(node: ast.FunctionDef, result: Several) -> list[str]:
     ]
     names = [identifier(name).strip("_") if name else kind for name, kind in zip(made, kinds, strict=True)]
     return [f"{name}_{at + 1}" if names.count(name) > 1 else name for at, name in enumerate(names)]
-
-
-def is_constructor(value: Any) -> bool:
-    """Return True for a NamedTuple class."""
-    return is_record(value)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ import numba
 from flightstack.core import portable_math
 from flightstack.firmware.generator.calls import c_prototype
 from flightstack.firmware.generator.law import Function, load, python_function
-from flightstack.firmware.generator.text import ascii_text, comment, fold, identifier, snake_case
+from flightstack.firmware.generator.text import comment, fold, identifier, snake_case
 from flightstack.firmware.generator.types import (
     Array,
     Record,
@@ -47,7 +48,7 @@ class Unit:
         self._tables: dict[str, list[str]] = {}
         self.static_names = frozenset(
             identifier(name.strip("_"))
-            for name, value in vars(__import__("sys").modules[module]).items()
+            for name, value in vars(sys.modules[module]).items()
             if name.startswith("_") and python_function(value) is not None
         )
 
@@ -125,7 +126,7 @@ class Unit:
         return "\n".join(parts)
 
     def _head(self) -> list[str]:
-        module = __import__("sys").modules[self.module]
+        module = sys.modules[self.module]
         title = (module.__doc__ or "").strip().partition("\n")[0]
         where = self.module.replace(".", "/") + ".py"
         return [f"/* {NOTICE} */", *comment(f"{title} {where}".strip())]
@@ -278,7 +279,7 @@ def _description(function: Function) -> list[str]:
 
 
 def _braced(values: Sequence[Any]) -> str:
-    inner = [f"FS_LIT({value!r})" if isinstance(value, float) else _braced(value) for value in values]
+    inner = [f"FS_LIT({float(value)!r})" if isinstance(value, float) else _braced(value) for value in values]
     return "{" + ", ".join(inner) + "}"
 
 
@@ -289,8 +290,3 @@ def write(units: Sequence[Unit], folder: Path) -> list[Path]:
         (folder / f"{unit.name}.h").write_text(unit.header(), encoding="ascii")
         (folder / f"{unit.name}.c").write_text(unit.source(), encoding="ascii")
     return [folder / f"{unit.name}.c" for unit in units]
-
-
-def plain(text: str) -> str:
-    """Return text in ASCII."""
-    return ascii_text(text)

@@ -66,7 +66,7 @@ def real_literal(value: float) -> Value:
         return Value(REAL, "FS_NAN", literal=value)
     if math.isinf(value):
         return Value(REAL, "FS_INFINITY" if value > 0.0 else "-FS_INFINITY", ATOM if value > 0.0 else UNARY)
-    return Value(REAL, f"FS_LIT({value!r})", literal=value)
+    return Value(REAL, f"FS_LIT({float(value)!r})", literal=float(value))  # a NumPy scalar has another repr
 
 
 def int_literal(value: int) -> Value:

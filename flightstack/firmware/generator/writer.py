@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from flightstack.firmware.generator.law import Function
 from flightstack.firmware.generator.text import WIDTH, comment, fold, identifier
-from flightstack.firmware.generator.types import REAL, Array, Record, Scalar, Type, c_size, c_type, has_rotors
+from flightstack.firmware.generator.types import Array, Record, Scalar, Type, c_size, c_type, has_rotors
 from flightstack.firmware.generator.usage import Path, Usage
 from flightstack.firmware.generator.values import Form, Value
 
@@ -253,8 +253,3 @@ def declaration(variable: Variable) -> str:
     """Return the declaration of a variable without a value."""
     assert isinstance(variable.type, Scalar | Record)
     return f"{c_type(variable.type)} {variable.name};"
-
-
-def is_scalar_real(kind: Type) -> bool:
-    """Return True for a float."""
-    return kind is REAL
