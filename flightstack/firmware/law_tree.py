@@ -7,6 +7,7 @@ The copy is a whole ``firmware`` folder, which also compiles for a board. Copies
 from __future__ import annotations
 
 import hashlib
+import os
 import shutil
 import subprocess
 import tempfile
@@ -102,19 +103,31 @@ def law_tree(controller: AttitudeController) -> Path:
     digest = hashlib.sha256(source_hash())
     for name, text in sorted(generated_files(controller).items()):
         digest.update(f"{name}\0{text}\0".encode())
-    base = cache_root() / "laws"
+    base = _laws_folder()
     place = base / f"{law_name(controller)}-{digest.hexdigest()[:16]}"
     if place.is_dir():
         return place
-    base.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=base, prefix=".") as fresh:
         made = write_tree(controller, Path(fresh) / "firmware")
-        if not place.is_dir():
+        try:
             made.rename(place)
+        except OSError:
+            if not place.is_dir():  # no other process has written it meanwhile
+                raise
     trees = [path for path in base.iterdir() if path.is_dir() and not path.name.startswith(".")]
     for old in sorted(trees, key=lambda path: path.stat().st_mtime, reverse=True)[_KEPT:]:
         shutil.rmtree(old, ignore_errors=True)
     return place
+
+
+def _laws_folder() -> Path:
+    """Return the folder of generated firmware; one of this process if the cache cannot be written."""
+    base = cache_root() / "laws"
+    try:
+        base.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return Path(tempfile.mkdtemp(prefix="flightstack-laws-"))
+    return base if os.access(base, os.W_OK) else Path(tempfile.mkdtemp(prefix="flightstack-laws-"))
 
 
 @contextmanager

@@ -46,6 +46,15 @@ def test_user_controller_gets_a_whole_firmware_once(lqr: AttitudeController) -> 
     assert (tree / "core" / "lqr_controller.c").stat().st_mtime_ns == stamp
 
 
+def test_without_a_cache_to_write_to_firmware_is_generated_for_this_process(
+    lqr: AttitudeController, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null")
+    tree = law_tree(lqr)
+    assert tree.parent.name.startswith("flightstack-laws-")
+    assert (tree / "core" / "lqr_controller.c").exists()
+
+
 def test_target_with_a_user_controller_has_a_source_hash_of_its_own(lqr: AttitudeController) -> None:
     before = source_hash()
     with firmware_for(lqr) as tree:
