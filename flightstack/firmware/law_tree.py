@@ -106,6 +106,7 @@ def law_tree(controller: AttitudeController) -> Path:
     base = _laws_folder()
     place = base / f"{law_name(controller)}-{digest.hexdigest()[:16]}"
     if place.is_dir():
+        os.utime(place)
         return place
     with tempfile.TemporaryDirectory(dir=base, prefix=".") as fresh:
         made = write_tree(controller, Path(fresh) / "firmware")
@@ -114,6 +115,7 @@ def law_tree(controller: AttitudeController) -> Path:
         except OSError:
             if not place.is_dir():  # no other process has written it meanwhile
                 raise
+    os.utime(place)  # the copy has the time of its source
     trees = [path for path in base.iterdir() if path.is_dir() and not path.name.startswith(".")]
     for old in sorted(trees, key=lambda path: path.stat().st_mtime, reverse=True)[_KEPT:]:
         shutil.rmtree(old, ignore_errors=True)

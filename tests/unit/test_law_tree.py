@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -69,6 +70,19 @@ def test_other_parameters_of_the_law_make_other_firmware(lqr: AttitudeController
         read_params=lambda vehicle, gains: lqr.read_params(vehicle, gains)._replace(angle_roll=1.0)
     )  # type: ignore[attr-defined]
     assert law_tree(other) != law_tree(lqr)
+
+
+def test_oldest_generated_firmware_is_removed(
+    lqr: AttitudeController, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from flightstack.firmware import law_tree as trees  # noqa: PLC0415
+
+    monkeypatch.setattr(trees, "_KEPT", 1)
+    first = law_tree(lqr)
+    os.utime(first, (1.0, 1.0))
+    second = law_tree(lqr._replace(name="other"))
+    assert second.is_dir()
+    assert not first.exists()
 
 
 def test_law_with_a_function_of_portable_math_brings_it_along(
