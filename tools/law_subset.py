@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+import importlib.util
+import sys
+
 from flightstack.firmware.generator.subset import ADVICE
+from flightstack.firmware.generator.unit import Program
+from tools.generated import ROOT
+
+EXAMPLE = ROOT / "examples" / "mission_tests" / "lqr_controller.py"
 
 HEAD = """\
 # C from a control law
@@ -57,4 +64,20 @@ gcs: --controller: lqr: has no C: lqr_controller.py:40: power: write `x * x`, or
 def subset_page(note: str) -> str:
     """Return the page."""
     rows = (f"| {construct} | {advice.replace('|', chr(92) + '|')} |" for construct, advice in ADVICE.items())
-    return HEAD.replace("{note}", note) + "\n".join(rows) + "\n"
+    link = "[the tutorial's LQR](../tutorials/controller.md)"
+    example = f"\n## Example\n\nThe step of {link}:\n\n```c\n{lqr_source()}```\n"
+    return HEAD.replace("{note}", note) + "\n".join(rows) + "\n" + example
+
+
+def lqr_source() -> str:
+    """Return the C of the example's controller."""
+    spec = importlib.util.spec_from_file_location("lqr_controller", EXAMPLE)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["lqr_controller"] = module
+    spec.loader.exec_module(module)
+    program = Program()
+    program.add(module.step)
+    (unit,) = (unit for unit in program.written() if unit.module == "lqr_controller")
+    return unit.source()
