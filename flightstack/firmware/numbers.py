@@ -217,5 +217,12 @@ def default_numbers(controllers: Sequence[AttitudeController] = CONTROLLERS) -> 
     tilt_rad = math.radians(SPECS[TILT].default)
     for controller in reversed(controllers):  # the first one is active
         gains = open_gains(DEFAULT_GAINS)
-        values |= target_numbers(vehicle, controller, gains, tilt_rad, DEFAULT_INNER_HZ, divisor)
+        try:
+            values |= target_numbers(vehicle, controller, gains, tilt_rad, DEFAULT_INNER_HZ, divisor)
+        except (
+            ConfigError
+        ):  # a user's controller may need its own table of a gains file; a flight sets every number
+            if controller in CONTROLLERS:
+                raise
+            values |= {number.name: 0.0 for number in _controller_numbers(controller)}
     return values

@@ -97,6 +97,12 @@ def test_law_with_a_function_of_portable_math_brings_it_along(
     assert (core / "fs_law_math.h").exists()
 
 
+def test_controller_that_needs_its_own_gains_file_starts_with_zeros(lqr: AttitudeController) -> None:
+    demanding = lqr._replace(read_params=lambda vehicle, gains: lqr.params_type(gains.number("k", 0.0, 1.0)))
+    text = (law_tree(demanding) / "core" / "fs_param_table.c").read_text()
+    assert '{"LQR_ANGLE_ROLL", FS_LIT(-1000000000000.0), FS_LIT(1000000000000.0), FS_LIT(0.0), 0U}' in text
+
+
 def test_law_outside_the_subset_is_refused_with_line_and_advice(lqr: AttitudeController) -> None:
     stranger = lqr._replace(step=example_module().lqr_gains)
     with pytest.raises(ConfigError, match=r"lqr: has no C: lqr_controller.py:\d+: power: write `x \* x`"):
