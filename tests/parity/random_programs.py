@@ -59,7 +59,7 @@ def _numbers(inner: st.SearchStrategy[str]) -> st.SearchStrategy[str]:
         return st.tuples(inner, inner).map(lambda pair: form.format(*pair))
 
     operators = st.sampled_from(
-        ["({} + {})", "({} - {})", "{} * ({})", "({}) / ({})", "{} - {} * HALF", "({} + {}) * x"]
+        ["({} + {})", "({} - {})", "{} * ({})", "({}) / float({})", "{} - {} * HALF", "({} + {}) * x"]
     )
     calls = [
         "max({}, {})",
@@ -110,6 +110,10 @@ _SIMPLE = [
     "w[2] -= {number}",
     "b = _fill(w, {number})",
     "x, y, a = v",
+    "v = v if flag and a > {number} else cross(v, pair.v)",
+    "a = cross(v, pair.v).x if flag else {number}",
+    "flag = flag or not cross(v, pair.v).y > {number}",
+    "pair = pair if -1.0 < {number} < b else Pair(a, b, cross(pair.v, v))",
 ]
 
 

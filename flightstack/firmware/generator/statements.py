@@ -34,9 +34,6 @@ class Statements:
     def run(self) -> None:
         """Translate the whole function."""
         writer, function = self.writer, self.function
-        for parameter in function.parameters:
-            if not writer.usage.loads.get(parameter.name):
-                writer.line(f"(void){identifier(parameter.name)};")
         body = function.node.body
         is_documented = ast.get_docstring(function.node) is not None
         if is_documented:

@@ -234,6 +234,10 @@ class Writer:
         """Return the folded lines; a variable that is never read is marked, for compilers that warn."""
         for name in sorted(self._taken):
             self._mark_unused(name)
+        whole = "\n".join(re.sub(r"/\*.*?\*/", "", text) for _, text in self.lines)
+        parameters = [identifier(parameter.name) for parameter in self.function.parameters]
+        unread = [name for name in parameters if not re.search(rf"(?<![.\w]){name}\b", whole)]
+        self.lines[:0] = [(1, f"(void){name};") for name in unread]
         return [folded for depth, text in self.lines for folded in fold(text, "    " * depth)]
 
     def _mark_unused(self, name: str) -> None:
