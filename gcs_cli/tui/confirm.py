@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from time import monotonic
 from typing import ClassVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
-from textual.events import Event
 from textual.screen import ModalScreen
 from textual.widgets import Button, Label
 
@@ -33,14 +31,6 @@ class Confirm(ModalScreen[bool]):
     def __init__(self, question: str, yes: str) -> None:
         super().__init__()
         self._question, self._yes = question, yes
-        self._shown_s: float | None = None
-
-    def is_answered_by(self, event: Event) -> bool:
-        """True if the user saw the question before this input."""
-        return self._shown_s is not None and event.time > self._shown_s
-
-    def _note_shown(self) -> None:
-        self._shown_s = monotonic()
 
     def compose(self) -> ComposeResult:
         """Yield the question and the buttons."""
@@ -52,7 +42,6 @@ class Confirm(ModalScreen[bool]):
 
     def on_mount(self) -> None:
         """Select the harmless answer."""
-        self.call_after_refresh(self._note_shown)
         self.set_focus(self.query_one("#no"))
 
     def on_button_pressed(self, event: Button.Pressed) -> None:

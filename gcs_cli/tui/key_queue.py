@@ -22,7 +22,7 @@ UserEvent: TypeAlias = InputEvent | Paste
 
 
 class KeyQueue:
-    """Keeps each event until the effect of the one before; a question takes no event from before it was drawn.
+    """Keeps each event until the effect of the one before; a question takes no event from before it was there.
 
     Textual gives a key to the widget that has the focus when the key arrives, and calls the bindings later. So keys
     that follow ``/`` closely would not reach the search field that it opens: they would command the vehicle.
@@ -31,18 +31,24 @@ class KeyQueue:
     def __init__(self, app: App[Any], handle: Callable[[UserEvent], Awaitable[None]]) -> None:
         self._app = app
         self._handle = handle
-        self._events: asyncio.Queue[UserEvent] = asyncio.Queue()
+        self._events: asyncio.Queue[tuple[UserEvent, DOMNode | None]] = asyncio.Queue()
 
     def put(self, event: UserEvent) -> None:
         """Handle ``event`` after the former ones."""
-        self._events.put_nowait(event)
+        self._events.put_nowait((event, self._screen))
+
+    @property
+    def _screen(self) -> DOMNode | None:
+        """The screen in front, once it is mounted."""
+        screen = self._app.screen if self._app.screen_stack else None
+        return screen if screen is not None and screen.is_mounted else None
 
     async def run(self) -> None:
         """Handle events until cancelled."""
         while True:
-            event = await self._events.get()
+            event, seen = await self._events.get()
             screen = self._app.screen if self._app.screen_stack else None
-            if isinstance(screen, Confirm) and not screen.is_answered_by(event):
+            if isinstance(screen, Confirm) and screen is not seen:
                 continue
             await self._handle(event)
             if isinstance(event, Key | Paste | MouseUp):

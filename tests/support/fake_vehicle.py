@@ -304,20 +304,20 @@ class FakeVehicle:
 
 @contextmanager
 def serve(vehicle: FakeVehicle, to_port: int | None = None) -> Iterator[UdpSocket]:
-    """Run ``vehicle`` on a free UDP port in a thread. If ``to_port`` is given, the vehicle sends to it first."""
+    """Run ``vehicle`` on a free UDP port in a thread; it sends to all that it has heard, and to ``to_port``."""
     socket = UdpSocket("127.0.0.1")
     vehicle.make_heartbeat_due()
     stopped = threading.Event()
 
     def run() -> None:
-        peer = None if to_port is None else ("127.0.0.1", to_port)
+        peers = set() if to_port is None else {("127.0.0.1", to_port)}
         while not stopped.is_set():
             socket.wait(STEP_S)
             for data, sender in socket.receive():
-                peer = sender
+                peers.add(sender)
                 vehicle.receive(data, time.monotonic())
-            if peer is not None:
-                for frame in vehicle.poll(time.monotonic()):
+            for frame in vehicle.poll(time.monotonic()) if peers else ():
+                for peer in peers:
                     socket.send(frame, peer)
 
     thread = threading.Thread(target=run)
