@@ -60,8 +60,12 @@ EVERY = {**OWN, **LAWS, "LQR": example_module().step}
 
 
 @compiled
-def whole_numbers(x: float, y: float) -> tuple[float, float, float, float]:
-    return math.floor(x) * 1.0, math.floor(x / y) + 0.5, float(int(y)), math.copysign(x, -y)
+def whole_numbers(x: float, y: float) -> tuple[float, float, float, float, float]:
+    below = math.floor(min(max(x, -9.0), 9.0))
+    product = below * -2
+    product *= math.floor(0.5)
+    signed = float(-below) if y > 0.0 else float(product)
+    return math.floor(x) * 1.0, math.floor(x / y) + 0.5, float(int(y)), math.copysign(x, -y), signed
 
 
 class Built:

@@ -11,7 +11,17 @@ from flightstack.firmware.generator.expressions import Expressions
 from flightstack.firmware.generator.law import Function, python_function
 from flightstack.firmware.generator.subset import construct_of
 from flightstack.firmware.generator.text import identifier
-from flightstack.firmware.generator.types import INT, NOTHING, REAL, Array, Record, Several, c_type, is_record
+from flightstack.firmware.generator.types import (
+    INT,
+    NOTHING,
+    REAL,
+    WHOLE,
+    Array,
+    Record,
+    Several,
+    c_type,
+    is_record,
+)
 from flightstack.firmware.generator.values import PRODUCT, SUM, Form, Value, as_real
 from flightstack.firmware.generator.writer import Variable, Writer, declaration
 
@@ -153,7 +163,8 @@ class Assignments:
                 raise self.function.refusal(target, "array value")
             self.writer.write_to(target, place)
             self.writer.store(
-                f"{place.text} = ", as_real(value) if value.type is INT else self._real(target, value)
+                f"{place.text} = ",
+                as_real(value) if value.type in (INT, WHOLE) else self._real(target, value),
             )
             return
         if not isinstance(target, ast.Name):
@@ -211,8 +222,8 @@ class Assignments:
                 return False
         else:
             self.writer.write_to(target, old)
-        number = as_real(value) if made.type is REAL else value
-        self.writer.line(
-            f"{old.text if not isinstance(target, ast.Name) else variable.name} {known[0]}= {number.text};"
-        )
+        place = variable.name if isinstance(target, ast.Name) else old.text
+        number = value if made.type is INT else as_real(value)
+        is_product = made.type is WHOLE and known[0] == "*"  # which has a sum behind it
+        self.writer.line(f"{place} = {made.text};" if is_product else f"{place} {known[0]}= {number.text};")
         return False

@@ -16,6 +16,7 @@ from flightstack.firmware.generator.types import (
     INT,
     NOTHING,
     REAL,
+    WHOLE,
     Array,
     Record,
     Several,
@@ -153,7 +154,7 @@ class Calls:
 
     def converted(self, node: ast.AST, value: Value, kind: Type) -> Value:
         """Return ``value`` as a parameter, field or result of type ``kind``; only exact types are accepted."""
-        if kind is REAL and value.type is INT:
+        if kind is REAL and value.type in (INT, WHOLE):
             raise self.function.refusal(node, "integer for a float")
         if isinstance(kind, Array) and isinstance(value.type, Array):
             if kind.shape != value.type.shape and ("",) not in (kind.shape, value.type.shape):
@@ -172,7 +173,8 @@ class Calls:
             return self._least_or_most(node, _MIN_MAX[target])
         if target in _MATH and len(node.args) == _MATH[target][1]:
             values = [as_real(self.expressions.number(argument)).text for argument in node.args]
-            return Value(REAL, f"{_MATH[target][0]}({', '.join(values)})")
+            kind = WHOLE if target is math.floor else REAL
+            return Value(kind, f"{_MATH[target][0]}({', '.join(values)})")
         if target in _TESTS and len(node.args) == 1:
             return Value(BOOL, f"{_TESTS[target]}({as_real(self.expressions.number(node.args[0])).text})")
         if target is math.ldexp and len(node.args) == 2:
@@ -199,15 +201,15 @@ class Calls:
         value = self.expressions.value(argument)
         if target is len and isinstance(value.type, Array):
             return self.expressions.size(node, value.type.shape[0])
-        if target is abs and value.type is REAL:
-            return Value(REAL, f"fs_abs({value.text})")
+        if target is abs and value.type in (REAL, WHOLE):
+            return Value(value.type, f"fs_abs({value.text})")
         if target is float and value.type is BOOL:
             return Value(REAL, f"{value.within(CHOICE + 1)} ? FS_LIT(1.0) : FS_LIT(0.0)", CHOICE)
-        if target is float and value.type in (REAL, INT):
+        if target is float and value.type in (REAL, INT, WHOLE):
             return real_literal(float(value.literal)) if value.literal is not None else as_real(value)
         if target is int and value.type is BOOL:
             return Value(INT, f"{value.within(CHOICE + 1)} ? 1 : 0", CHOICE)
-        if target is int and value.type is REAL:
+        if target is int and value.type in (REAL, WHOLE):
             return Value(INT, f"fs_to_int({value.text})")
         if (target is int and value.type is INT) or (target is bool and value.type is BOOL):
             return value

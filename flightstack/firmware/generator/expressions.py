@@ -12,7 +12,17 @@ from flightstack.firmware.generator.calls import Calls
 from flightstack.firmware.generator.law import Function
 from flightstack.firmware.generator.subset import construct_of
 from flightstack.firmware.generator.text import identifier
-from flightstack.firmware.generator.types import BOOL, INT, NOTHING, REAL, ROTORS, Array, Record, c_type
+from flightstack.firmware.generator.types import (
+    BOOL,
+    INT,
+    NOTHING,
+    REAL,
+    ROTORS,
+    WHOLE,
+    Array,
+    Record,
+    c_type,
+)
 from flightstack.firmware.generator.values import (
     AND,
     ATOM,
@@ -26,6 +36,7 @@ from flightstack.firmware.generator.values import (
     Form,
     Value,
     as_real,
+    as_whole,
     bool_literal,
     field_of,
     int_literal,
@@ -44,6 +55,7 @@ _COMPARISONS = {
     ast.Eq: ("==", EQUAL),
     ast.NotEq: ("!=", EQUAL),
 }
+NUMBERS = {REAL, INT, WHOLE}
 _LARGEST_INT = 2**31 - 1
 MISSING = object()
 
@@ -70,7 +82,7 @@ class Expressions:
             raise self.function.refusal(node, "arithmetic with a bool")
         if isinstance(value.type, Array):
             raise self.function.refusal(node, "array value")
-        if value.type not in (REAL, INT):
+        if value.type not in NUMBERS:
             raise self.function.refusal(node, "values of different types")
         return value
 
@@ -206,6 +218,8 @@ class Expressions:
             return real_literal(-float(operand.literal))
         if operand.type is INT and isinstance(operand.literal, int):
             return int_literal(-operand.literal)
+        if operand.type is WHOLE:
+            return Value(WHOLE, f"FS_LIT(0.0) - {operand.within(PRODUCT)}", SUM)
         text = operand.within(UNARY)
         return Value(operand.type, f"-({text})" if text[0] == "-" else f"-{text}", UNARY)
 
@@ -221,7 +235,12 @@ class Expressions:
         sign, rank = operator
         if sign == "/" or REAL in (left.type, right.type):
             left, right = as_real(left), as_real(right)
-        return Value(left.type, f"{left.within(rank)} {sign} {right.within(rank + 1)}", rank)
+        elif WHOLE in (left.type, right.type):
+            left, right = as_whole(left), as_whole(right)
+        text = f"{left.within(rank)} {sign} {right.within(rank + 1)}"
+        if left.type is WHOLE and sign == "*":  # an integer has no negative zero
+            return Value(WHOLE, f"{text} + FS_LIT(0.0)", SUM)
+        return Value(left.type, text, rank)
 
     def _boolop(self, node: ast.BoolOp) -> Value:
         is_and = isinstance(node.op, ast.And)
@@ -255,9 +274,9 @@ class Expressions:
     def _comparison(self, node: ast.AST, known: tuple[str, int], left: Value, right: Value) -> Value:
         sign, rank = known
         kinds = {left.type, right.type}
-        if kinds == {REAL, INT}:
+        if len(kinds) > 1 and kinds <= NUMBERS:
             left, right = as_real(left), as_real(right)
-        elif len(kinds) > 1 or not kinds <= {REAL, INT, BOOL} or (BOOL in kinds and rank == ORDER):
+        elif len(kinds) > 1 or not kinds <= NUMBERS | {BOOL} or (BOOL in kinds and rank == ORDER):
             raise self.function.refusal(node, "values of different types", "comparison of different types")
         return Value(BOOL, f"{left.within(ORDER + 1)} {sign} {right.within(ORDER + 1)}", rank)
 
@@ -267,8 +286,9 @@ class Expressions:
             yes = self.value(node.body)
         with self.writer.aside() as no_lines:
             no = self.value(node.orelse)
-        if {yes.type, no.type} == {REAL, INT}:
-            yes, no = as_real(yes), as_real(no)
+        if yes.type != no.type and {yes.type, no.type} <= NUMBERS:
+            change = as_real if REAL in (yes.type, no.type) else as_whole
+            yes, no = change(yes), change(no)
         if yes.type != no.type or yes.type is NOTHING or isinstance(yes.type, Array):
             raise self.function.refusal(node, "values of different types")
         if isinstance(yes.type, Record) or yes_lines or no_lines:

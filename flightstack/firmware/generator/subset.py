@@ -51,7 +51,7 @@ ADVICE: dict[str, str] = {
     "truth of a number": "compare it: `x != 0.0`",
     "arithmetic with a bool": "convert it: `float(flag)` or `int(flag)`",
     "number as a flag": "compare it: `x > 0.0`",
-    "integer for a float": "write a decimal point: `1.0`",
+    "integer for a float": "write a decimal point, `1.0`, or convert it: `float(i)`",
     "values of different types": "give both the same type",
     "type of a variable": "use one type for a name in the whole function",
     "variable without a value": "assign it before the `if` or the loop",

@@ -24,10 +24,12 @@ class Scalar(enum.Enum):
     REAL = "fs_real"
     INT = "int32_t"
     BOOL = "bool"
+    WHOLE = "whole"
+    """An integer that C keeps as ``fs_real``, of ``math.floor``: it has no negative zero."""
     NOTHING = "void"
 
 
-REAL, INT, BOOL, NOTHING = Scalar.REAL, Scalar.INT, Scalar.BOOL, Scalar.NOTHING
+REAL, INT, BOOL, WHOLE, NOTHING = Scalar.REAL, Scalar.INT, Scalar.BOOL, Scalar.WHOLE, Scalar.NOTHING
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,8 @@ def record_name(kind: type) -> str:
 
 def c_type(kind: Type) -> str:
     """Return the C type of a number or a record."""
+    if kind is WHOLE:
+        return REAL.value
     return record_name(kind.kind) if isinstance(kind, Record) else kind.value  # type: ignore[union-attr]
 
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from flightstack.firmware.generator.types import BOOL, INT, REAL, Record, Type
+from flightstack.firmware.generator.types import BOOL, INT, REAL, WHOLE, Record, Type
 
 
 class Form(Enum):
@@ -81,11 +81,16 @@ def bool_literal(value: bool) -> Value:
 
 def as_real(value: Value) -> Value:
     """Return an integer as a float; a float unchanged."""
-    if value.type is REAL:
-        return value
+    if value.type in (REAL, WHOLE):
+        return replace(value, type=REAL)
     if isinstance(value.literal, int):
         return real_literal(float(value.literal))
     return replace(value, type=REAL, text=f"(fs_real){value.within(UNARY)}", rank=UNARY, literal=None)
+
+
+def as_whole(value: Value) -> Value:
+    """Return an integer as C keeps those of ``math.floor``."""
+    return replace(as_real(value), type=WHOLE)
 
 
 def field_of(record: Value, name: str, kind: Type) -> Value:
