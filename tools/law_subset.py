@@ -46,7 +46,7 @@ Functions marked `@compiled`, with annotations. Types come from annotations and 
 | docstring, comments | comments, in ASCII; each function names its line of Python |
 
 Division by zero gives infinity or NaN, as in compiled Python. `math.floor` of NaN is NaN, and −2⁶³ in compiled
-Python. `int` of a float saturates at 2³¹ in C.
+Python. `int` of a float saturates at 2³¹ in C. The sign of a NaN, which `copysign` reads, depends on the processor.
 
 ## Refused
 

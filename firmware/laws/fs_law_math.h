@@ -10,20 +10,22 @@
 
 #ifdef FS_DOUBLE
 #define FS_INFINITY __builtin_inf()
+#define FS_NAN __builtin_nan("")
 #define FS_LAW_WHOLE 4503599627370496.0 /* 2^52: from here on every number is whole */
 #define FS_LAW_EXPONENT 1023
 #define FS_LAW_DIGITS 53
 #else
 #if defined(__GNUC__)
 #define FS_INFINITY __builtin_inff()
+#define FS_NAN __builtin_nanf("")
 #else
 #define FS_INFINITY INFINITY
+#define FS_NAN NAN
 #endif
 #define FS_LAW_WHOLE 8388608.0F /* 2^23 */
 #define FS_LAW_EXPONENT 127
 #define FS_LAW_DIGITS 24
 #endif
-#define FS_NAN (FS_INFINITY - FS_INFINITY)
 #define FS_LAW_INT FS_LIT(2147483520.0) /* below 2^31, and a float */
 
 static inline bool fs_is_nan(fs_real value)

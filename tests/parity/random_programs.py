@@ -65,12 +65,12 @@ def _numbers(inner: st.SearchStrategy[str]) -> st.SearchStrategy[str]:
         "max({}, {})",
         "min({}, {}, a)",
         "atan2({}, {})",
-        "math.copysign({}, {})",
+        "math.copysign({}, max(-9.0, {}))",
         "cross(v, Vector3(1.0, {}, {})).x",
     ]
     choice = st.tuples(inner, conditions(inner), inner).map(lambda parts: "({} if {} else {})".format(*parts))
     one = st.sampled_from(
-        ["-({})", "abs({})", "math.sqrt(abs({}))", "math.floor(min(max({}, -9.0), 9.0))", "+({})"]
+        ["-({})", "abs({})", "math.sqrt(abs({}))", "math.floor(min(max(float({}), -9.0), 9.0))", "+({})"]
     )
     return st.one_of(
         operators.flatmap(two),
