@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import pytest
@@ -18,7 +17,6 @@ from gcs_cli.tui.app import WatchApp
 from gcs_cli.tui.confirm import Confirm
 from gcs_cli.tui.entry_form import EntryForm
 from gcs_cli.tui.item_form import item_entries, item_of_texts
-from gcs_cli.tui.map_scene import Place
 from gcs_cli.tui.mission_draft import MissionDraft
 from gcs_cli.tui.mission_rows import (
     Progress,
@@ -26,33 +24,17 @@ from gcs_cli.tui.mission_rows import (
     mission_columns,
     mission_progress,
     mission_row,
-    mission_table,
     summary,
     to_go,
 )
-from gcs_cli.tui.mission_screen import MissionScreen
 from gcs_cli.tui.palette import DARK
-from gcs_cli.vehicle.view_types import GeoPosition, Identity, Mission
-from tests.support.map_views import HOME, VIEW, item
+from gcs_cli.vehicle.view_types import Identity
+from tests.support.map_views import item
+from tests.support.mission_stories import FLYING, ITEMS, TABLE, answer, drive, said
 from tests.support.pictures import check_picture
 from tests.support.pilots import run_story
 from tests.support.screens import shown
 from tests.support.still_feed import StillFeed
-
-ITEMS = (
-    item(Command.NAV_TAKEOFF),
-    item(Command.NAV_WAYPOINT, Place(20.0, 0.0), param1=2.0),
-    item(Command.DO_CHANGE_SPEED, param1=1.0, param2=2.0),
-    item(Command.NAV_WAYPOINT, Place(20.0, 30.0)),
-    item(Command.NAV_RETURN_TO_LAUNCH),
-)
-TABLE = mission_table(Plan(ITEMS), HOME)
-FLYING = VIEW._replace(
-    armed=True,
-    home=GeoPosition(*HOME[:3], 0.0),
-    geo=GeoPosition(*HOME[:2], HOME.altitude_m + 10.0, 10.0),
-    mission=Mission(current=1, total=5, reached=0),
-)
 
 
 def test_distance_to_go_is_from_the_vehicle_in_flight_and_from_the_start_before():
@@ -145,38 +127,6 @@ def test_item_form_names_the_field_that_is_not_valid(index, text, reason):
     texts[index] = text
     with pytest.raises(ValueError, match=reason):
         item_of_texts(ITEMS[1], texts)
-
-
-def answer(app: WatchApp, value: object) -> None:
-    future = app.feed.jobs[-1][1]
-    if isinstance(value, Exception):
-        future.set_exception(value)
-    else:
-        future.set_result(value)
-
-
-def said(app: WatchApp) -> list[str]:
-    return [entry.text for entry in app.feed.messages.since(0)]
-
-
-def drive(
-    story: Callable[[Pilot[None], WatchApp, MissionScreen], Awaitable[None]], size=(80, 24), view=FLYING
-) -> None:
-    app = WatchApp(StillFeed(view))
-
-    async def begin(pilot: Pilot[None]) -> None:
-        await pilot.press("3")
-        await pilot.pause()
-        screen = app.screen
-        assert isinstance(screen, MissionScreen)
-        for items in (ITEMS, (), ()):
-            screen.show(view, 10.0)
-            answer(app, items)
-        screen.show(view, 10.0)
-        await pilot.pause()
-        await story(pilot, app, screen)
-
-    run_story(app, begin, size=size)
 
 
 @pytest.mark.parametrize("size", [(80, 24), (120, 35), (200, 50)], ids=str)

@@ -96,7 +96,7 @@ class Terminal:
 
     def resize(self, width: int, height: int) -> None:
         """Change the size of the window."""
-        self._call("refresh-client", "-C", f"{width}x{height}")
+        self._call("resize-window", "-x", width, "-y", height)
 
     def wait_for_end(self) -> None:
         """Wait until the program has ended."""
