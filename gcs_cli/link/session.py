@@ -70,7 +70,7 @@ class Session:
         self._monitor = LinkMonitor(lambda: self.view.link)
         self._background: list[Service] = [self._monitor] if monitors else []
         self._heartbeat_due_s = 0.0
-        self._heartbeat_due_vehicle_s = math.inf
+        self._heartbeat_due_vehicle_s = -math.inf  # as soon as the vehicle's time is known
 
     @property
     def own(self) -> Component:
@@ -191,13 +191,17 @@ class Session:
 
     def heartbeat_is_due(self, now_s: float) -> bool:
         """Return True if the next ``poll`` sends a heartbeat."""
-        return now_s >= self._heartbeat_due_s or (self.view.time_s or 0.0) >= self._heartbeat_due_vehicle_s
+        vehicle_s = self.view.time_s
+        return now_s >= self._heartbeat_due_s or (
+            vehicle_s is not None and vehicle_s >= self._heartbeat_due_vehicle_s
+        )
 
     def skip_heartbeat(self, now_s: float) -> None:
         """Send the next heartbeat one period from now: the peer just got one."""
         self._heartbeat_due_s = now_s + HEARTBEAT_PERIOD_S
         vehicle_s = self.view.time_s
-        self._heartbeat_due_vehicle_s = math.inf if vehicle_s is None else vehicle_s + HEARTBEAT_PERIOD_S
+        if vehicle_s is not None:
+            self._heartbeat_due_vehicle_s = vehicle_s + HEARTBEAT_PERIOD_S
 
     def next_deadline(self) -> float | None:
         """Return the time at which to call ``poll`` at the latest; None without a vehicle."""

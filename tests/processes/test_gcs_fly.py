@@ -102,9 +102,12 @@ def text_lines(printed: str) -> list[str]:
     return [line for line in printed.splitlines() if re.match(r"\d+:\d\d\.\d  [A-Z]+: ", line)]
 
 
-def test_equal_flights_print_equal_times_of_texts(tmp_path: Path) -> None:
+def test_equal_flights_print_equal_texts_and_log_equal_bytes(tmp_path: Path) -> None:
     one, other = (text_lines(run(tmp_path / name).stdout) for name in ("one", "other"))
     assert one == other
+    assert not [line for line in one if "WARN" in line]
+    logs = [(tmp_path / name / "flight.ulg").read_bytes() for name in ("one", "other")]
+    assert logs[0] == logs[1]
     logged = [
         f"{clock_text(round(text.time_s, 6))}  {SEVERITIES[text.level]}: {text.text}"
         for text in read_flight(tmp_path / "one" / "flight.ulg").texts

@@ -59,6 +59,21 @@ def test_heartbeats_follow_vehicle_time_when_it_is_faster_than_real_time() -> No
     assert not heartbeats(session.poll(0.03))
 
 
+def test_heartbeats_follow_vehicle_time_that_is_known_after_the_first() -> None:
+    """A fast flight may be over before the next second of real time."""
+    session, vehicle = Session(), FakeVehicle()
+    alone = [frame for frame in vehicle.poll(0.0) if heartbeats([frame])]
+    session.receive(alone[0], HERE, 0.0)
+    assert session.view.time_s is None
+    assert len(heartbeats(session.poll(0.0))) == 1
+    sent = []
+    for step, time_s in enumerate((0.5, 0.9, 1.4, 1.5)):
+        message = mavlink.MAVLink_system_time_message(0, round(time_s * 1000))
+        session.receive(Link(1, 1).encode(message), HERE, 0.01 * step)
+        sent += [time_s for _ in heartbeats(session.poll(0.01 * step))]
+    assert sent == [0.5, 1.5]
+
+
 def test_a_given_peer_is_spoken_to_first() -> None:
     session = Session(peer=HERE)
     assert len(heartbeats(session.poll(0.0))) == 1
