@@ -195,7 +195,7 @@ def test_two_browsers_show_the_view_and_command_the_vehicle(tmp_path: Path) -> N
             await one.type("A")
             await one.wait_for_frame("The rotors start")
             await one.type("y")
-            await two.wait_for_frame(" ARMED ")
+            await one.wait_for_frame(" ARMED ")
             await two.wait_for_frame("in air")
             assert vehicle.armed
             await two.type("D")
