@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Literal
 from textual import work
 from textual.app import App, SystemCommand
 from textual.binding import Binding
-from textual.events import Event, InputEvent, Paste
+from textual.events import Event, InputEvent, Paste, Resize
 from textual.screen import Screen
 
 from flightstack.core.enums import Severity
@@ -128,6 +128,11 @@ class WatchApp(App[None]):
         if screens and isinstance(screens[0], WatchScreen) and screens[0].is_composed:
             screens[0].show(view, self.feed.now_s)
             self.redraws += 1
+        for screen in screens:
+            if (
+                screen.outer_size != self.size
+            ):  # Textual's timer for a new size is lost if the process is held up
+                screen.post_message(Resize(self.size, self.size))
 
     # -- what the user asks of the vehicle
 

@@ -155,7 +155,7 @@ def test_view_reports_the_loss_and_the_return_of_a_vehicle(tmp_path: Path) -> No
                 view.wait("A Arm")
 
 
-def test_all_vehicles_take_one_order(tmp_path: Path) -> None:
+def test_all_vehicles_take_one_order_while_the_window_shrinks(tmp_path: Path) -> None:
     free = UdpSocket("127.0.0.1")
     port = free.address[1]
     free.close()
@@ -173,6 +173,7 @@ def test_all_vehicles_take_one_order(tmp_path: Path) -> None:
             view.wait("COMMANDS TO ALL 2")
             view.press("A")
             view.wait("Arm: all 2 vehicles")
+            view.resize(80, 24)
             view.press("y")
             view.wait("ARMED", "COMMANDS TO ALL 2", without="Arm: all")
             view.press("]")
@@ -185,4 +186,6 @@ def test_all_vehicles_take_one_order(tmp_path: Path) -> None:
             view.wait("Disarm: all 2 vehicles")
             view.press("y")
             view.wait("DISARMED", without="Disarm: all 2 vehicles")
+            view.resize(200, 50)
+            view.wait("Last 2 minutes")
             wait_for_messages(view, f"{ids[0]}: disarmed after", f"{ids[1]}: disarmed after")

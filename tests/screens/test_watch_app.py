@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
+import time
+
 import pytest
+import textual._time
 from textual.color import Color
 from textual.pilot import Pilot
 
 from flightstack.core.enums import Severity
-from gcs_cli.tui.app import WatchApp
+from gcs_cli.tui.app import REDRAWS_HZ, WatchApp
 from gcs_cli.tui.feed import Notice
 from gcs_cli.tui.orders import ORDERS
 from gcs_cli.tui.palette import DARK, LIGHT
@@ -42,6 +46,19 @@ def test_every_screen_survives_any_size(entry: ScreenEntry, size: tuple[int, int
         assert len(shown(app)) == size[1]
 
     play(story, size=size)
+
+
+def test_a_new_size_is_followed_when_the_process_is_held_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A busy machine may stop the process for 20 ms anywhere; Textual's timer of 8 ms for the new size is lost then."""
+    calls = itertools.count()
+    monkeypatch.setattr(textual._time, "get_time", lambda: time.monotonic() + 0.02 * next(calls))
+
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await pilot.resize_terminal(200, 50)
+        await pilot.pause(2 / REDRAWS_HZ)
+        assert len(shown(app)) == 50
+
+    play(story, size=(80, 24))
 
 
 def test_a_click_on_a_tab_opens_its_screen() -> None:
