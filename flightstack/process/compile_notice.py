@@ -37,7 +37,7 @@ class CompileNotice(event.Listener):  # type: ignore[misc]  # Numba has no types
     def _report(self, kernel: str) -> None:
         if not self._began:
             self._began = True
-            self._say("compiling kernels, once; this takes about 12 s on two idle cores")
+            self._say("compiling kernels, once; this takes about 10 s on two idle cores")
         place = ""
         if kernel in self._kernels:
             place = f" {self._kernels.index(kernel) + 1} of {len(self._kernels)}"
