@@ -187,8 +187,8 @@ def replayed(
     return outputs
 
 
-def as_flight(record: Recording, outputs: FloatArray, flight: FlightSamples) -> FlightSamples:
-    """Return the outputs in the form of a log, for comparison with the replayed one.
+def as_flight(record: Recording, outputs: FloatArray, info: Mapping[str, Any]) -> FlightSamples:
+    """Return the outputs in the form of a log with this ``info``, for comparison with others.
 
     The attitude target is that of the outer ticks. If the log does not mark those of the outer loop, all were given,
     and none is compared.
@@ -203,4 +203,4 @@ def as_flight(record: Recording, outputs: FloatArray, flight: FlightSamples) -> 
         if record.tells_targets:
             signals[name] = Samples(samples.time_us[aims], samples.values[aims])
     status = Samples(record.time_us, outputs[:, STATUS_AT:].astype(np.float32))
-    return flight._replace(signals=signals, status=status)
+    return FlightSamples(signals, status, {}, info, {}, ())

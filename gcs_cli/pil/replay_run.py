@@ -35,9 +35,18 @@ from gcs_cli.pil.result import (
     target_tiles,
 )
 from gcs_cli.pil.signals import BY_NAME, TARGET
+from gcs_cli.pil.stagewise import STAGEWISE, expected_outputs
 from gcs_cli.pil.target_record import TargetRecord, read_record
 from gcs_cli.pil.targets import has_same_bits, meaning
-from gcs_cli.pil.verdict import OPEN_LOOP_ULPS, board_limits, difference_checks, same_bits_limits
+from gcs_cli.pil.verdict import (
+    BOARD_FACTOR,
+    OPEN_LOOP_ULPS,
+    STAGE_LIMITS,
+    Limits,
+    board_limits,
+    difference_checks,
+    same_bits_limits,
+)
 from gcs_cli.report.run_directory import LOG_NAME
 from gcs_cli.tui.transfer_bar import step_bar
 
@@ -155,21 +164,28 @@ def judged(
     facts: Mapping[str, Any],
 ) -> Outcome:
     """Compare the outputs with the log and check them. Pure."""
-    flight = replay.flight
-    made = as_flight(replay.record, outputs, flight)
-    pair = pair_name(LOG, "target")
+    flight, record_in = replay.flight, replay.record
+    made = as_flight(record_in, outputs, {})
+    expected = as_flight(record_in, expected_outputs(record_in, outputs, replay.setup, replay.numbers), {})
+    pair, stages = pair_name(LOG, "target"), pair_name(STAGEWISE, "target")
     differences = list(compared(pair, flight, made))
+    by_stage = list(compared(stages, expected, made))
     flown = str(flight.info.get("loops", PYTHON))
     exact = same_bits and flown != PYTHON and not flown.startswith(SERIAL)
-    limits = same_bits_limits(OPEN_LOOP_ULPS) if exact else OPEN_LOOP_ULPS
+    limits = same_bits_limits(OPEN_LOOP_ULPS) if exact else Limits(OPEN_LOOP_ULPS)
     if not exact and not (flown == PYTHON or same_bits):
         limits = board_limits(OPEN_LOOP_ULPS)
+    left_out = None if record_in.tells_targets else TARGET
     checks = [
-        *difference_checks(pair, differences, limits, None if replay.record.tells_targets else TARGET),
+        *difference_checks(pair, differences, limits, left_out),
+        *difference_checks(
+            stages, by_stage, STAGE_LIMITS if same_bits else STAGE_LIMITS.scaled(BOARD_FACTOR), left_out
+        ),
         status_check(f"{pair} steps of another status", flight, made, exact),
+        status_check(f"{stages} steps of another status", expected, made, False),
         *(target_checks(record, len(outputs)) if record is not None else ()),
     ]
-    result = assembled(differences, checks, record, facts)
+    result = assembled([*differences, *by_stage], checks, record, facts)
     if not replay.record.tells_targets:
         result["meaning"] += (
             " This log does not tell which attitude targets the outer loop made: all were given to the inner loop, "

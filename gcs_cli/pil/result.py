@@ -25,6 +25,7 @@ from gcs_cli.pil.verdict import (
     PIL,
     SIL,
     Check,
+    Limits,
     all_passed,
     board_limits,
     difference_checks,
@@ -166,9 +167,9 @@ def _closed_loop_checks(
         yield Check(f"{pair} ticks flown by one alone", 0.0 if exact else _LANDING_TICKS, apart, "")
         if MIL not in (a, b):
             yield status_check(f"{pair} ticks of another status", first, second, exact)
-        limits: Mapping[str, float] = CLOSED_LOOP_ULPS
+        limits = Limits(CLOSED_LOOP_ULPS)
         if MIL not in (a, b):
-            limits = same_bits_limits(limits) if exact else board_limits(limits)
+            limits = same_bits_limits(limits.ulp) if exact else board_limits(limits.ulp)
         yield from difference_checks(pair, differences[pair], limits)
 
 
