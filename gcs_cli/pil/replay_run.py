@@ -39,7 +39,7 @@ from gcs_cli.pil.target_record import TargetRecord, read_record
 from gcs_cli.pil.targets import has_same_bits, meaning
 from gcs_cli.pil.verdict import OPEN_LOOP_ULPS, board_limits, difference_checks, same_bits_limits
 from gcs_cli.report.run_directory import LOG_NAME
-from gcs_cli.tui.transfer_bar import step_bar
+from gcs_cli.tui.widgets.transfer_bar import step_bar
 
 LOG = "log"
 _TILT = "MPC_TILTMAX_AIR"
