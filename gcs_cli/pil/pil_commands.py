@@ -19,7 +19,7 @@ from gcs_cli.pil import doctor, replay_run
 from gcs_cli.pil.result import PASSED, Outcome
 from gcs_cli.pil.run import HTML_NAME, make_pil_directory, run, write_outcome
 from gcs_cli.pil.targets import checked_target
-from gcs_cli.tui.transfer_bar import step_bar
+from gcs_cli.tui.widgets.transfer_bar import step_bar
 
 
 def run_flights(

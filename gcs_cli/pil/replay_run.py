@@ -48,7 +48,7 @@ from gcs_cli.pil.verdict import (
     same_bits_limits,
 )
 from gcs_cli.report.run_directory import LOG_NAME
-from gcs_cli.tui.transfer_bar import step_bar
+from gcs_cli.tui.widgets.transfer_bar import step_bar
 
 LOG = "log"
 _TILT = "MPC_TILTMAX_AIR"
