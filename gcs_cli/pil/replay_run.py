@@ -39,10 +39,8 @@ from gcs_cli.pil.stagewise import STAGEWISE, expected_outputs
 from gcs_cli.pil.target_record import TargetRecord, read_record
 from gcs_cli.pil.targets import has_same_bits, meaning
 from gcs_cli.pil.verdict import (
-    BOARD_FACTOR,
-    OPEN_LOOP_ULPS,
-    STAGE_LIMITS,
-    Limits,
+    DEFAULT_LIMITS,
+    LimitSet,
     board_limits,
     difference_checks,
     same_bits_limits,
@@ -135,7 +133,13 @@ def fed(replay: Replay, target: str, folder: Path, console: Console) -> tuple[Fl
 
 
 def replay(
-    log: Path, choice: LoopsChoice, target: str, prepared_replay: Replay, folder: Path, console: Console
+    log: Path,
+    choice: LoopsChoice,
+    target: str,
+    prepared_replay: Replay,
+    folder: Path,
+    console: Console,
+    limits: LimitSet = DEFAULT_LIMITS,
 ) -> Outcome:
     """Replay a log on a target and compare; raise ConfigError, CliError."""
     outputs, version = fed(prepared_replay, target, folder, console)
@@ -147,7 +151,7 @@ def replay(
         f"compared with the log's. {meaning(choice, replay=True)}",
         "conditions": _conditions(log, target, prepared_replay),
     }
-    return judged(prepared_replay, outputs, record, has_same_bits(choice), facts)
+    return judged(prepared_replay, outputs, record, has_same_bits(choice), facts, limits)
 
 
 def _conditions(log: Path, target: str, replay: Replay) -> dict[str, Any]:
@@ -162,6 +166,7 @@ def judged(
     record: TargetRecord | None,
     same_bits: bool,
     facts: Mapping[str, Any],
+    limits: LimitSet = DEFAULT_LIMITS,
 ) -> Outcome:
     """Compare the outputs with the log and check them. Pure."""
     flight, record_in = replay.flight, replay.record
@@ -172,15 +177,14 @@ def judged(
     by_stage = list(compared(stages, expected, made))
     flown = str(flight.info.get("loops", PYTHON))
     exact = same_bits and flown != PYTHON and not flown.startswith(SERIAL)
-    limits = same_bits_limits(OPEN_LOOP_ULPS) if exact else Limits(OPEN_LOOP_ULPS)
+    of_log = same_bits_limits(limits.replay) if exact else limits.replay
     if not exact and not (flown == PYTHON or same_bits):
-        limits = board_limits(OPEN_LOOP_ULPS)
+        of_log = board_limits(limits.replay)
+    of_stages = limits.stages if same_bits else board_limits(limits.stages)
     left_out = None if record_in.tells_targets else TARGET
     checks = [
-        *difference_checks(pair, differences, limits, left_out),
-        *difference_checks(
-            stages, by_stage, STAGE_LIMITS if same_bits else STAGE_LIMITS.scaled(BOARD_FACTOR), left_out
-        ),
+        *difference_checks(pair, differences, of_log, left_out),
+        *difference_checks(stages, by_stage, of_stages, left_out),
         status_check(f"{pair} steps of another status", flight, made, exact),
         status_check(f"{stages} steps of another status", expected, made, False),
         *(target_checks(record, len(outputs)) if record is not None else ()),

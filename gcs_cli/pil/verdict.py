@@ -107,14 +107,28 @@ STAGE_LIMITS = Limits(
 float32, measured in three flights in gusts and in the excitation, both vehicles and both controllers."""
 
 
-def same_bits_limits(limits_ulps: Mapping[str, float]) -> Limits:
+class LimitSet(NamedTuple):
+    """Limits of all comparisons."""
+
+    flight: Limits
+    """Between flights in Python and in C, each with its own vehicle."""
+    replay: Limits
+    """Between the log of Python's loops and a target."""
+    stages: Limits
+    """Between Python's stages and a target's."""
+
+
+DEFAULT_LIMITS = LimitSet(Limits(CLOSED_LOOP_ULPS), Limits(OPEN_LOOP_ULPS), STAGE_LIMITS)
+
+
+def same_bits_limits(limits: Limits) -> Limits:
     """Return the limits of the same signals if no bit may differ."""
-    return Limits(dict.fromkeys(limits_ulps, SAME_BITS_ULPS))
+    return Limits(dict.fromkeys(limits.ulp, SAME_BITS_ULPS))
 
 
-def board_limits(limits_ulps: Mapping[str, float]) -> Limits:
+def board_limits(limits: Limits) -> Limits:
     """Return the limits between the host and a board."""
-    return Limits(limits_ulps).scaled(BOARD_FACTOR)
+    return limits.scaled(BOARD_FACTOR)
 
 
 class Check(NamedTuple):
