@@ -8,10 +8,11 @@ from typing import Annotated
 
 import typer
 
-from flightstack.process.command_line import IN_LOOPS, PanelCommand, expand_options, make_app
+from flightstack.process.command_line import IN_LOOPS, VEHICLE, PanelCommand, expand_options, make_app
+from flightstack.process.options import Controller, Gains, InnerHz, OuterHz
 from gcs_cli.fly.fly_flags import FlyOptions, RunOptions, complete_options
 from gcs_cli.pil.pil_flags import JudgeOptions
-from gcs_cli.settings import JsonOption
+from gcs_cli.settings import JsonOption, OverwriteOption
 
 app = make_app(add_completion=False)
 
@@ -39,7 +40,9 @@ def fly(
 @app.command()
 @expand_options
 def replay(
-    log: Annotated[Path, typer.Argument(help="A flight log (ULog).", show_default=False)],
+    log: Annotated[
+        Path, typer.Argument(help="A flight log (ULog), or test vectors (.csv, .mat).", show_default=False)
+    ],
     judge: JudgeOptions,
     target: Annotated[
         str, typer.Option(metavar="TARGET", help="emulated, host, c, or serial:DEVICE[:BAUD].")
@@ -55,6 +58,32 @@ def replay(
     from gcs_cli.pil.pil_commands import run_replay
 
     run_replay(log, judge, target, vehicle)
+
+
+@app.command()
+def vectors(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="The file to write: .csv or .mat.", show_default=False)
+    ],
+    log: Annotated[
+        Path | None,
+        typer.Option(metavar="LOG", help="Take inputs and outputs from this flight log.", show_default=False),
+    ] = None,
+    vehicle: Annotated[str, VEHICLE] = "paper_quad",
+    controller: Controller = "pid",
+    gains: Gains = "tuned",
+    inner_hz: InnerHz = 500.0,
+    outer_hz: OuterHz = None,
+    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Write test vectors for a replay, as CSV or MATLAB.
+
+    Without a log, they are an excitation that reaches every term and limit of the loops.
+    """
+    from gcs_cli.pil.pil_commands import run_vectors
+
+    run_vectors(file, log, (vehicle, controller, gains, inner_hz, outer_hz), overwrite, as_json)
 
 
 @app.command()

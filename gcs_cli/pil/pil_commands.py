@@ -13,17 +13,21 @@ from rich.console import Console
 from flightstack.core.atomic_file import write_bytes_atomically
 from flightstack.firmware.law_parity import VECTORS, differing_steps
 from flightstack.firmware.law_tree import controller_named, generated_names, is_built_in, write_tree
+from flightstack.process.clock import nearest_outer_hz
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.fly.fly_display import FlyConsole
 from gcs_cli.fly.fly_flags import FlyOptions
 from gcs_cli.fly.fly_options import checked_plan
+from gcs_cli.output import Output
 from gcs_cli.pil import doctor, replay_run
+from gcs_cli.pil.excitation import excitation
 from gcs_cli.pil.junit import pil_junit
 from gcs_cli.pil.limits_file import read_limits
 from gcs_cli.pil.pil_flags import JudgeOptions
 from gcs_cli.pil.result import PASSED, Outcome
 from gcs_cli.pil.run import HTML_NAME, make_pil_directory, run, write_outcome
 from gcs_cli.pil.targets import checked_target
+from gcs_cli.pil.vectors import SUFFIXES, Vectors, vectors_of, write_vectors
 from gcs_cli.pil.verdict import LimitSet
 from gcs_cli.settings import check_output_file
 from gcs_cli.tui.widgets.transfer_bar import step_bar
@@ -51,6 +55,34 @@ def run_replay(log: Path, judge: JudgeOptions, target: str, vehicle: str | None)
     write_outcome(folder, outcome)
     _finish(outcome, folder, console, judge, "pil.replay", began_s)
     _check_verdict(outcome, judge.fail_over)
+
+
+def run_vectors(
+    file: Path,
+    log: Path | None,
+    loops: tuple[str, str, str, float, float | None],
+    overwrite: bool,
+    as_json: bool,
+) -> None:
+    """Write test vectors of a log, or of the excitation of ``loops``; raise CliError, ConfigError.
+
+    ``loops``: vehicle, controller, gains, rates of inner and outer loop.
+    """
+    if file.suffix.lower() not in SUFFIXES:
+        raise CliError(f"{file}: give the file a name that ends in {' or '.join(SUFFIXES)}", USAGE)
+    if file.exists() and not overwrite:
+        raise CliError(f"{file}: exists; give --overwrite to replace it", USAGE)
+    if log is None:
+        vehicle, controller, gains, inner_hz, outer_hz = loops
+        rates = inner_hz, outer_hz or nearest_outer_hz(inner_hz)
+        setup, info, parameters = replay_run.configured(vehicle, controller, gains, *rates)
+        vectors = Vectors(excitation(setup), None, info, parameters)
+    else:
+        vectors = vectors_of(*replay_run.read_flight(log))
+    write_vectors(file, vectors)
+    steps = len(vectors.record.time_us)
+    what = "excitation, inputs only" if log is None else f"inputs and outputs of {log.name}"
+    Output(as_json).say("vectors", f"{file}: {steps} steps, {what}", file=str(file), steps=steps)
 
 
 def _checked(judge: JudgeOptions) -> LimitSet:

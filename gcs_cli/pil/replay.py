@@ -18,7 +18,7 @@ FlagArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
 STATE, SETPOINT, TARGET, INPUT_SIZE = slice(0, 13), slice(13, 24), slice(24, 29), 29
 OUTPUT_SIZE, STATUS_AT = 32, 31
-_OUTPUTS = {
+OUTPUTS = {
     "target_attitude": slice(0, 4),
     "target_thrust": slice(4, 5),
     "reference_attitude": slice(5, 9),
@@ -195,7 +195,7 @@ def as_flight(record: Recording, outputs: FloatArray, info: Mapping[str, Any]) -
     """
     signals = {
         name: Samples(record.time_us, outputs[:, columns].astype(np.float32))
-        for name, columns in _OUTPUTS.items()
+        for name, columns in OUTPUTS.items()
     }
     aims = record.is_outer & ((record.flags & LoopFlags.OUTER_DUE) != 0)
     for name in _OF_TARGET:

@@ -264,8 +264,8 @@ def test_a_verdict_that_is_not_good_fails_when_it_is_asked_for(flown: Path, tmp_
 
 def test_limits_of_a_file_judge_a_replay(flown: Path, tmp_path: Path) -> None:
     limits = tmp_path / "limits.toml"
-    limits.write_text("[stages.torque]\nulp = 0.01\n")
+    limits.write_text("[stages.target_thrust]\nulp = 0.01\n")
     log, out = flown / "mil" / "flight.ulg", tmp_path / "out"
     done = pil("replay", log, "--target", "c", "--out", out, "--limits", limits, "--fail-over")
     assert done.returncode == FAILED, done.stdout + done.stderr
-    assert "the verdict is not good: stages–target wrench\n" in done.stderr
+    assert "the verdict is not good: stages–target attitude target\n" in done.stderr
