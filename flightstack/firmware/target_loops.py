@@ -15,7 +15,7 @@ from flightstack.core.float32 import as_float32
 from flightstack.firmware.c_loops import INPUT_SIZE, OUTPUT_SIZE, SETPOINT_AT, TARGET_AT
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilClient, PilCounters, PilTiming
 from flightstack.firmware.pil_operations import PilReport
-from flightstack.firmware.pil_record import COST_UNITS, PilRecord
+from flightstack.firmware.pil_record import COST_UNITS, PilRecord, TracedLink
 from flightstack.firmware.sources import source_hash
 from flightstack.transports.byte_link import ByteLink
 
@@ -114,6 +114,8 @@ class TargetLoops:
         try:
             if self.ending is None or isinstance(self._client.result, PilReport):  # the target responds
                 self.record.status = self._final_counters()
+            if isinstance(self._link, TracedLink):
+                self.record.trace = self._link.trace
         finally:
             self._link.close()
 

@@ -22,6 +22,7 @@ from flightstack.params.behaviour import SPECS
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
 from flightstack.params.vehicle import Vehicle, load_vehicle
 from gcs_cli.errors import NO_ANSWER, USAGE, CliError
+from gcs_cli.pil.code_facts import code_facts
 from gcs_cli.pil.compare import Difference, compared, deviation
 from gcs_cli.pil.flight_samples import FlightSamples, read_samples
 from gcs_cli.pil.replay import Recording, UnfitLogError, as_flight, recording, replayed
@@ -29,6 +30,7 @@ from gcs_cli.pil.report_charts import DeviationChart
 from gcs_cli.pil.result import (
     Outcome,
     assembled,
+    costs_of,
     largest_difference,
     pair_name,
     profiles_of,
@@ -187,6 +189,8 @@ def replay(
         "compared with the log's, and stage by stage with Python's, computed in float64 from what the target reports. "
         f"{meaning(choice, replay=True)}",
         "conditions": _conditions(log, target, prepared_replay),
+        "inner_hz": prepared_replay.setup.inner_hz,
+        **code_facts(record, prepared_replay.setup.controller.name),
     }
     return judged(prepared_replay, outputs, record, has_same_bits(choice), facts, limits)
 
@@ -236,7 +240,10 @@ def judged(
         DeviationChart(BY_NAME[name], {shown: deviation(BY_NAME[name], first, made)}) for name in _SHOWN
     ]
     return Outcome(
-        result, [chart for chart in charts if np.size(chart.pairs[shown].size)], profiles_of(record)
+        result,
+        [chart for chart in charts if np.size(chart.pairs[shown].size)],
+        profiles_of(record),
+        costs_of(record),
     )
 
 
