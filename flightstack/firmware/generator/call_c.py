@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flightstack.core.contract import MAX_ROTORS
+from flightstack.core.contract import MAX_ROTORS, FloatArray
 from flightstack.firmware.generator.law import Function
 from flightstack.firmware.generator.types import (
     BOOL,
@@ -24,6 +24,8 @@ from flightstack.firmware.generator.types import (
     has_rotors,
 )
 
+ROTOR_COUNT = 4
+"""Rotors of random arrays."""
 EDGES = [0.0, -0.0, math.nan, math.inf, -math.inf, 5e-324, -1e-310, 1e308, -1e308, 1e-30, 1.0, -1.0]
 
 
@@ -85,7 +87,7 @@ class CFunction:
         result = function.result
         self._call.restype = None if isinstance(result, Several) else _layout(result)
 
-    def __call__(self, *values: Any, rotors: int = 0) -> list[float]:
+    def __call__(self, *values: Any, rotors: int = ROTOR_COUNT) -> list[float]:
         """Return the numbers of the results; arrays are written in place."""
         arguments: list[Any] = []
         held = []
@@ -122,7 +124,7 @@ class Vectors:
         if isinstance(kind, Record):
             return kind.kind(*(self.value(inner) for inner in kind.fields.values()))
         if isinstance(kind, Array):
-            sizes = [int(size) for size in kind.shape]
+            sizes = [ROTOR_COUNT if size == ROTORS else int(size) for size in kind.shape]
             return np.array([self.value(REAL) for _ in range(math.prod(sizes))]).reshape(sizes)
         if kind is INT:
             return int(self._random.integers(-3, 4))
@@ -144,6 +146,15 @@ def flattened(value: Any) -> list[float]:
     return [] if value is None else [float(value)]
 
 
+def _outcome(function: Callable[..., Any], values: Sequence[Any]) -> FloatArray:
+    """Return the numbers of the results, and of the arrays that were given, after a call with copies of them."""
+    given = [value.copy() if isinstance(value, np.ndarray) else value for value in values]
+    result = function(*given)
+    numbers = result if isinstance(result, list) else flattened(result)
+    arrays = [value.ravel() for value in given if isinstance(value, np.ndarray)]
+    return np.concatenate([np.array(numbers, dtype=np.float64), *arrays])
+
+
 def differences(
     c: CFunction, python: Callable[..., Any], vectors: Sequence[Sequence[Any]]
 ) -> list[Difference]:
@@ -151,7 +162,7 @@ def differences(
     found = []
     with np.errstate(all="ignore"):
         for values in vectors:
-            wanted, made = np.array(flattened(python(*values))), np.array(c(*values))
+            wanted, made = _outcome(python, values), _outcome(c, values)
             equal = (wanted.view(np.int64) == made.view(np.int64)) | (np.isnan(wanted) & np.isnan(made))
             if not equal.all():
                 found.append(Difference(values, wanted.tolist(), made.tolist()))
