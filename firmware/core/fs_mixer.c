@@ -194,10 +194,10 @@ static void limit_even(fs_real thrust_n, const fs_mixer *mixer, fs_real work[3][
 }
 
 /* Return the share of yaw, in [0, 1], that fits within the limits. mixer.py:135 */
-static fs_real largest_yaw_scale(const fs_mixer *mixer, fs_real work[3][FS_MAX_ROTORS])
+static fs_real largest_yaw_scale(const fs_mixer *mixer, const fs_real work[3][FS_MAX_ROTORS])
 {
-    fs_real *turn = work[1];
-    fs_real *lift = work[2];
+    const fs_real *turn = work[1];
+    const fs_real *lift = work[2];
     fs_real scale = FS_LIT(1.0);
     for (int32_t i = 0; i < mixer->rotors; i++) {
         const fs_real room = turn[i] > FS_LIT(0.0) ? mixer->high[i] - lift[i] : lift[i] - mixer->low[i];
@@ -229,7 +229,7 @@ fs_wrench fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, fs_real rotor_s
             }
             limit_even(thrust_n, mixer, work, &tilt_scale, &thrust_n);
         }
-        yaw_scale = largest_yaw_scale(mixer, work);
+        yaw_scale = largest_yaw_scale(mixer, (const fs_real(*)[FS_MAX_ROTORS])work);
     }
     for (int32_t i = 0; i < mixer->rotors; i++) {
         rotor_speed_rad_s[i] = signed_root(work[2][i] + yaw_scale * work[1][i]);

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from flightstack.control.control_law import ControlLaw, CStep
 from flightstack.control.controller import ATTITUDE, GUIDANCE, MIXER, POSITION, TILT_FIELD
 from flightstack.control.controller_loading import fields_of
+from flightstack.firmware.generator.law import Function
 from flightstack.firmware.generator.text import comment, fold, identifier, indented
 from flightstack.firmware.generator.unit import NOTICE, Program
 from flightstack.firmware.numbers import Laws, law_name
@@ -127,7 +128,7 @@ def controllers_source(laws: Laws, program: Program) -> str:
                 lines = fold(f"{law.step.step}({table.c_arguments(law_name(law))});", "    ")
                 lines = ["    (void)memory;", *lines, "    return 1U;"]
             else:
-                lines = _generated_step(table, law, steps[role, law.name].c_name)
+                lines = _generated_step(table, law, steps[role, law.name])
             parts += [*fold(f"static uint16_t run_{role}_{law_name(law)}{table.signature()}")]
             parts += ["{", *lines, "}", ""]
         names = ", ".join(f"run_{role}_{law_name(law)}" for law in laws[role])
@@ -160,9 +161,14 @@ def _reset_lines(laws: Sequence[ControlLaw]) -> list[str]:
     return lines
 
 
-def _generated_step(table: RoleTable, law: ControlLaw, step: str) -> list[str]:
+def _generated_step(table: RoleTable, law: ControlLaw, step: Function) -> list[str]:
     """Return the call of a generated step, and the test whether its memory is finite."""
     name = law_name(law)
     finite = [f"fs_is_finite(memory_out->{name}.{identifier(field)})" for field in fields_of(law.memory_type)]
     result = finite[0] if len(finite) == 1 else f"(uint16_t)({' & '.join(finite)})"
-    return [*fold(f"{step}({table.arguments(name)});", "    "), *fold(f"return {result};", "    ")]
+    call = f"{step.c_name}({table.arguments(name)});"
+    if (
+        step.parameters[-1].name not in step.written
+    ):  # C converts no pointer to rows to one of constant rows by itself
+        call = call.replace(", work,", ", (const fs_real(*)[FS_MAX_ROTORS])work,")
+    return [*fold(call, "    "), *fold(f"return {result};", "    ")]
