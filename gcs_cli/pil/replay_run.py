@@ -15,7 +15,7 @@ from flightstack.core.contract import FloatArray
 from flightstack.core.errors import ConfigError, TargetError
 from flightstack.firmware.c_loops import CLoops, LoopsSetup
 from flightstack.firmware.choice import PYTHON, SERIAL, LoopsChoice
-from flightstack.firmware.law_tree import controller_named
+from flightstack.firmware.law_tree import controller_named, logged_params
 from flightstack.firmware.targets import finish_loops, make_loops
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
 from flightstack.params.vehicle import Vehicle, load_vehicle
@@ -77,14 +77,16 @@ def _setup(flight: FlightSamples, log: Path, vehicle: str | None) -> LoopsSetup:
         tilt_deg = flight.parameters[_TILT]
     except KeyError as error:
         raise ConfigError(log, "", f"cannot be replayed: it does not say its {error.args[0]}") from error
+    controller = controller_named(name)
     return LoopsSetup(
         _vehicle(flight, log, vehicle),
-        controller_named(name),
+        controller,
         open_gains(DEFAULT_GAINS),  # each gain is a parameter, and the values of the log replace them
         math.radians(tilt_deg),
         inner_hz,
         outer_hz,
         max(1, round(inner_hz / outer_hz)),
+        logged_params(controller, str(info.get("law_params", "{}")), log),
     )
 
 
