@@ -15,6 +15,7 @@ from sim_bridge.plant.fault_table import TABLE, Row
 from tools.generated import ROOT, write_or_check
 from tools.law_subset import subset_page
 from tools.scenario_page import scenarios_page, schema_text
+from tools.sensor_page import sensor_page
 from tools.watch_keys import keys_page
 
 FOLDER = ROOT / "docs" / "reference"
@@ -268,6 +269,7 @@ if __name__ == "__main__":
         "failsafes.md": failsafes_page(),
         "log-topics.md": topics_page(),
         "faults.md": faults_page(),
+        "sensors.md": sensor_page(NOTE.format(source="flightstack/params/sensors.py")),
         "scenarios.md": scenarios_page(NOTE.format(source="flightstack/testing")),
         "scenario.schema.json": schema_text(),
         "generated-c.md": subset_page(NOTE.format(source="flightstack/firmware/generator")),

@@ -82,7 +82,8 @@ class RangeSample(NamedTuple):
 class FlowSample(NamedTuple):
     """Optical flow over ``dt_s``: angles about the body's x and y axes, with the rotation of the gyro included.
 
-    Over level ground at height h, ``flow_x`` − ``gyro_x`` is v_y · dt / h and ``flow_y`` − ``gyro_y`` is −v_x · dt / h.
+    The signs are MAVLink's: over level ground at height h, ``flow_x`` − ``gyro_x`` is −v_y · dt / h, and ``flow_y`` −
+    ``gyro_y`` is v_x · dt / h.
     """
 
     time_s: float
