@@ -19,7 +19,7 @@ from flightstack.core.portable_math import exp, log
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.plant.dimensions import foot_z_m, propeller_radius_m
 from sim_bridge.sensors.layout import BARO, write_numbers
-from sim_bridge.sensors.noise import NormalStream, gauss_markov, quantised
+from sim_bridge.sensors.noise import NormalStream, gauss_markov, quantised, with_fault
 
 SEA_LEVEL_HPA, SEA_LEVEL_K, LAPSE_K_M = 1013.25, 288.15, 0.0065
 _EXPONENT = 9.80665 / (287.05287 * LAPSE_K_M)
@@ -44,7 +44,7 @@ def pressure_altitude_m(pressure_hpa: float) -> float:
 
 @compiled
 def measure_baro(
-    baros: RecordArray, state: FloatArray, airspeed_m_s: float, thrust_n: float, noise: FloatArray
+    baros: RecordArray, state: FloatArray, airspeed_m_s: float, rotor_speed: FloatArray, noise: FloatArray
 ) -> None:
     """Write pressure, pressure altitude and temperature to ``out``; ``noise`` are two standard normal deviates."""
     baro = baros[0]
@@ -56,11 +56,15 @@ def measure_baro(
     density = static * _PA_PER_HPA / (_GAS_J_KG_K * temperature_k)
     radius = baro["rotor_radius"]
     share = radius / (2.0 * max(baro["surface_z"] - state[2], _LEAST_RADII * radius))
-    near_pa = baro["ground_effect_share"] * baro["disc_loading"] * thrust_n * share * share
+    loading = 0.0
+    for i in range(len(baro["disc_loading"])):
+        loading += baro["disc_loading"][i] * rotor_speed[i] * abs(rotor_speed[i])
+    near_pa = baro["ground_effect_share"] * loading * share * share
     dynamic_pa = baro["dynamic_share"] * 0.5 * density * airspeed_m_s * airspeed_m_s
     value = static + (near_pa + dynamic_pa) / _PA_PER_HPA
     value += baro["offset"] + baro["drift"] + baro["fault_bias"][0]
-    value = quantised(value + baro["noise_factor"] * baro["noise_hpa"] * noise[0], baro["resolution_hpa"])
+    spread = with_fault(baro["noise_hpa"], baro["fault_noise"])
+    value = quantised(value + spread * noise[0], baro["resolution_hpa"])
     baro["out"][0] = value
     baro["out"][1] = pressure_altitude_m(max(value, 1.0))
     baro["out"][2] = temperature_k - 273.15
@@ -71,17 +75,21 @@ class Barometer:
 
     def __init__(self, vehicle: Vehicle, seed: int, altitude_m: float) -> None:
         self.records: RecordArray = np.zeros(1, BARO)
+        self.out: FloatArray = self.records["out"][0]
+        """The last measurement."""
         baro, self._noise = self.records[0], NormalStream(seed, "baro", width=2)
         write_numbers(baro, vehicle.sensors.numbers["baro"])
         radius = propeller_radius_m(vehicle)
-        baro["noise_factor"], baro["altitude"] = 1.0, altitude_m
+        baro["altitude"] = altitude_m
         baro["rotor_radius"], baro["surface_z"] = radius, foot_z_m(vehicle)
-        baro["disc_loading"] = 1.0 / (len(vehicle.rotors) * math.pi * radius * radius)
+        area = len(vehicle.rotors) * math.pi * radius * radius
+        for index, rotor in enumerate(vehicle.rotors):
+            baro["disc_loading"][index] = rotor.thrust_coefficient_n_s2 / area
         first, second = self._noise.first(2).tolist()
         baro["offset"], baro["drift"] = baro["turn_on_offset_hpa"] * first, baro["drift_hpa"] * second
         baro["decay"], share = gauss_markov(1.0 / float(baro["rate_hz"]), float(baro["drift_time_s"]))
         baro["wander"] = share * baro["drift_hpa"]
 
-    def measure(self, state: FloatArray, airspeed_m_s: float, thrust_n: float) -> None:
-        """Measure at a state, an airspeed and the thrust of all rotors."""
-        measure_baro(self.records, state, airspeed_m_s, thrust_n, self._noise.row())
+    def measure(self, state: FloatArray, airspeed_m_s: float, rotor_speed: FloatArray) -> None:
+        """Measure at a state, an airspeed and the speeds [rad/s] of the rotors, shape (8,)."""
+        measure_baro(self.records, state, airspeed_m_s, rotor_speed, self._noise.row())

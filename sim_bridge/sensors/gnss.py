@@ -20,7 +20,7 @@ from flightstack.core.contract import FloatArray, RecordArray, Vector3
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.sensors.layout import GNSS, write_numbers
-from sim_bridge.sensors.noise import NormalStream, gauss_markov
+from sim_bridge.sensors.noise import NormalStream, gauss_markov, with_fault
 
 LEAST_SATELLITES = 4
 
@@ -48,9 +48,8 @@ def measure_gnss(receivers: RecordArray, state: FloatArray, noise: FloatArray) -
     for axis in range(3):
         white = gnss["horizontal_noise_m"] if axis < 2 else gnss["vertical_noise_m"]
         speed = gnss["velocity_noise_m_s"] if axis < 2 else gnss["vertical_velocity_noise_m_s"]
-        out[axis] = (
-            state[axis] + gnss["fault_bias"][axis] + factor * (gnss["drift"][axis] + white * noise[3 + axis])
-        )
+        error = gnss["drift"][axis] + with_fault(white, gnss["fault_noise"]) * noise[3 + axis]
+        out[axis] = state[axis] + gnss["fault_bias"][axis] + factor * error
         out[3 + axis] = state[3 + axis] + gnss["fault_rate"][axis] + factor * speed * noise[6 + axis]
 
 
@@ -61,7 +60,6 @@ class GnssReceiver:
         self.records: RecordArray = np.zeros(1, GNSS)
         gnss, self._noise = self.records[0], NormalStream(seed, "gnss", width=9)
         write_numbers(gnss, vehicle.sensors.numbers["gnss"])
-        gnss["noise_factor"] = 1.0
         horizontal, vertical = float(gnss["horizontal_drift_m"]), float(gnss["vertical_drift_m"])
         spread = np.array([horizontal, horizontal, vertical])
         gnss["decay"], share = gauss_markov(1.0 / float(gnss["rate_hz"]), float(gnss["drift_time_s"]))
@@ -71,8 +69,6 @@ class GnssReceiver:
         self._latency_us = round(float(gnss["latency_s"]) * 1e6)
         self._first_fix_us = round(float(gnss["first_fix_s"]) * 1e6)
         self._waiting: deque[tuple[int, Fix]] = deque()
-        self.extra_latency_us = 0
-        """Latency of a fault."""
         self.lost_share = 0.0
         """Share of the satellites that jamming takes."""
 
@@ -80,10 +76,8 @@ class GnssReceiver:
         """Measure at a state; the message is due after the latency."""
         gnss = self.records[0]
         jam = 1.0 / max(1.0 - self.lost_share, 0.05)
-        fault = float(gnss["noise_factor"])
-        gnss["noise_factor"] = fault * jam
+        gnss["noise_factor"] = jam
         measure_gnss(self.records, state, self._noise.row())
-        gnss["noise_factor"] = fault
         satellites = math.floor(float(gnss["satellites"]) * (1.0 - self.lost_share) + 0.5)
         has_fix = satellites >= LEAST_SATELLITES and time_us >= self._first_fix_us
         kind = mavlink.GPS_FIX_TYPE_3D_FIX if has_fix else mavlink.GPS_FIX_TYPE_NO_FIX
@@ -91,7 +85,12 @@ class GnssReceiver:
         fix = Fix(
             Vector3(x, y, z), Vector3(vx, vy, vz), self._eph_m * jam, self._epv_m * jam, kind, satellites
         )
-        self._waiting.append((time_us + self._latency_us + self.extra_latency_us, fix))
+        self._waiting.append((time_us + self._latency_us, fix))
+
+    @property
+    def next_due_us(self) -> int:
+        """Time of the next message."""
+        return self._waiting[0][0] if self._waiting else 1 << 64
 
     def due(self, time_us: int) -> Fix | None:
         """Return the newest message that is due, once; older ones are dropped."""

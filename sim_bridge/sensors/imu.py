@@ -37,7 +37,7 @@ from flightstack.core.geometry import (
 from flightstack.core.portable_math import sin_cos
 from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
 from sim_bridge.sensors.layout import IMU, IMU_NOISE, MOTION, write_numbers
-from sim_bridge.sensors.noise import NormalStream, gauss_markov, limited, quantised
+from sim_bridge.sensors.noise import NormalStream, gauss_markov, limited, quantised, with_fault
 
 _MATRIX_DEVIATES, _BIAS_DEVIATES = 18, 18
 _ROWS = 256
@@ -101,7 +101,7 @@ def _sense(imu: Record, part: int, true: Vector3, full_scale: float, step: float
     """Write the output of the gyro (``part`` 0) or accelerometer (1)."""
     if imu["is_frozen"][part] != 0:
         return
-    matrix, white = imu["matrix"][part], imu["white"][part] * imu["noise_factor"][part]
+    matrix, white = imu["matrix"][part], with_fault(imu["white"][part], imu["fault_noise"][part])
     for axis in range(3):
         i = 3 * part + axis
         row = matrix[axis]
@@ -109,6 +109,7 @@ def _sense(imu: Record, part: int, true: Vector3, full_scale: float, step: float
         value += imu["turn_on"][i] + imu["per_kelvin"][i] * imu["rise"] + imu["bias"][i]
         value += white * noise[i] + imu["fault_bias"][i]
         imu["out"][i] = quantised(limited(value, full_scale), step)
+        imu["wire"][(i + 3) % 6] = imu["out"][i]
 
 
 @compiled
@@ -202,7 +203,6 @@ class ImuSet:
 
 def _set_errors(imu: Record, stream: NormalStream) -> None:
     """Draw the constant errors of a sensor and the start of its wandering bias."""
-    imu["noise_factor"] = 1.0
     deviates = stream.first(_MATRIX_DEVIATES).reshape(2, 3, 3)
     scale = (imu["gyro_scale_error"], imu["accel_scale_error"])
     for part in range(2):

@@ -6,7 +6,6 @@ An angle of the file in degrees is in radians here, and its name ends in ``_rad`
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -38,15 +37,16 @@ def write_numbers(record: Record, numbers: Numbers) -> None:
         record[_in_radians(key)] = np.multiply(value, scale)
 
 
-_FAULT: list[tuple[Any, ...]] = [
-    ("noise_factor", "f8"),  # on white noise
-    ("is_frozen", "i8"),  # 1: the last output stays
-]
-
-
-def _dtype(
-    sensor: str, *state: tuple[Any, ...], faults: Iterable[tuple[Any, ...]] = _FAULT
-) -> np.dtype[np.void]:
+def _dtype(sensor: str, *state: tuple[Any, ...], channels: tuple[int, ...] = ()) -> np.dtype[np.void]:
+    """Return the record type of a sensor, of several ``channels`` that fail separately."""
+    faults = [
+        (
+            "fault_noise",
+            "f8",
+            *channels,
+        ),  # standard deviation of white noise on top, in the unit of the output
+        ("is_frozen", "i8", *channels),  # 1: the last output stays
+    ]
     return np.dtype([*_fields(sensor), *state, *faults], align=True)
 
 
@@ -83,7 +83,8 @@ IMU = _dtype(
     ("warming", "f8"),  # decay of its rest over one measurement
     ("fault_bias", "f8", 6),  # rad/s, m/s²
     ("out", "f8", 6),  # rates rad/s, specific force m/s², FRD
-    faults=(("noise_factor", "f8", 2), ("is_frozen", "i8", 2)),  # of gyro and accelerometer
+    ("wire", "f4", 6),  # specific force and rates, as in HIL_SENSOR
+    channels=(2,),
 )
 """One inertial sensor."""
 
@@ -103,11 +104,11 @@ BARO = _dtype(
     ("drift", "f8"),  # hPa
     ("decay", "f8"),
     ("wander", "f8"),
-    ("disc_loading", "f8"),  # thrust of 1 N over the area of all rotors, Pa
+    ("disc_loading", "f8", MAX_ROTORS),  # thrust of each rotor over Ω·|Ω| and the area of all rotors, Pa s²
     ("rotor_radius", "f8"),  # m
     ("surface_z", "f8"),  # m NED, of the ground
     ("altitude", "f8"),  # of the origin above mean sea level, m
-    ("fault_bias", "f8", 1),
+    ("fault_bias", "f8", 1),  # hPa
     ("out", "f8", 3),  # pressure hPa, pressure altitude m, temperature °C
 )
 
@@ -118,6 +119,7 @@ GNSS = _dtype(
     ("wander", "f8", 3),
     ("fault_bias", "f8", 3),  # m NED
     ("fault_rate", "f8", 3),  # m/s NED: the velocity of a spoofed position
+    ("noise_factor", "f8"),  # of jamming
     ("out", "f8", 6),  # position m NED, velocity m/s NED
 )
 

@@ -12,7 +12,7 @@ from flightstack.core.contract import FloatArray, Quaternion, RecordArray, Vecto
 from flightstack.core.geometry import conjugate, rotate
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.sensors.layout import MAG, write_numbers
-from sim_bridge.sensors.noise import NormalStream, limited, quantised
+from sim_bridge.sensors.noise import NormalStream, limited, quantised, with_fault
 
 
 @compiled
@@ -22,13 +22,14 @@ def measure_mag(mags: RecordArray, state: FloatArray, current_a: float, noise: F
     if mag["is_frozen"] != 0:
         return
     earth, out = mag["earth"], mag["out"]
+    spread = with_fault(mag["noise_gauss"], mag["fault_noise"])
     attitude = Quaternion(state[6], state[7], state[8], state[9])
     true = rotate(conjugate(attitude), Vector3(earth[0], earth[1], earth[2]))
     for axis in range(3):
         row = mag["matrix"][axis]
         value = row[0] * true.x + row[1] * true.y + row[2] * true.z
         value += mag["offset"][axis] + mag["per_ampere"][axis] * current_a + mag["fault_bias"][axis]
-        value += mag["noise_factor"] * mag["noise_gauss"] * noise[axis]
+        value += spread * noise[axis]
         out[axis] = quantised(limited(value, mag["range_gauss"]), mag["resolution_gauss"])
 
 
@@ -37,9 +38,11 @@ class Magnetometer:
 
     def __init__(self, vehicle: Vehicle, seed: int, earth_ned_gauss: Vector3) -> None:
         self.records: RecordArray = np.zeros(1, MAG)
+        self.out: FloatArray = self.records["out"][0]
+        """The last measurement."""
         mag, self._noise = self.records[0], NormalStream(seed, "mag", width=3)
         write_numbers(mag, vehicle.sensors.numbers["mag"])
-        mag["earth"], mag["noise_factor"] = earth_ned_gauss, 1.0
+        mag["earth"] = earth_ned_gauss
         mag["matrix"] = np.eye(3) + mag["soft_iron"] * self._noise.first(10)[:9].reshape(3, 3)
         mag["offset"] = mag["hard_iron_gauss"] * self._noise.first(4)[:3]
         mag["per_ampere"] = mag["current_gauss_a"] * self._noise.first(4)[:3]

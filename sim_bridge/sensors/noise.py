@@ -18,6 +18,7 @@ _ROWS = 256
 _FIRST_STREAM = 16
 """Jumps of the generator before the first stream; gusts have the first two."""
 _STREAMS = {"imu": 0, "mag": 8, "baro": 16, "gnss": 24, "range": 32, "flow": 40}
+_LOSSES = 48
 
 
 class NormalStream:
@@ -43,10 +44,27 @@ class NormalStream:
         return self._left.pop()
 
 
+class UniformStream:
+    """Numbers of a uniform distribution over [0, 1)."""
+
+    def __init__(self, seed: int) -> None:
+        self._bits = np.random.PCG64(seed).jumped(_FIRST_STREAM + _LOSSES)
+
+    def next(self) -> float:
+        """Return the next number."""
+        return float(int(self._bits.random_raw()) >> 11) / 2**53
+
+
 def gauss_markov(step_s: float, time_s: float) -> tuple[float, float]:
     """Return decay and relative noise of a first-order Gauss-Markov process over one step, exact for any step."""
     decay = exp(-step_s / time_s)
     return decay, math.sqrt(1.0 - decay * decay)
+
+
+@compiled
+def with_fault(spread: float, fault: float) -> float:
+    """Return the standard deviation with the noise of a fault on top."""
+    return spread if fault == 0.0 else math.sqrt(spread * spread + fault * fault)
 
 
 @compiled

@@ -17,7 +17,7 @@ from flightstack.core.geometry import conjugate, rotate
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.plant.dimensions import foot_z_m
 from sim_bridge.sensors.layout import FLOW, write_numbers
-from sim_bridge.sensors.noise import NormalStream, limited
+from sim_bridge.sensors.noise import NormalStream, limited, with_fault
 from sim_bridge.sensors.rangefinder import ground_distance_m
 
 
@@ -34,7 +34,7 @@ def measure_flow(sensors: RecordArray, state: FloatArray, origin: FloatArray, no
     if distance < max(sensor["min_height_m"], 1e-3):
         out[0], out[1], out[2] = 0.0, 0.0, 0.0
         return
-    spread = sensor["noise_factor"] * sensor["noise_rad_s"]
+    spread = with_fault(sensor["noise_rad_s"], sensor["fault_noise"])
     out[0] = limited(state[10] - velocity.y / distance + bias[0] + spread * noise[0], most)
     out[1] = limited(state[11] + velocity.x / distance + bias[1] + spread * noise[1], most)
     out[2] = 1.0 if abs(out[0]) < most and abs(out[1]) < most else 0.0
@@ -48,7 +48,7 @@ class OpticalFlow:
         self._noise = NormalStream(seed, "flow", width=2)
         self._origin: FloatArray = np.zeros(3)
         write_numbers(self.records[0], vehicle.sensors.numbers["flow"])
-        self.records[0]["noise_factor"], self.records[0]["surface_z"] = 1.0, foot_z_m(vehicle)
+        self.records[0]["surface_z"] = foot_z_m(vehicle)
 
     def measure(self, state: FloatArray) -> None:
         """Measure at a state."""

@@ -13,7 +13,7 @@ from flightstack.core.geometry import rotate
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.plant.dimensions import foot_z_m
 from sim_bridge.sensors.layout import RANGE, write_numbers
-from sim_bridge.sensors.noise import NormalStream, quantised
+from sim_bridge.sensors.noise import NormalStream, quantised, with_fault
 
 _LEAST_COSINE = 0.5
 
@@ -37,8 +37,9 @@ def measure_range(sensors: RecordArray, state: FloatArray, noise: FloatArray) ->
     if sensor["is_frozen"] != 0:
         return
     true = ground_distance_m(state, sensor["position_frd_m"], sensor["surface_z"])
-    error = sensor["noise_m"] * noise[0] + sensor["noise_share"] * true * noise[1]
-    value = quantised(true + sensor["noise_factor"] * error + sensor["fault_bias"][0], sensor["resolution_m"])
+    error = with_fault(sensor["noise_m"], sensor["fault_noise"]) * noise[0]
+    error += sensor["noise_share"] * true * noise[1]
+    value = quantised(true + error + sensor["fault_bias"][0], sensor["resolution_m"])
     has_echo = true >= 0.0 and sensor["min_m"] <= value <= sensor["max_m"]
     sensor["out"][0], sensor["out"][1] = (value, 1.0) if has_echo else (sensor["max_m"], 0.0)
 
@@ -50,7 +51,7 @@ class Rangefinder:
         self.records: RecordArray = np.zeros(1, RANGE)
         self._noise = NormalStream(seed, "range", width=2)
         write_numbers(self.records[0], vehicle.sensors.numbers["range"])
-        self.records[0]["noise_factor"], self.records[0]["surface_z"] = 1.0, foot_z_m(vehicle)
+        self.records[0]["surface_z"] = foot_z_m(vehicle)
 
     def measure(self, state: FloatArray) -> None:
         """Measure at a state."""

@@ -97,10 +97,10 @@ def test_pressure_is_that_of_the_standard_atmosphere(altitude_m: float, pressure
 
 
 def baro(
-    vehicle, state=HIGH, airspeed: float = 0.0, thrust: float = 0.0, altitude: float = 500.0
+    vehicle, state=HIGH, airspeed: float = 0.0, speed: float = 0.0, altitude: float = 500.0
 ) -> np.ndarray:
     sensor = Barometer(vehicle, 1, altitude)
-    sensor.measure(state, airspeed, thrust)
+    sensor.measure(state, airspeed, np.full(8, speed, dtype="f4"))
     return sensor.records[0]["out"].copy()
 
 
@@ -123,12 +123,13 @@ def test_barometer_feels_its_share_of_the_dynamic_pressure() -> None:
 
 def test_barometer_feels_the_downwash_near_the_ground() -> None:
     """The share of the disc loading at half a radius of a rotor, a quarter of it at one radius."""
-    radius, thrust = propeller_radius_m(X_QUAD), 15.0
-    loading_hpa = 0.01 * thrust / (4.0 * math.pi * radius**2)
+    radius, speed = propeller_radius_m(X_QUAD), 650.0
+    thrust = X_QUAD.rotors[0].thrust_coefficient_n_s2 * speed**2
+    loading_hpa = 0.01 * thrust / (math.pi * radius**2)
     vehicle = with_sensors(baro={"ground_effect_share": 0.2})
     for height, share in ((0.5 * radius, 0.2), (radius, 0.05), (0.1 * radius, 0.2)):
         at = state_at(position=(0.0, 0.0, FOOT - height))
-        assert baro(vehicle, at, 0.0, thrust)[0] - baro(vehicle, at)[0] == pytest.approx(share * loading_hpa)
+        assert baro(vehicle, at, 0.0, speed)[0] - baro(vehicle, at)[0] == pytest.approx(share * loading_hpa)
 
 
 def test_barometer_drift_has_the_covariance_of_a_gauss_markov_process() -> None:
@@ -139,7 +140,7 @@ def test_barometer_drift_has_the_covariance_of_a_gauss_markov_process() -> None:
     )
     drift = np.empty(20_000)
     for index in range(len(drift)):
-        sensor.measure(HIGH, 0.0, 0.0)
+        sensor.measure(HIGH, 0.0, np.zeros(8, dtype="f4"))
         drift[index] = sensor.records[0]["out"][0] - standard_pressure_hpa(100.0)
     for lag in (0, 5, 10):
         covariance = np.mean(drift[: len(drift) - lag] * drift[lag:])
