@@ -10,7 +10,7 @@ from sim_bridge.server.connection import Connection, StoppedError, StopSignal
 from sim_bridge.server.endpoint import FlightStackEndpoint
 from sim_bridge.server.pacing import Pacer
 
-FREEWHEEL_S = 0.02
+FREEWHEEL_S = 0.05
 """Wait for an answer while the client's answers have not begun; PX4 takes 20 to 40 steps to start."""
 
 
