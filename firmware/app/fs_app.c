@@ -50,6 +50,9 @@ static void handle(fs_app *app)
     case FS_PIL_STEP_ID:
         fs_app_on_step(app);
         break;
+    case FS_PIL_TICK_ID:
+        fs_app_on_tick(app);
+        break;
     case FS_PARAM_REQUEST_LIST_ID:
         fs_app_on_param_list(app);
         break;

@@ -42,6 +42,9 @@
 #define FS_APP_OVERRUN 0x40000UL
 #define FS_APP_BAD_INPUT 0x80000UL
 
+#define FS_APP_PROTOCOL 2U /* version of the FS_PIL messages: FS_PIL_IDENTITY.protocol */
+#define FS_APP_WINDOW 8U   /* steps whose answers are kept, so that a host may send as many before the first answer */
+
 #define FS_APP_STEP_TIMEOUT_MS 1000UL /* without a step: no host steps any more */
 #define FS_APP_SILENCE_MS 20UL        /* without an octet: what is held of a frame will not be completed */
 #define FS_APP_PERIOD_MS 1000UL       /* between heartbeats, between status messages, between complaints */
@@ -58,6 +61,13 @@ typedef struct {
     uint32_t (*stack_high_water)(void); /* most of it that was ever used; NULL: unknown */
 } fs_port;
 
+/* A step and its report, for the case that the report is lost. */
+typedef struct {
+    fs_pil_step step;
+    fs_pil_report report;
+    uint16_t is_short; /* 1: it came as an FS_PIL_TICK, and is answered by an FS_PIL_OUTPUT */
+} fs_answered;
+
 /* The state of the application: the caller owns it, and looks only at what fs_app_* functions tell. */
 typedef struct {
     const fs_port *port;
@@ -73,9 +83,8 @@ typedef struct {
     uint16_t state;        /* FS_APP_READY … */
 
     uint32_t expected;    /* number of the next step */
-    uint16_t has_stepped; /* the last step and its report are kept */
-    fs_pil_step step;
-    fs_pil_report report;
+    fs_answered answered[FS_APP_WINDOW]; /* a ring of the last steps of this flight */
+    uint16_t kept, newest;               /* how many there are; place of the last one */
     uint32_t steps, repeats, out_of_order, loop_overruns, safe_states;
 
     uint32_t uart_overruns, uart_errors, told_overruns; /* the last: of those that were complained about */

@@ -27,6 +27,8 @@ static uint16_t send_identity(fs_app *app)
     fs_text_put(message.board, BOARD_SIZE, app->port->board);
     fs_text_put(message.compiler, COMPILER_SIZE, app->port->compiler);
     message.compiler[COMPILER_SIZE - 1U] = 0U; /* a cut version must not look whole to who wants a NUL */
+    message.protocol = FS_APP_PROTOCOL;
+    message.window = FS_APP_WINDOW;
     length = fs_pil_identity_encode(&message, app->payload);
     return fs_outbox_put(&app->outbox, FS_PIL_IDENTITY_ID, app->payload, length, FS_OUTBOX_ANSWER);
 }

@@ -27,6 +27,7 @@ void fs_app_tell_alarm(fs_app *app); /* if there is one, and room */
 
 /* fs_app_pil.c: steps of the loops */
 void fs_app_on_step(fs_app *app);
+void fs_app_on_tick(fs_app *app);
 void fs_app_on_new_numbers(fs_app *app);
 void fs_app_forget_flight(fs_app *app); /* step 0 or one with RESET is expected next; the state stays */
 

@@ -46,6 +46,8 @@ MESSAGES = (
     "FS_PIL_REPORT",
     "FS_PIL_STATUS",
     "FS_PIL_IDENTITY",
+    "FS_PIL_TICK",
+    "FS_PIL_OUTPUT",
 )
 """What a target speaks. The parser passes over every other message."""
 

@@ -13,7 +13,7 @@ import numpy as np
 from flightstack.core.atomic_file import write_bytes_atomically, write_text_atomically
 from flightstack.core.contract import LoopFlags
 from flightstack.firmware.pil_client import PilCounters
-from flightstack.firmware.pil_operations import PilReport
+from flightstack.firmware.pil_steps import PilReport
 
 LINK_FILE, STEPS_FILE = "pil-link.json", "pil-steps.npz"
 COST_UNITS = ("none", "cycles", "instructions", "ns")

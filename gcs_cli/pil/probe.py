@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flightstack.core.contract import LoopFlags
+from flightstack.firmware.identity import described
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilClient, PilCounters, PilTiming
-from flightstack.firmware.target_loops import described
 from flightstack.transports.byte_link import ByteLink
 
 EXCHANGES = 300

@@ -227,6 +227,11 @@ def step(
     return mavlink.MAVLink_fs_pil_step_message(number, flags, list(state), [*setpoint, *[0.0] * 11][:11])
 
 
+def tick(number: int, flags: int = 0, values: Sequence[float] = LEVEL[6:]) -> Any:
+    """Return an FS_PIL_TICK; ``values`` as in the message, the rest zero."""
+    return mavlink.MAVLink_fs_pil_tick_message(number, flags, [*values, *[0.0] * 24][:24])
+
+
 def command(number: int, *values: float, system: int = 1, component: int = 1) -> Any:
     """Return a COMMAND_LONG."""
     parameters = [*values, *[0.0] * 7][:7]
