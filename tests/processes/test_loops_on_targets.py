@@ -91,7 +91,9 @@ def test_short_steps_fly_the_same_flight_and_log_fewer_stages(tmp_path: Path, in
     wrench, idle = log.get_dataset("wrench").data, 32
     assert np.isnan(wrench["torque_n_m[0]"][wrench["status"] != idle]).all()
     link = json.loads((tmp_path / "run" / "pil-link.json").read_text())
-    assert link["link"]["octets_sent"] / link["steps"] < 90  # 48 in an inner tick, at most 116 in an outer one
+    assert (
+        link["link"]["octets_sent"] / link["steps"] < 90
+    )  # 48 in an inner tick, at most 116 in an outer one
     assert link["link"]["octets_received"] / link["steps"] < 70  # 40, 60 or 56
 
 
