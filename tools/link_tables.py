@@ -11,7 +11,7 @@ from flightstack.firmware.line_model import (
     spare_latency_s,
 )
 
-BAUDS = (115_200, 460_800, 921_600, 2_000_000)
+BAUDS = (115_200, 460_800, 921_600, 2_000_000, 2_500_000)
 TIMERS_S = (0.0, 1e-3, 16e-3)
 RATES_HZ = ((500.0, 5), (1000.0, 10))
 """Inner rate, and inner ticks per outer tick."""
@@ -47,7 +47,7 @@ and target, to keep the inner rate in real time.
 * 500 Hz in lockstep fit at 921 600 baud with short steps if the bridge delays an answer by {half_ms:.2f} ms at most;
   with a latency timer of 1 ms they reach {half_hz:.0f} steps/s.
 * 1 kHz fits at 2 Mbaud if it delays an answer by {one_ms:.2f} ms at most; with a timer of 1 ms it reaches
-  {one_hz:.0f} steps/s.
+  {one_hz:.0f} steps/s. The F28377S cannot make 2 Mbaud; it makes 2.5 Mbaud.
 
 A flight in lockstep does not depend on any of this: a slower line makes it longer and changes nothing in it.
 """

@@ -28,6 +28,7 @@ void fs_app_init(fs_app *app, const fs_port *port)
     app->alarm = NULL;
     app->alarm_severity = 0U;
     app->next_listed = fs_param_count();
+    fs_app_baud_init(app);
     fs_app_forget_flight(app);
     app->state = FS_APP_READY;
     if (port->was_watchdog != 0U) {
@@ -46,6 +47,7 @@ uint16_t fs_app_is_target(fs_octet system, fs_octet component)
 
 static void handle(fs_app *app)
 {
+    fs_app_baud_heard(app);
     switch (app->frame.id) {
     case FS_PIL_STEP_ID:
         fs_app_on_step(app);
@@ -134,6 +136,7 @@ static void tell_news(fs_app *app)
 void fs_app_poll(fs_app *app, uint32_t now_ms)
 {
     app->now_ms = now_ms;
+    fs_app_baud_poll(app);
     listen_for_silence(app);
     if ((app->state == FS_APP_STEPPING) && ((now_ms - app->last_step_ms) >= FS_APP_STEP_TIMEOUT_MS)) {
         app->state = FS_APP_READY; /* nothing is forgotten: the host may go on */
@@ -164,6 +167,7 @@ uint32_t fs_app_wait_ms(const fs_app *app)
     if (app->state == FS_APP_STEPPING) {
         wait_at_most(app, app->last_step_ms, FS_APP_STEP_TIMEOUT_MS, &wait_ms);
     }
+    wait_at_most(app, app->now_ms, fs_app_baud_wait_ms(app), &wait_ms);
     if (app->alarm != NULL) { /* the outbox may have room soon */
         wait_at_most(app, app->now_ms, FS_APP_SILENCE_MS, &wait_ms);
     }

@@ -47,6 +47,7 @@
 
 #define FS_APP_STEP_TIMEOUT_MS 1000UL /* without a step: no host steps any more */
 #define FS_APP_SILENCE_MS 20UL        /* without an octet: what is held of a frame will not be completed */
+#define FS_APP_BAUD_TRIAL_MS 1000UL /* at a new baud rate without a frame: go back */
 #define FS_APP_PERIOD_MS 1000UL       /* between heartbeats, between status messages, between complaints */
 
 /* What the application has to know about where it runs; it stays the port's and must outlive the application. */
@@ -59,7 +60,17 @@ typedef struct {
     const fs_octet *source_hash;       /* 8 octets */
     uint32_t stack_size;               /* in the smallest addressable unit */
     uint32_t (*stack_high_water)(void); /* most of it that was ever used; NULL: unknown */
+    uint32_t baud;                      /* of the line at the start; 0: it has no rate */
+    uint16_t (*can_set_baud)(uint32_t baud); /* 1: the line can run at this rate; NULL: at no other one */
+    uint16_t (*set_baud)(uint32_t baud);     /* change the rate; 0: not yet, octets are still being sent */
 } fs_port;
+
+/* The baud rate of the line; see fs_app_baud.c. */
+typedef struct {
+    uint32_t baud, next, former;     /* present one; another one if a change is due; the one to go back to */
+    uint32_t since_ms, unframed_ms;  /* when it began; when the first octet without a frame came */
+    uint16_t is_on_trial, is_unframed, has_heard; /* the last: a frame, since noise was looked for */
+} fs_line;
 
 /* A step and its report, for the case that the report is lost. */
 typedef struct {
@@ -87,6 +98,7 @@ typedef struct {
     uint16_t kept, newest;               /* how many there are; place of the last one */
     uint32_t steps, repeats, out_of_order, loop_overruns, safe_states;
 
+    fs_line line;
     uint32_t uart_overruns, uart_errors, told_overruns; /* the last: of those that were complained about */
     const char *alarm;                                  /* a text that waits for room in the outbox; NULL: none */
     uint16_t alarm_severity;

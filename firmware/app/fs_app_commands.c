@@ -29,6 +29,7 @@ static uint16_t send_identity(fs_app *app)
     message.compiler[COMPILER_SIZE - 1U] = 0U; /* a cut version must not look whole to who wants a NUL */
     message.protocol = FS_APP_PROTOCOL;
     message.window = FS_APP_WINDOW;
+    message.baud = app->line.baud;
     length = fs_pil_identity_encode(&message, app->payload);
     return fs_outbox_put(&app->outbox, FS_PIL_IDENTITY_ID, app->payload, length, FS_OUTBOX_ANSWER);
 }
@@ -133,6 +134,8 @@ void fs_app_on_command(fs_app *app)
         result = request_message(app, message.param1);
     } else if (message.command == FS_MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN) {
         result = reboot(app, message.param1);
+    } else if (message.command == FS_MAV_CMD_FS_SET_BAUD_RATE) {
+        result = fs_app_set_baud(app, message.param1);
     } else {
         /* no other command */
     }

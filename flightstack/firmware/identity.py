@@ -39,6 +39,7 @@ def described(identity: Any) -> dict[str, Any]:
         "char_bits": identity.char_bits,
         "protocol": identity.protocol,
         "window": identity.window,
+        "baud": identity.baud,
     }
 
 

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from flightstack.firmware.pil_operations import Operation, Request, Result, SetNumber, message_of
+from flightstack.firmware.pil_operations import Command, Operation, Request, Result, SetNumber, message_of
 from flightstack.firmware.pil_steps import (
     OWN_COMPONENT,
     OWN_SYSTEM,
@@ -103,6 +103,10 @@ class PilClient:
     def start_request(self, name: str) -> None:
         """Request the message of this name."""
         self._start(Request(name))
+
+    def start_command(self, number: int, refusal: str, *values: float) -> None:
+        """Send a command; ``refusal`` is the failure if it is refused."""
+        self._start(Command(number, refusal, values))
 
     @property
     def result(self) -> Result:

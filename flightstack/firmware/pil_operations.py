@@ -1,8 +1,9 @@
-"""Operations on a target besides steps: set a number, request a message. Pure."""
+"""Operations on a target besides steps: set a number, request a message, command. Pure."""
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from typing import Protocol, TypeAlias
 
 from flightstack.core.float32 import as_float32
@@ -101,6 +102,36 @@ class Request:
     def silence(self, attempts: int) -> str:
         """Return why the request fails."""
         return f"did not answer {attempts} requests for {self._name}: check its firmware and the baud rate"
+
+
+class Command:
+    """Sends a command and waits for its acknowledgement."""
+
+    def __init__(self, number: int, refusal: str, values: Sequence[float]) -> None:
+        """``refusal`` is the failure of a refused command, as a clause about the target."""
+        self.result: Message | None = None
+        self.failure: str | None = None
+        self._number, self._refusal, self._values = number, refusal, [*values, *[0.0] * 7][:7]
+
+    def frames(self, codec: Link, sequence: int) -> list[bytes]:
+        """Return the COMMAND_LONG."""
+        message = mavlink.MAVLink_command_long_message(
+            TARGET_SYSTEM, TARGET_COMPONENT, self._number, 0, *self._values
+        )
+        return [codec.encode(message)]
+
+    def take_message(self, message: Message) -> None:
+        """Process the acknowledgement; after a temporary rejection the command is resent."""
+        if message.get_type() != "COMMAND_ACK" or message.command != self._number:
+            return
+        if message.result == mavlink.MAV_RESULT_ACCEPTED:
+            self.result = message
+        elif message.result not in _NOT_REFUSED:
+            self.failure = self._refusal
+
+    def silence(self, attempts: int) -> str:
+        """Return why the command fails."""
+        return f"did not acknowledge command {self._number}, sent {attempts} times"
 
 
 _NOT_REFUSED = (

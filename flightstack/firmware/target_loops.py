@@ -15,15 +15,14 @@ from flightstack.core.errors import TargetError, WrongFirmwareError
 from flightstack.core.float32 import as_float32
 from flightstack.firmware.c_loops import INPUT_SIZE, OUTPUT_SIZE, SETPOINT_AT, TARGET_AT
 from flightstack.firmware.identity import check_identity, described
-from flightstack.firmware.pil_client import DEFAULT_TIMING, PilClient, PilCounters, PilTiming
+from flightstack.firmware.pil_client import DEFAULT_TIMING, PilCounters, PilTiming
 from flightstack.firmware.pil_record import PilRecord
+from flightstack.firmware.pil_session import PilSession
 from flightstack.firmware.pil_steps import WANT_REFERENCE, StepInput
 from flightstack.firmware.sources import source_hash
 from flightstack.transports.byte_link import ByteLink
 
 NOTHING = (0.0,) * (TARGET_AT - SETPOINT_AT - ATTITUDE_TARGET_SIZE)
-MOST_READS = 100_000
-"""Maximum reads per attempt, which bounds a step on a link with endless data."""
 FINAL_ATTEMPTS = 6
 """Attempts to read the target's counters at the end."""
 
@@ -43,15 +42,17 @@ class TargetLoops:
         clock_s: Callable[[], float] = time.monotonic,
         expected_hash: bytes | None = None,
         short: bool = False,
+        note: str | None = None,
     ) -> None:
         """Check the target and set ``numbers``; raise TargetError, WrongFirmwareError.
 
         ``expected_hash`` is the source hash required of the target, by default that of this installation. ``short``
         steps send and report only what a flight needs, for a slow line: of the stages, the output has the rotor speed
         commands, in outer ticks the attitude target, once per outer period the attitude reference, else NaN.
+        ``note`` is a sentence about the link for version and record.
         """
-        self._link, self._client, self._clock_s = link, PilClient(timing), clock_s
-        self._waited_s = 0.0  # added to the clock: an emulated target waits without real time
+        self._session = PilSession(link, timing, clock_s)
+        self._link, self._client = link, self._session.client
         self._numbers: dict[str, float] = {}
         self._pending: list[tuple[str, float]] = []  # set one by one: integrals are scaled at each
         self._is_closed = False
@@ -66,12 +67,13 @@ class TargetLoops:
         self.identity = described(identity)
         self._window = max(1, identity.window)
         self._short = ShortSteps(numbers) if short else None
-        self.record = PilRecord(link.name, self.identity, self._counters())
-        details = (
+        self.record = PilRecord(link.name, self.identity, self._counters(), note)
+        details = [
             self.identity["board"],
             f"sources {self.identity['source_hash']}",
             self.identity["compiler"],
-        )
+            *([] if note is None else [note]),
+        ]
         self.version = f"C, float, {', '.join(details)}"
         for name, value in numbers.items():
             self.set(name, value)
@@ -122,11 +124,11 @@ class TargetLoops:
 
     def _run_steps(self, flags: Sequence[int]) -> None:
         """Finish the steps of the client and record them, also those before a failure."""
-        began_s = self._clock_s()
+        began_s = self._session.clock_s()
         try:
             self._finish()
         finally:  # a step that ended in the safe state has a report too
-            share_s = (self._clock_s() - began_s) / len(flags)
+            share_s = (self._session.clock_s() - began_s) / len(flags)
             for flag, step in zip(flags, self._client.steps, strict=True):
                 if step.result is not None:
                     self.record.add(flag, step.result, step.attempts, share_s)
@@ -155,47 +157,21 @@ class TargetLoops:
         """Counters of the link."""
         return self._client.counters
 
-    @property
-    def _now_s(self) -> float:
-        return self._clock_s() + self._waited_s
-
     def _finish(self) -> Any:
         """Run the link until the operation ends; return its result or raise TargetError."""
-        client, link = self._client, self._link
+        client = self._client
         try:
-            while client.failure is None and client.result is None:
-                data = client.poll(self._now_s)
-                if data:
-                    link.write(data)
-                self._receive()
+            result = self._session.finish()
         except (OSError, RuntimeError) as error:  # link or emulated processor failed
             self.ending = str(error)
             raise TargetError(str(error)) from error
         if client.failure is not None:
-            sentence = f"the target on {link.name} {client.failure}"
+            sentence = f"the target on {self._link.name} {client.failure}"
             if client.texts:
                 sentence += f"; its last message: {client.texts[-1][1]}"
             self.ending = sentence
             raise TargetError(sentence)
-        return client.result
-
-    def _receive(self) -> None:
-        """Read until the end or deadline of the operation."""
-        client, link = self._client, self._link
-        for _ in range(MOST_READS):
-            deadline_s = client.next_deadline()
-            if deadline_s is None:
-                return
-            left_s = deadline_s - self._now_s
-            if left_s <= 0.0:
-                return
-            before_s = self._clock_s()
-            data = link.read(left_s)
-            if data:
-                client.receive(data, self._now_s)
-            else:  # time passed on an emulated target but not on the clock
-                self._waited_s += max(0.0, left_s - (self._clock_s() - before_s))
-        self._waited_s += max(0.0, (client.next_deadline() or 0.0) - self._now_s)
+        return result
 
     def _request(self, name: str) -> Any:
         self._client.start_request(name)

@@ -21,6 +21,7 @@ from flightstack.firmware.choice import (
     parse_loops,
 )
 from flightstack.firmware.law_tree import firmware_for
+from flightstack.firmware.line_rate import negotiate_baud
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilTiming
 from flightstack.firmware.target_loops import TargetLoops
 from flightstack.transports.byte_link import ByteLink, LineError
@@ -140,9 +141,11 @@ def timing_of(choice: LoopsChoice) -> PilTiming:
 
 def connect(choice: LoopsChoice, numbers: dict[str, float]) -> TargetLoops:
     """Return the loops on a target with their numbers; raise BuildError, LineError, TargetError, WrongFirmwareError."""
-    link = open_link(choice)
+    link, timing, note = open_link(choice), timing_of(choice), None
     try:
-        return TargetLoops(link, numbers, timing_of(choice), short=choice.ending == SHORT)
+        if isinstance(link, SerialPort):
+            note = negotiate_baud(link, choice.baud, timing)
+        return TargetLoops(link, numbers, timing, short=choice.ending == SHORT, note=note)
     except BaseException:
         link.close()
         raise

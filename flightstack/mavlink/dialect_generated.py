@@ -2,6 +2,10 @@
 
 from flightstack.mavlink.layout import Field, Layout
 
+ENTRIES = {
+    "MAV_CMD_FS_SET_BAUD_RATE": 53000,
+}
+
 LAYOUTS = (
     Layout(
         291,
@@ -215,6 +219,7 @@ LAYOUTS = (
             Field("compiler", "s", 48, True, "char", "", 6),
             Field("protocol", "B", 1, False, "uint8_t", "", 7, True),
             Field("window", "B", 1, False, "uint8_t", "", 8, True),
+            Field("baud", "I", 1, False, "uint32_t", "Bd", 9, True),
         ),
     ),
     Layout(

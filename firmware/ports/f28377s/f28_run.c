@@ -32,6 +32,9 @@ static void describe_port(uint16_t was_watchdog)
     port.source_hash = source_hash;
     port.stack_size = F28_STACK_WORDS;
     port.stack_high_water = &f28_stack_high_water;
+    port.baud = F28_BAUD;
+    port.can_set_baud = &f28_serial_can_set_baud;
+    port.set_baud = &f28_serial_set_baud;
 }
 
 void f28_start(void)
