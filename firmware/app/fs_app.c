@@ -4,9 +4,31 @@
 #include "fs_constants.h"
 #include "fs_params.h"
 
+#define CALIBRATIONS 16U
+
+/* Least difference of two readings, one right after the other. */
+static uint32_t overhead_of(fs_clock clock)
+{
+    uint32_t least = 0xFFFFFFFFUL, first, between;
+    uint16_t i;
+
+    if (clock == NULL) {
+        return 0UL;
+    }
+    for (i = 0U; i < CALIBRATIONS; i++) {
+        first = clock();
+        between = clock() - first;
+        if (between < least) {
+            least = between;
+        }
+    }
+    return least;
+}
+
 void fs_app_init(fs_app *app, const fs_port *port)
 {
     app->port = port;
+    app->clock_overhead = overhead_of(port->clock);
     fs_parser_init(&app->parser);
     fs_outbox_init(&app->outbox);
     app->now_ms = 0UL;

@@ -52,7 +52,7 @@
 
 /* What the application has to know about where it runs; it stays the port's and must outlive the application. */
 typedef struct {
-    fs_clock clock;                    /* cost counter that counts up modulo 2^32; NULL: none */
+    fs_clock clock;                    /* cost counter that counts up modulo 2^32, not in interrupts; NULL: none */
     uint32_t clock_hz;                 /* of the processor; 0: unknown or emulated */
     uint16_t cost_unit;                /* FS_COST_* */
     uint16_t was_watchdog;             /* 1: this start is the watchdog's doing */
@@ -89,6 +89,7 @@ typedef struct {
     fs_octet payload[FS_MAX_PAYLOAD]; /* where a payload is made */
 
     uint32_t now_ms, last_octet_ms, last_step_ms, last_heartbeat_ms, last_status_ms, last_complaint_ms;
+    uint32_t clock_overhead; /* cost of a clock reading; costs are told without it */
     uint16_t is_polled;    /* the three times of last news mean something */
     uint16_t has_received; /* octets since the last poll */
     uint16_t state;        /* FS_APP_READY … */
@@ -105,7 +106,7 @@ typedef struct {
     uint16_t next_listed;                               /* index of the next parameter of a list; the count: no list */
 } fs_app;
 
-/* Begin: parameters at their defaults, state READY (or RESTARTED), step 0 or one with RESET expected. */
+/* Measure the clock's overhead, and begin: parameters at their defaults, state READY (or RESTARTED), step 0 or one with RESET expected. */
 void fs_app_init(fs_app *app, const fs_port *port);
 
 /* Take an octet from the line; its high bits may be anything. Answers wait for fs_app_transmit. */

@@ -30,6 +30,7 @@ static uint16_t send_identity(fs_app *app)
     message.protocol = FS_APP_PROTOCOL;
     message.window = FS_APP_WINDOW;
     message.baud = app->line.baud;
+    message.clock_overhead = app->clock_overhead;
     length = fs_pil_identity_encode(&message, app->payload);
     return fs_outbox_put(&app->outbox, FS_PIL_IDENTITY_ID, app->payload, length, FS_OUTBOX_ANSWER);
 }

@@ -51,6 +51,20 @@ static void send_refusal(fs_app *app, uint32_t number, uint32_t status, uint16_t
     send_report(app, &report, 0UL, is_short);
 }
 
+static uint32_t less(uint32_t cost, uint32_t overhead)
+{
+    return (cost > overhead) ? (cost - overhead) : 0UL;
+}
+
+/* Take the readings of the clock out of what it measured. */
+static void take_overhead_out(const fs_app *app, fs_loop_cost *cost)
+{
+    cost->outer = less(cost->outer, app->clock_overhead);
+    cost->inner = less(cost->inner, app->clock_overhead);
+    cost->mixer = less(cost->mixer, app->clock_overhead);
+    cost->whole = less(cost->whole, app->clock_overhead * ((uint32_t)cost->readings - 1U));
+}
+
 /* Tell whether a step took longer than a period of the inner loop, where the clock's rate is known. */
 static uint16_t is_overrun(const fs_app *app, const fs_loop_cost *cost)
 {
@@ -88,6 +102,7 @@ static void compute(fs_app *app, const fs_pil_step *step, uint16_t is_short)
 
     fs_pil_to_input(step, &input);
     fs_loops_step(&app->loops, &input, app->port->clock, &output, &cost);
+    take_overhead_out(app, &cost);
     answered->step = *step;
     answered->is_short = is_short;
     app->expected = step->step + 1UL;

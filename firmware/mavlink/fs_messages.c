@@ -401,6 +401,7 @@ uint16_t fs_pil_identity_encode(const fs_pil_identity *m, fs_octet *payload)
     fs_put_octet(&payload[87], m->protocol);
     fs_put_octet(&payload[88], m->window);
     fs_put_u32(&payload[89], m->baud);
+    fs_put_u32(&payload[93], m->clock_overhead);
     return fs_trimmed(payload, FS_PIL_IDENTITY_LENGTH);
 }
 
@@ -416,6 +417,7 @@ void fs_pil_identity_decode(const fs_octet *payload, uint16_t length, fs_pil_ide
     m->protocol = fs_get_octet(payload, length, 87U);
     m->window = fs_get_octet(payload, length, 88U);
     m->baud = fs_get_u32(payload, length, 89U);
+    m->clock_overhead = fs_get_u32(payload, length, 93U);
 }
 
 uint16_t fs_pil_tick_encode(const fs_pil_tick *m, fs_octet *payload)

@@ -227,7 +227,7 @@ void fs_pil_status_decode(const fs_octet *payload, uint16_t length, fs_pil_statu
 
 /* FS_PIL_IDENTITY */
 #define FS_PIL_IDENTITY_ID 53013U
-#define FS_PIL_IDENTITY_LENGTH 93U
+#define FS_PIL_IDENTITY_LENGTH 97U
 typedef struct {
     uint32_t clock_hz; /* Hz */
     fs_octet source_hash[8];
@@ -239,6 +239,7 @@ typedef struct {
     fs_octet protocol;
     fs_octet window;
     uint32_t baud; /* Bd */
+    uint32_t clock_overhead;
 } fs_pil_identity;
 uint16_t fs_pil_identity_encode(const fs_pil_identity *m, fs_octet *payload);
 void fs_pil_identity_decode(const fs_octet *payload, uint16_t length, fs_pil_identity *m);

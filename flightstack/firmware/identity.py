@@ -40,6 +40,7 @@ def described(identity: Any) -> dict[str, Any]:
         "protocol": identity.protocol,
         "window": identity.window,
         "baud": identity.baud,
+        "clock_overhead": identity.clock_overhead,
     }
 
 

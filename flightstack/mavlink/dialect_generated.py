@@ -220,6 +220,7 @@ LAYOUTS = (
             Field("protocol", "B", 1, False, "uint8_t", "", 7, True),
             Field("window", "B", 1, False, "uint8_t", "", 8, True),
             Field("baud", "I", 1, False, "uint32_t", "Bd", 9, True),
+            Field("clock_overhead", "I", 1, False, "uint32_t", "", 10, True),
         ),
     ),
     Layout(

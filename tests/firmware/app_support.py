@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import functools
 import hashlib
+import itertools
 import os
 import subprocess
 import tempfile
@@ -33,6 +34,8 @@ GCS = (255, 190)
 Clock = ctypes.CFUNCTYPE(ctypes.c_uint32)
 BaudCall = ctypes.CFUNCTYPE(ctypes.c_uint16, ctypes.c_uint32)
 START_BAUD = 115_200
+CLOCK_READINGS = 32
+"""Of the application at its start, which measures their cost."""
 
 
 def sources(*folders: str) -> list[Path]:
@@ -121,16 +124,18 @@ class Target:
         real: str = "float",
         own_port: bool = False,
         bauds: Sequence[int] = (),
+        overhead: int = 0,
     ) -> None:
         """``ticks``: what the clock shows at each call; without, it stands still. ``own_port``: the host's.
 
-        ``bauds``: rates that the line can run at; without any, the port has no functions for rates.
+        ``bauds``: rates that the line can run at; without any, the port has no functions for rates. ``overhead``: cost
+        of reading the clock that the application finds at its start, before ``ticks``.
         """
         self.baud = START_BAUD
         self.is_sending = False
         """True while the port still sends, so that its rate cannot change."""
         self._library = library(real=real)
-        times = iter(ticks)
+        times = itertools.chain((overhead * at for at in range(CLOCK_READINGS)), ticks)
         self._hash = (ctypes.c_uint16 * 8)(*(0xFF00 + octet for octet in range(1, 9)))  # high bits: rubbish
         self._port = Port(
             Clock(lambda: next(times, 0)), clock_hz, cost_unit, was_watchdog,

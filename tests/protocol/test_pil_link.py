@@ -386,6 +386,8 @@ def test_what_is_left_of_a_flight_beside_its_log(device, tmp_path) -> None:
         "char_bits": 8,
         "protocol": 2,
         "window": 8,
+        "baud": 115_200,
+        "clock_overhead": 0,
     }
     assert told["steps"] == 200
     assert told["ending"] is None

@@ -50,8 +50,8 @@ void f28_start(void)
     f28_serial_init();
     f28_time_init();
     describe_port(was_watchdog);
-    fs_app_init(&app, &port);
     (void)Interrupt_enableGlobal();
+    fs_app_init(&app, &port); /* measures the clock as steps read it */
     f28_watchdog_start(f28_now_ms());
 }
 

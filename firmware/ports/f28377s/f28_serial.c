@@ -68,15 +68,21 @@ static void feed(void)
 
 static __interrupt void on_received(void)
 {
+    const uint32_t began = f28_interrupt_begins();
+
     fetch();
     SCI_clearInterruptStatus(SCIA_BASE, SCI_INT_RXFF);
     Interrupt_clearACKGroup(INTERRUPT_ACK_GROUP9);
+    f28_interrupt_ends(began);
 }
 
 static __interrupt void on_sent(void)
 {
+    const uint32_t began = f28_interrupt_begins();
+
     feed();
     Interrupt_clearACKGroup(INTERRUPT_ACK_GROUP9);
+    f28_interrupt_ends(began);
 }
 
 static void init_pins(void)
