@@ -123,7 +123,11 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "gcs pil generate --controller lqr",
         "gcs pil generate --controller lqr --out build/lqr",
     ),
-    "pil doctor": ("gcs pil doctor --target emulated", "gcs pil doctor --port /dev/ttyUSB1 --baud 921600"),
+    "pil doctor": (
+        "gcs pil doctor --target emulated",
+        "gcs pil doctor --port /dev/ttyUSB1 --baud 921600",
+        "gcs pil doctor --port /dev/ttyACM0 --conformance",
+    ),
 }
 
 

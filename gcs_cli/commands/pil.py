@@ -118,9 +118,17 @@ def doctor(
         typer.Option(min=1_200, help="Rate to try; may be repeated.  [default: 115200 230400 460800 921600]"),
     ] = None,
     exchanges: Annotated[int, typer.Option(min=1, max=100_000, help="Steps to measure at each rate.")] = 300,
+    conformance: Annotated[
+        bool,
+        typer.Option("--conformance", help="Check that a port keeps the contract of the firmware instead."),
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Measure the link to a target, and suggest settings."""
+    from gcs_cli.pil.conformance.command import run_conformance
     from gcs_cli.pil.pil_commands import run_doctor
 
+    if conformance:
+        run_conformance(port, target, baud, as_json)
+        return
     run_doctor(port, target, baud, exchanges, as_json)

@@ -27,7 +27,7 @@ from gcs_cli.pil.limits_file import read_limits
 from gcs_cli.pil.pil_flags import JudgeOptions
 from gcs_cli.pil.result import PASSED, Outcome
 from gcs_cli.pil.run import HTML_NAME, make_pil_directory, run, write_outcome
-from gcs_cli.pil.targets import checked_target
+from gcs_cli.pil.targets import checked_target, port_or_target
 from gcs_cli.pil.vectors import SUFFIXES, Vectors, vectors_of, write_vectors
 from gcs_cli.pil.verdict import LimitSet
 from gcs_cli.settings import check_output_file
@@ -124,9 +124,7 @@ def run_doctor(
     port: str | None, target: str | None, bauds: list[int] | None, exchanges: int, as_json: bool
 ) -> None:
     """Measure the link to a serial port or a target and print the findings; raise CliError."""
-    if (port is None) == (target is None):
-        raise CliError("give either --port DEVICE or --target", USAGE)
-    choice = checked_target(f"serial:{port}" if target is None else target)
+    choice = port_or_target(port, target)
     rates = bauds or (doctor.BAUDS if target is None else [choice.baud])
     console = FlyConsole(stderr=as_json, highlight=False)
     with step_bar("exchanges", console) as bar:

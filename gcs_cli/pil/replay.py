@@ -5,7 +5,8 @@ Logs and links to targets both carry float32: a flight with the loops in C repla
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import itertools
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
@@ -35,20 +36,17 @@ _SETPOINT_FIELDS = (
     *(f"{name}[{axis}]" for name in ("position", "velocity", "acceleration") for axis in range(3)),
     *("yaw", "yawspeed"),
 )
-_PROGRESS_STEPS = 500
+_PROGRESS_STEPS = 200
 
 
 class Loops(Protocol):
     """Computes steps of the loops; see ``flightstack.firmware.c_loops.LoopExecutor``."""
 
-    input: FloatArray
-    output: FloatArray
-
     def set(self, name: str, value: float) -> None:
         """Change a parameter from the next step on."""
 
-    def step(self, flags: int) -> None:
-        """Compute a step from ``input`` into ``output``."""
+    def run(self, flags: Sequence[int], inputs: FloatArray) -> FloatArray:
+        """Compute steps from ``inputs`` (n, 29); return their outputs (n, 32)."""
 
 
 class UnfitLogError(ValueError):
@@ -174,16 +172,13 @@ def replayed(
     count = len(record.time_us)
     outputs = np.empty((count, OUTPUT_SIZE))
     flags = record.flags.tolist()
-    for index in range(count):
-        for name, value in record.changes.get(index, ()):
+    begins = sorted({*range(0, count, _PROGRESS_STEPS), *(at for at in record.changes if at < count)})
+    for begin, end in itertools.pairwise((*begins, count)):
+        for name, value in record.changes.get(begin, ()):
             if known(name):
                 loops.set(name, value)
-        loops.input[:] = record.inputs[index]
-        loops.step(flags[index])
-        outputs[index] = loops.output
-        if index % _PROGRESS_STEPS == 0:
-            progress(index, count)
-    progress(count, count)
+        outputs[begin:end] = loops.run(flags[begin:end], record.inputs[begin:end])
+        progress(end, count)
     return outputs
 
 

@@ -15,7 +15,8 @@ from flightstack.core.contract import FloatArray
 from flightstack.core.errors import ConfigError, TargetError
 from flightstack.firmware.c_loops import CLoops, LoopsSetup
 from flightstack.firmware.choice import PYTHON, SERIAL, LoopsChoice
-from flightstack.firmware.law_tree import controller_named
+from flightstack.firmware.law_tree import controller_named, logged_params
+from flightstack.firmware.stages import has_model
 from flightstack.firmware.targets import finish_loops, make_loops
 from flightstack.flight_log.flight_log import vehicle_fields
 from flightstack.params.behaviour import SPECS
@@ -122,14 +123,16 @@ def _setup(flight: FlightSamples, log: Path, vehicle: str | None) -> LoopsSetup:
         tilt_deg = flight.parameters[_TILT]
     except KeyError as error:
         raise ConfigError(log, "", f"cannot be replayed: it does not say its {error.args[0]}") from error
+    controller = controller_named(name)
     return LoopsSetup(
         _vehicle(flight, log, vehicle),
-        controller_named(name),
+        controller,
         open_gains(DEFAULT_GAINS),  # each gain is a parameter, and the values of the log replace them
         math.radians(tilt_deg),
         inner_hz,
         outer_hz,
         max(1, round(inner_hz / outer_hz)),
+        logged_params(controller, str(info.get("law_params", "{}")), log),
     )
 
 
@@ -212,19 +215,22 @@ def judged(
     """Compare the outputs with the log and with Python's stages, and check them. Pure."""
     flight, steps = replay.flight, replay.record
     made = as_flight(steps, outputs, {})
-    expected = as_flight(steps, expected_outputs(steps, outputs, replay.setup, replay.numbers), {})
+    modelled = has_model(replay.setup)
+    computed = expected_outputs(steps, outputs, replay.setup, replay.numbers) if modelled else outputs
+    expected = as_flight(steps, computed, {})
     pair, stages = pair_name(LOG, "target"), pair_name(STAGEWISE, "target")
     differences = list(compared(pair, flight, made))
-    by_stage = list(compared(stages, expected, made))
+    by_stage = list(compared(stages, expected, made)) if modelled else []
     left_out = None if steps.tells_targets else TARGET
     of_stages = limits.stages if same_bits else board_limits(limits.stages)
     checks = [
         *(_log_checks(pair, differences, replay, made, same_bits, limits.replay) if flight.signals else ()),
-        *difference_checks(stages, by_stage, of_stages, left_out),
-        status_check(f"{stages} steps of another status", expected, made, False),
+        *(_stage_checks(stages, by_stage, of_stages, left_out, expected, made) if modelled else ()),
         *(target_checks(record, len(outputs)) if record is not None else ()),
     ]
     result = assembled([*differences, *by_stage], checks, record, facts)
+    if not modelled:
+        result["meaning"] += " A law is written in C: it has no stage in Python to compare with."
     if not replay.record.tells_targets:
         result["meaning"] += (
             " This log does not tell which attitude targets the outer loop made: all were given to the inner loop, "
@@ -245,6 +251,19 @@ def judged(
         profiles_of(record),
         costs_of(record),
     )
+
+
+def _stage_checks(
+    pair: str,
+    differences: Sequence[Difference],
+    limits: Limits,
+    left_out: str | None,
+    expected: FlightSamples,
+    made: FlightSamples,
+) -> Iterator[Check]:
+    """Yield the checks against Python's stages."""
+    yield from difference_checks(pair, differences, limits, left_out)
+    yield status_check(f"{pair} steps of another status", expected, made, False)
 
 
 def _log_checks(

@@ -96,6 +96,20 @@ def test_costs_are_differences_of_the_clock_also_when_it_wraps() -> None:
     target.close()
 
 
+def test_costs_are_told_without_the_readings_of_the_clock() -> None:
+    """10 for each of six readings: the stages have one each, the whole step five."""
+    target = Target(ticks=[1000, 1010, 1210, 1410, 1460, 1500], overhead=10)
+    assert target.request("FS_PIL_IDENTITY").clock_overhead == 10
+    assert target.step(0, RESET | OUTER_DUE).cycles == [190, 190, 40, 450]
+    target.close()
+
+
+def test_a_cost_below_that_of_the_clock_is_zero() -> None:
+    target = Target(ticks=[5 * at for at in range(6)], overhead=10)
+    assert target.step(0, RESET | OUTER_DUE).cycles == [0, 0, 0, 0]
+    target.close()
+
+
 def test_a_repeated_step_is_answered_again_and_not_computed_again(target: Target) -> None:
     aside = (0.3, 0.2, *ABOVE[2:])
     first = target.step(0, RESET | OUTER_DUE, setpoint=aside)

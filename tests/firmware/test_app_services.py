@@ -23,6 +23,7 @@ from tests.firmware.app_support import (
     kinds,
     read,
     step,
+    tick,
     write,
 )
 from tests.firmware.codec_support import damaged
@@ -187,14 +188,16 @@ def test_a_full_outbox_drops_whole_frames_the_least_important_first(target: Targ
 
 
 def test_the_outbox_is_full_with_its_last_octet(target: Target) -> None:
-    """16 values of 37 octets and 3 reports of 144 (four rotors; zeros at the end are cut) are 1024."""
+    """16 values of 37 octets, 9 reports of 144 and 4 outputs of 40 (four rotors; zeros at the end are cut) are 2048."""
     for index in range(16):
         target.give(target.pack(read("", index)))
-    for number in range(4):
+    for number in range(9):
         target.give(target.pack(step(number, RESET | OUTER_DUE)))
+    for number in range(5):
+        target.give(target.pack(tick(number, RESET)))
     data = target.take()
-    assert len(data) == 1024
-    assert kinds(target.heard(data)) == ["PARAM_VALUE"] * 16 + ["FS_PIL_REPORT"] * 3
+    assert len(data) == 2048
+    assert kinds(target.heard(data)) == ["PARAM_VALUE"] * 16 + ["FS_PIL_REPORT"] * 9 + ["FS_PIL_OUTPUT"] * 4
 
 
 @pytest.mark.parametrize(

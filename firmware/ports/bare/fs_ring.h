@@ -1,11 +1,11 @@
 /*
- * A ring of octets between an interrupt and the main loop: one of them writes, the other reads, nobody waits.
+ * A ring of octets between an interrupt and the main loop: one of them writes, the other reads, without a lock.
  *
  * The two counts run freely modulo 2^16, each is written by one side only and read in one instruction; their difference
  * is what the ring holds, so that it may be filled to its last place.
  */
-#ifndef F28_RING_H
-#define F28_RING_H
+#ifndef FS_RING_H
+#define FS_RING_H
 
 #include "fs_wire.h"
 
@@ -13,16 +13,16 @@ typedef struct {
     volatile uint16_t written, read;
     uint16_t size; /* a power of two, 2^15 at most */
     volatile fs_octet *octets;
-} f28_ring;
+} fs_ring;
 
-void f28_ring_init(f28_ring *ring, volatile fs_octet *octets, uint16_t size);
-uint16_t f28_ring_held(const f28_ring *ring);
-uint16_t f28_ring_room(const f28_ring *ring);
+void fs_ring_init(fs_ring *ring, volatile fs_octet *octets, uint16_t size);
+uint16_t fs_ring_held(const fs_ring *ring);
+uint16_t fs_ring_room(const fs_ring *ring);
 
 /* Put one octet at the end; 0, and nothing happens, when the ring is full. */
-uint16_t f28_ring_put(f28_ring *ring, fs_octet octet);
+uint16_t fs_ring_put(fs_ring *ring, fs_octet octet);
 
 /* Take the oldest octet; 0, and *octet is unchanged, when the ring is empty. */
-uint16_t f28_ring_take(f28_ring *ring, fs_octet *octet);
+uint16_t fs_ring_take(fs_ring *ring, fs_octet *octet);
 
 #endif

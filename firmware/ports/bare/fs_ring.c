@@ -1,6 +1,6 @@
-#include "f28_ring.h"
+#include "fs_ring.h"
 
-void f28_ring_init(f28_ring *ring, volatile fs_octet *octets, uint16_t size)
+void fs_ring_init(fs_ring *ring, volatile fs_octet *octets, uint16_t size)
 {
     ring->octets = octets;
     ring->size = size;
@@ -8,7 +8,7 @@ void f28_ring_init(f28_ring *ring, volatile fs_octet *octets, uint16_t size)
     ring->read = 0U;
 }
 
-uint16_t f28_ring_held(const f28_ring *ring)
+uint16_t fs_ring_held(const fs_ring *ring)
 {
     const uint16_t written = ring->written;
     const uint16_t read = ring->read;
@@ -16,16 +16,16 @@ uint16_t f28_ring_held(const f28_ring *ring)
     return (uint16_t)(((uint32_t)written - read) & 0xFFFFUL);
 }
 
-uint16_t f28_ring_room(const f28_ring *ring)
+uint16_t fs_ring_room(const fs_ring *ring)
 {
-    return (uint16_t)(ring->size - f28_ring_held(ring));
+    return (uint16_t)(ring->size - fs_ring_held(ring));
 }
 
-uint16_t f28_ring_put(f28_ring *ring, fs_octet octet)
+uint16_t fs_ring_put(fs_ring *ring, fs_octet octet)
 {
     const uint16_t at = ring->written;
 
-    if (f28_ring_held(ring) >= ring->size) {
+    if (fs_ring_held(ring) >= ring->size) {
         return 0U;
     }
     ring->octets[at & (ring->size - 1U)] = octet & 0xFFU;
@@ -33,11 +33,11 @@ uint16_t f28_ring_put(f28_ring *ring, fs_octet octet)
     return 1U;
 }
 
-uint16_t f28_ring_take(f28_ring *ring, fs_octet *octet)
+uint16_t fs_ring_take(fs_ring *ring, fs_octet *octet)
 {
     const uint16_t at = ring->read;
 
-    if (f28_ring_held(ring) == 0U) {
+    if (fs_ring_held(ring) == 0U) {
         return 0U;
     }
     *octet = ring->octets[at & (ring->size - 1U)];
