@@ -15,7 +15,7 @@ from flightstack.core.contract import FloatArray
 from flightstack.core.errors import ConfigError, TargetError
 from flightstack.firmware.c_loops import CLoops, LoopsSetup
 from flightstack.firmware.choice import PYTHON, SERIAL, LoopsChoice
-from flightstack.firmware.law_tree import controller_named, logged_params
+from flightstack.firmware.law_tree import controller_named, logged_params, own_params
 from flightstack.firmware.stages import has_model
 from flightstack.firmware.targets import finish_loops, make_loops
 from flightstack.flight_log.flight_log import vehicle_fields
@@ -111,7 +111,7 @@ def configured(
         max(1, round(inner_hz / outer_hz)),
     )
     info = {**vehicle_fields(flown), "controller": controller, "gains": gains}
-    info |= {"inner_hz": inner_hz, "outer_hz": outer_hz}
+    info |= {"inner_hz": inner_hz, "outer_hz": outer_hz, **own_params(setup)}
     own = {name: value for name, value in setup.numbers().items() if not name.startswith(_OF_TARGET)}
     return setup, info, own
 
