@@ -14,7 +14,8 @@ from tests.firmware.codec_support import compiler
 from tests.support.tools import missing
 
 TESTS = [
-    str(Path(__file__).with_name(f"test_app_{name}.py")) for name in ("pil", "windows", "baud", "services")
+    str(Path(__file__).with_name(f"test_app_{name}.py"))
+    for name in ("pil", "windows", "baud", "free", "services")
 ]
 NEEDLESS = "double"
 """Part of the names of tests that would compile another library."""
