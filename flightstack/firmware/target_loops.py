@@ -13,6 +13,7 @@ from flightstack.core.contract import ATTITUDE_TARGET_SIZE, FloatArray, LoopFlag
 from flightstack.core.errors import TargetError, WrongFirmwareError
 from flightstack.core.float32 import as_float32
 from flightstack.firmware.c_loops import INPUT_SIZE, OUTPUT_SIZE, SETPOINT_AT, TARGET_AT
+from flightstack.firmware.numbers import FIRST_NUMBERS
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilClient, PilCounters, PilTiming
 from flightstack.firmware.pil_operations import PilReport
 from flightstack.firmware.pil_record import COST_UNITS, PilRecord
@@ -66,7 +67,7 @@ class TargetLoops:
             self.identity["compiler"],
         )
         self.version = f"C, float, {', '.join(details)}"
-        for name, value in numbers.items():
+        for name, value in (*FIRST_NUMBERS.items(), *numbers.items()):
             self.set(name, value)
         self._send_numbers()
 
