@@ -14,6 +14,7 @@ from flightstack.params.behaviour import Behaviour
 from sim_bridge.plant.fault_table import SENSORS, TABLE, Row
 from tools.generated import ROOT, write_or_check
 from tools.law_subset import subset_page
+from tools.link_tables import link_page
 from tools.scenario_page import scenarios_page, schema_text
 from tools.sensor_page import sensor_page
 from tools.watch_keys import keys_page
@@ -299,6 +300,7 @@ if __name__ == "__main__":
         "scenarios.md": scenarios_page(NOTE.format(source="flightstack/testing")),
         "scenario.schema.json": schema_text(),
         "generated-c.md": subset_page(NOTE.format(source="flightstack/firmware/generator")),
+        "pil-link.md": link_page(NOTE.format(source="flightstack/firmware/line_model.py")),
         "watch-keys.md": keys_page(NOTE.format(source="gcs_cli/tui")),
     }
     sys.exit(write_or_check({FOLDER / name: text for name, text in pages.items()}))

@@ -115,8 +115,8 @@ class Table:
         """Return True if ``key`` is present."""
         return key in self._values
 
-    def expect(self, *keys: str, prefix: str) -> None:
-        """Raise ConfigError for a key that is not in ``keys`` and does not begin with ``prefix``."""
+    def expect(self, *keys: str, prefix: tuple[str, ...]) -> None:
+        """Raise ConfigError for a key that is not in ``keys`` and does not begin with one of ``prefix``."""
         for key in self._values:
             if key not in keys and not key.startswith(prefix):
                 raise self.error(key, "is not a known key")
