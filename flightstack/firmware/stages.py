@@ -12,23 +12,25 @@ from typing import Any
 
 import numpy as np
 
-from flightstack.control.attitude_controller import AttitudeController, AttitudeInputs
+from flightstack.control.attitude_controller import AttitudeInputs
 from flightstack.control.attitude_reference import (
     ReferenceMemory,
     ReferenceParams,
     attitude_reference_step,
     in_body_frame,
 )
-from flightstack.control.loop_parameters import LoopParameters, loop_numbers
-from flightstack.control.loops import (
-    POSITION_MEMORY_SIZE,
-    POSITION_PARAMS_SIZE,
+from flightstack.control.control_law import CStep, NoMemory, NoParams
+from flightstack.control.controller import ATTITUDE, GUIDANCE, MIXER, POSITION, Controller, controller_of
+from flightstack.control.controller_loading import check_python
+from flightstack.control.loop_kernels import (
     REFERENCE_MEMORY_SIZE,
     REFERENCE_PARAMS_SIZE,
     inner_layout,
     outer_kernel,
 )
-from flightstack.control.mixer import Mixer, mix, mixer_for, relative_rotor_speed
+from flightstack.control.loop_parameters import LoopNumbers, LoopParameters, loop_numbers
+from flightstack.control.loops import bound_to, joined, outer_kernel_of
+from flightstack.control.mixer import Mixer, allocation_step, mixer_for, relative_rotor_speed
 from flightstack.core.array_items import as_tuple, store
 from flightstack.core.arrays import (
     achieved_wrench,
@@ -37,7 +39,7 @@ from flightstack.core.arrays import (
     store_wrenches,
     vehicle_state,
 )
-from flightstack.core.compiled import compiled, specialise
+from flightstack.core.compiled import compiled
 from flightstack.core.contract import (
     STATE_SIZE,
     AttitudeReference,
@@ -49,6 +51,7 @@ from flightstack.core.contract import (
     Record,
     RecordArray,
     Vector3,
+    VehicleState,
     Wrench,
 )
 from flightstack.core.geometry import blend, conjugate, quaternion_product, rotate, rotation_vector
@@ -64,19 +67,24 @@ ROLL, PITCH, YAW, THRUST = (
 RESOLUTION = 1e-9
 """Difference of demanded and achieved wrench [N, N m] above which the mixer is saturated, as in the loops."""
 
-# bound by ``specialise`` to the selected controller
+# bound by ``specialise`` to the laws of the controller
 controller_step: Any = None
 ControllerMemory: Any = None
 ControllerParams: Any = None
 CONTROLLER_MEMORY_SIZE = 0
 CONTROLLER_PARAMS_SIZE = 0
+mixer_step: Any = allocation_step
+MixerMemory: Any = NoMemory
+MixerParams: Any = NoParams
+MIXER_MEMORY_SIZE, MIXER_PARAMS_SIZE = 1, 1
 
 
 @compiled
 def _reset(m: Record, inputs: FloatArray) -> None:
     """Start at rest at this state, as the loops do."""
-    for index in range(POSITION_MEMORY_SIZE):
-        m["position"][index] = 0.0
+    store(m["outer"], m["outer_initial"])
+    store(m["attitude"], m["attitude_initial"])
+    store(m["mixer"], m["mixer_initial"])
     for index in range(REFERENCE_MEMORY_SIZE):
         m["reference"][index] = 0.0
     for index in range(4):
@@ -85,12 +93,11 @@ def _reset(m: Record, inputs: FloatArray) -> None:
     m["target"][4] = 0.0
     for index in range(m["last"].size):
         m["last"][index] = 0.0
-    store(m["controller"], m["controller_initial"])
 
 
 @compiled
 def _aim(m: Record, inputs: FloatArray, flags: int) -> None:
-    """Update the attitude target as the flags require."""
+    """Update the attitude target as the flags require, but for the outer loop."""
     if flags & RESET:
         _reset(m, inputs)
     if flags & (SET_TARGET | OUTER_DUE | RESET):
@@ -98,11 +105,6 @@ def _aim(m: Record, inputs: FloatArray, flags: int) -> None:
         m["fraction"][0] = 0.0
     if flags & SET_TARGET:
         store(m["target"], inputs[TARGET_AT:INPUT_SIZE])
-    if flags & OUTER_DUE:
-        outer_kernel(
-            inputs[:STATE_SIZE], inputs[SETPOINT_AT:TARGET_AT], m["position"], m["position_params"], m["last"],
-            m["outer_dt_s"], m["target"],
-        )  # fmt: skip
     m["fraction"][0] += m["fraction_step"]
 
 
@@ -134,14 +136,30 @@ def _reported_reference(out: FloatArray) -> AttitudeReference:
 
 
 @compiled
-def _mix(m: Record, out: FloatArray, expected: FloatArray) -> None:
-    """Write the expected rotor commands, achieved wrench and status for the reported wrench."""
-    mixer = _mixer(m)
-    demanded = Wrench(out[THRUST_AT], Vector3(out[16], out[17], out[18]))
-    achieved = mix(demanded, mixer, expected[COMMAND_AT:STATUS_AT], m["work"])
+def _law_inputs(
+    vehicle: VehicleState, reference: AttitudeReference, last: FloatArray, spin: FloatArray
+) -> AttitudeInputs:
+    return AttitudeInputs(
+        vehicle.attitude,
+        vehicle.rates_frd_rad_s,
+        reference,
+        rotation_vector(quaternion_product(conjugate(vehicle.attitude), reference.attitude)),
+        relative_rotor_speed(last[ROW_COMMAND:], spin),
+        _saturation(last),
+    )
+
+
+@compiled
+def _reported_wrench(out: FloatArray) -> Wrench:
+    return Wrench(out[THRUST_AT], Vector3(out[16], out[17], out[18]))
+
+
+@compiled
+def _store_mixed(demanded: Wrench, achieved: Wrench, rotors: int, expected: FloatArray) -> None:
+    """Write the expected achieved wrench and status."""
     expected[ACHIEVED_AT] = achieved.thrust_n
     store(expected[ACHIEVED_AT + 1 :], achieved.torque_frd_n_m)
-    expected[COMMAND_AT + mixer.spin.size : STATUS_AT] = 0.0
+    expected[COMMAND_AT + rotors : STATUS_AT] = 0.0
     expected[STATUS_AT] = _status(demanded, achieved)
 
 
@@ -217,9 +235,15 @@ def stages_kernel(
     controller to this template.
     """
     m = memory[0]
+    mixer = _mixer(m)
     for step in range(len(flags)):
         given, out, wanted = inputs[step], outputs[step], expected[step]
         _aim(m, given, flags[step])
+        if flags[step] & OUTER_DUE:
+            outer_kernel(
+                given[:STATE_SIZE], given[SETPOINT_AT:TARGET_AT], m["outer"], m["outer_params"], m["last"],
+                m["outer_dt_s"], m["target"],
+            )  # fmt: skip
         store(wanted, m["target"])
         store(m["target"], out[:REFERENCE_AT])
         if int(out[STATUS_AT]) & NOT_FINITE:
@@ -227,26 +251,29 @@ def stages_kernel(
             continue
         vehicle = vehicle_state(given[:STATE_SIZE])
         _filter(m, vehicle.attitude, wanted)
-        reference = _reported_reference(out)
-        law_inputs = AttitudeInputs(
-            vehicle.attitude,
-            vehicle.rates_frd_rad_s,
-            reference,
-            rotation_vector(quaternion_product(conjugate(vehicle.attitude), reference.attitude)),
-            relative_rotor_speed(m["last"][ROW_COMMAND:], m["spin"]),
-            _saturation(m["last"]),
-        )
         advanced, torque = controller_step(
-            ControllerMemory(*as_tuple(m["controller"], CONTROLLER_MEMORY_SIZE)),
-            law_inputs,
-            ControllerParams(*as_tuple(m["controller_params"], CONTROLLER_PARAMS_SIZE)),
+            ControllerMemory(*as_tuple(m["attitude"], CONTROLLER_MEMORY_SIZE)),
+            _law_inputs(vehicle, _reported_reference(out), m["last"], mixer.spin),
+            ControllerParams(*as_tuple(m["attitude_params"], CONTROLLER_PARAMS_SIZE)),
             m["dt_s"],
         )
         for index in range(CONTROLLER_MEMORY_SIZE):
-            m["controller"][index] = advanced[index]
+            m["attitude"][index] = advanced[index]
         wanted[THRUST_AT] = m["target"][4]
         store(wanted[THRUST_AT + 1 :], torque)
-        _mix(m, out, wanted)
+        demanded = _reported_wrench(out)
+        mixed, achieved = mixer_step(
+            MixerMemory(*as_tuple(m["mixer"], MIXER_MEMORY_SIZE)),
+            demanded,
+            mixer,
+            MixerParams(*as_tuple(m["mixer_params"], MIXER_PARAMS_SIZE)),
+            m["dt_s"],
+            wanted[COMMAND_AT:STATUS_AT],
+            m["work"],
+        )
+        for index in range(MIXER_MEMORY_SIZE):
+            m["mixer"][index] = mixed[index]
+        _store_mixed(demanded, achieved, mixer.spin.size, wanted)
         _adopt(m, vehicle.attitude, out)
 
 
@@ -255,35 +282,31 @@ class StageModel:
 
     def __init__(self, setup: LoopsSetup) -> None:
         """Start with the numbers of ``setup``; raise ConfigError."""
-        vehicle, controller = setup.vehicle, setup.controller
-        numbers = loop_numbers(vehicle, controller, setup.gains, setup.max_tilt_rad)
-        inner = inner_layout(len(vehicle.rotors), len(controller.initial_memory), numbers.controller.size)
-        self._memory: RecordArray = np.zeros(1, np.dtype([*inner.descr, *_more_fields(controller)]))
+        vehicle, controller = setup.vehicle, controller_of(setup.controller)
+        check_python(controller)
+        laws = controller.laws
+        numbers = loop_numbers(vehicle, controller, setup.gains, setup.max_tilt_rad, setup.given)
+        self._memory = _memory_of(controller, len(vehicle.rotors), numbers)
         record = self._memory[0]
         record["dt_s"], record["outer_dt_s"] = 1.0 / setup.inner_hz, setup.divisor / setup.inner_hz
         record["fraction_step"] = 1.0 / setup.divisor
-        record["controller_initial"] = record["controller"] = controller.initial_memory
-        for name in ("position", "reference", "controller"):
-            record[f"{name}_params"] = getattr(numbers, name)
         for name, values in mixer_for(vehicle)._asdict().items():
             record[name] = values
-        live = numbers._replace(
-            position=record["position_params"],
-            reference=record["reference_params"],
-            controller=record["controller_params"],
+        split = len(laws[POSITION].initial_memory), numbers.laws[POSITION].size
+        live, memories = (
+            {
+                POSITION: record[f"outer{suffix}"][:at],
+                GUIDANCE: record[f"outer{suffix}"][at:],
+                ATTITUDE: record[f"attitude{suffix}"],
+                MIXER: record[f"mixer{suffix}"],
+            }
+            for suffix, at in (("_params", split[1]), ("", split[0]))
         )
-        self._parameters = LoopParameters(live, controller, record["controller"])
+        live_numbers = numbers._replace(laws=live, reference=record["reference_params"])
+        self._parameters = LoopParameters(live_numbers, controller, memories)
         self.parameters = frozenset(spec.name for spec in numbers.specs)
         """Names of the parameters that can be set."""
-        self._kernel = specialise(
-            stages_kernel,
-            controller.key,
-            controller_step=controller.step,
-            ControllerMemory=controller.memory_type,
-            ControllerParams=controller.params_type,
-            CONTROLLER_MEMORY_SIZE=len(controller.initial_memory),
-            CONTROLLER_PARAMS_SIZE=numbers.controller.size,
-        )
+        self._kernel = bound_to(stages_kernel, laws, outer_kernel=outer_kernel_of(controller))
 
     def set_parameter(self, name: str, value: float) -> None:
         """Set a parameter from the next step on; raise KeyError if unknown."""
@@ -298,12 +321,37 @@ class StageModel:
         return wanted
 
 
-def _more_fields(controller: AttitudeController) -> list[tuple[Any, ...]]:
-    return [
-        ("position", "f8", (POSITION_MEMORY_SIZE,)),
-        ("position_params", "f8", (POSITION_PARAMS_SIZE,)),
-        ("controller_initial", "f8", (len(controller.initial_memory),)),
+def has_model(setup: LoopsSetup) -> bool:
+    """Return True if all laws are Python; one that is written in C has nothing to compare with."""
+    return not any(isinstance(law.step, CStep) for law in controller_of(setup.controller).laws.values())
+
+
+def _memory_of(controller: Controller, rotors: int, numbers: LoopNumbers) -> RecordArray:
+    """Return the memory of the kernel, with initial memories and parameters of the laws."""
+    laws = controller.laws
+    initial = {role: np.array(law.initial_memory, np.float64) for role, law in laws.items()}
+    outer, outer_params = joined(initial)[0], joined(numbers.laws)[0]
+    inner = inner_layout(rotors, laws[ATTITUDE], laws[MIXER])
+    more = [
+        ("outer", "f8", outer.shape),
+        ("outer_params", "f8", outer_params.shape),
+        ("outer_initial", "f8", outer.shape),
+        ("attitude_initial", "f8", initial[ATTITUDE].shape),
+        ("mixer_initial", "f8", initial[MIXER].shape),
         ("outer_dt_s", "f8"),
         ("fraction", "f8", (1,)),
         ("fraction_step", "f8"),
     ]
+    memory = np.zeros(1, np.dtype([*inner.descr, *more]))
+    values = {
+        "outer_params": outer_params,
+        "attitude_params": numbers.laws[ATTITUDE],
+        "mixer_params": numbers.laws[MIXER],
+        "reference_params": numbers.reference,
+        "outer": outer, "outer_initial": outer,
+        "attitude": initial[ATTITUDE], "attitude_initial": initial[ATTITUDE],
+        "mixer": initial[MIXER], "mixer_initial": initial[MIXER],
+    }  # fmt: skip
+    for name, numbers_of in values.items():
+        memory[0][name] = numbers_of
+    return memory
