@@ -30,6 +30,13 @@ class Landed(NamedTuple):
     is_landed: bool
 
 
+READ_PARAMETERS = (
+    "EKF2_GPS_DELAY", "EKF2_MAG_DELAY", "EKF2_BARO_DELAY", "EKF2_RNG_DELAY", "EKF2_MAG_DECL",
+    "EKF2_REQ_EPH", "EKF2_REQ_EPV", "EKF2_REQ_SACC", "EKF2_REQ_NSATS",
+)  # fmt: skip
+"""Parameters of a log that the estimator reads, with PX4's names and units."""
+_LARGEST_DELAY_S = 0.35
+"""The ring of IMU steps holds a little more."""
 _STANDARD_PRESSURE_HPA = 1013.25
 _IN_AIR_BIT = 1 << 7
 """``estimator_status.control_mode_flags`` of PX4."""
@@ -74,7 +81,10 @@ def params_of(log: Recording) -> tuple[EstimatorParams, GnssLimits, float]:
     def get(name: str, otherwise: float) -> float:
         return logged.get(name, otherwise)
 
-    delays_s = [get(f"EKF2_{sensor}_DELAY", 0.0) * 1e-3 for sensor in ("GPS", "MAG", "BARO", "RNG")]
+    delays_s = [
+        min(max(get(f"EKF2_{sensor}_DELAY", 0.0) * 1e-3, 0.0), _LARGEST_DELAY_S)
+        for sensor in ("GPS", "MAG", "BARO", "RNG")
+    ]
     base = EstimatorParams()
     if "EKF2_GPS_DELAY" not in logged:
         delays_s[0] = base.gnss_delay_s
