@@ -15,6 +15,7 @@ from flightstack.core.errors import TargetError, WrongFirmwareError
 from flightstack.core.float32 import as_float32
 from flightstack.firmware.c_loops import INPUT_SIZE, OUTPUT_SIZE, SETPOINT_AT, TARGET_AT
 from flightstack.firmware.identity import check_identity, described
+from flightstack.firmware.numbers import FIRST_NUMBERS
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilCounters, PilTiming
 from flightstack.firmware.pil_record import PilRecord, TracedLink
 from flightstack.firmware.pil_session import PilSession
@@ -75,7 +76,7 @@ class TargetLoops:
             *([] if note is None else [note]),
         ]
         self.version = f"C, float, {', '.join(details)}"
-        for name, value in numbers.items():
+        for name, value in (*FIRST_NUMBERS.items(), *numbers.items()):
             self.set(name, value)
         self._send_numbers()
 
