@@ -50,6 +50,26 @@ def fly(
     run_flights(complete_options(context, "pil", options, run), run, target, out, fail_over)
 
 
+@app.command("free-run", cls=PanelCommand)
+@partial(expand_options, without=("loops", "speed"))
+def free_run(
+    context: typer.Context,
+    options: FlyOptions,
+    run: RunOptions,
+    target: Annotated[
+        str, typer.Option(metavar="TARGET", help="host, or serial:DEVICE[:BAUD].", **IN_LOOPS)
+    ] = "host",
+    out: OutOption = None,
+) -> None:
+    """Fly a mission with the loops run by the target's own timer.
+
+    The flight is in real time. Jitter, overruns and the age of states are measured.
+    """
+    from gcs_cli.pil.free_run import run_free
+
+    run_free(complete_options(context, "pil", options, run), run, target, out)
+
+
 @app.command()
 @expand_options
 def replay(
