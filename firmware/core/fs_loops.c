@@ -5,12 +5,12 @@
 #include "fs_geometry.h"
 #include "fs_math.h"
 #include "fs_params.h"
-#include "fs_position_pid.h"
 
 /* What a tick changes if it turns out sound. */
 typedef struct {
     fs_reference_memory reference;
     fs_controller_memory controller;
+    fs_mixer_law_memory mixing;
     fs_saturation saturation;
 } fs_tick;
 
@@ -94,7 +94,13 @@ void fs_loops_init(fs_loops *loops)
                                     {FS_LIT(1.0), FS_LIT(0.0), FS_LIT(0.0), FS_LIT(0.0)},
                                     {FS_LIT(0.0), FS_LIT(0.0), FS_LIT(0.0)}};
 
-    loops->rates.controller = FS_CONTROLLERS; /* none yet: the first one starts without memory */
+    loops->rates.guidance = FS_GUIDANCE_LAWS; /* none yet: the first laws start without memory */
+    loops->rates.position = FS_POSITION_LAWS;
+    loops->rates.controller = FS_CONTROLLERS;
+    loops->rates.mixing = FS_MIXER_LAWS;
+    loops->setup.guidance = FS_LIT(0.0); /* a role with one law has no number of its index */
+    loops->setup.position = FS_LIT(0.0);
+    loops->setup.mixing = FS_LIT(0.0);
     fs_params_reset(loops);
     fs_loops_reset(loops, &level);
 }
@@ -121,13 +127,18 @@ static void clear_last(fs_loops *loops)
     loops->saturation.torque = no_vector;
 }
 
+void fs_loops_reset_laws(fs_loops *loops)
+{
+    fs_guidance_laws_reset(&loops->guidance_memory);
+    fs_position_laws_reset(&loops->position_memory);
+    fs_controllers_reset(&loops->controller_memory);
+    fs_mixer_laws_reset(&loops->mixing_memory);
+}
+
 void fs_loops_reset(fs_loops *loops, const fs_vehicle_state *state)
 {
     const fs_quaternion *attitude = &state->attitude;
 
-    loops->position_memory.x = FS_LIT(0.0);
-    loops->position_memory.y = FS_LIT(0.0);
-    loops->position_memory.z = FS_LIT(0.0);
     loops->reference_memory.w = attitude->w;
     loops->reference_memory.x = attitude->x;
     loops->reference_memory.y = attitude->y;
@@ -135,7 +146,7 @@ void fs_loops_reset(fs_loops *loops, const fs_vehicle_state *state)
     loops->reference_memory.p_rad_s = FS_LIT(0.0);
     loops->reference_memory.q_rad_s = FS_LIT(0.0);
     loops->reference_memory.r_rad_s = FS_LIT(0.0);
-    fs_controllers_reset(&loops->controller_memory);
+    fs_loops_reset_laws(loops);
     loops->target.attitude = *attitude;
     loops->target.thrust_n = FS_LIT(0.0);
     loops->is_target_sound = target_is_finite(&loops->target);
@@ -152,19 +163,29 @@ static void begin_outer_period(fs_loops *loops)
     loops->fraction = FS_LIT(0.0);
 }
 
-/* Run the position loop, or keep its memory and the target as they were. */
+/* Run guidance and the position law, or keep their memories and the target as they were. */
 static void outer_loop(fs_loops *loops, const fs_loop_input *input, uint16_t state_is_sound)
 {
-    fs_position_memory memory;
+    const fs_loop_rates *rates = &loops->rates;
+    fs_guidance_law_memory guidance;
+    fs_position_law_memory position;
+    fs_position_setpoint setpoint;
     fs_attitude_target target;
+    uint16_t is_sound;
 
     if (!state_is_sound || !setpoint_is_sound(&input->setpoint)) {
         return;
     }
-    fs_position_pid_step(&loops->position_memory, &input->state, &input->setpoint, &loops->position,
-                         loops->rates.outer_dt_s, loops->saturation.thrust, &memory, &target);
-    if (target_is_finite(&target)) {
-        loops->position_memory = memory;
+    is_sound = fs_guidance_laws_step(rates->guidance, &loops->guidance_memory, &input->state, &input->setpoint,
+                                     &loops->guidance, rates->outer_dt_s, &guidance, &setpoint);
+    is_sound &= setpoint_is_sound(&setpoint);
+    is_sound &= fs_position_laws_step(rates->position, &loops->position_memory, &input->state, &setpoint,
+                                      &loops->position, rates->outer_dt_s, loops->saturation.thrust, &position,
+                                      &target);
+    is_sound &= target_is_finite(&target);
+    if (is_sound) {
+        loops->guidance_memory = guidance;
+        loops->position_memory = position;
         loops->target = target;
         loops->is_target_sound = 1U;
     }
@@ -220,18 +241,21 @@ static uint16_t mix(const fs_loops *loops, fs_tick *tick, fs_loop_output *output
 {
     fs_real work[3][FS_MAX_ROTORS], sum;
     const fs_wrench *achieved = &output->wrench_achieved;
-    uint16_t i;
+    uint16_t i, is_memory_finite;
 
     for (i = loops->rates.rotors; i < FS_MAX_ROTORS; i++) {
         output->rotor_command_rad_s[i] = FS_LIT(0.0);
     }
-    output->wrench_achieved = fs_mix(&output->wrench, &loops->mixer, output->rotor_command_rad_s, work);
+    is_memory_finite =
+        fs_mixer_laws_step(loops->rates.mixing, &loops->mixing_memory, &output->wrench, &loops->mixer, &loops->mixing,
+                           loops->rates.inner_dt_s, output->rotor_command_rad_s, work, &tick->mixing,
+                           &output->wrench_achieved);
     output->status = fs_saturation_of(&output->wrench, achieved, &loops->resolution, &tick->saturation);
     sum = fs_add_part(FS_LIT(0.0), achieved->thrust_n);
     for (i = 0U; i < loops->rates.rotors; i++) {
         sum = fs_add_part(sum, output->rotor_command_rad_s[i]);
     }
-    return (uint16_t)(fs_is_finite(sum) & vector_is_finite(&achieved->torque_frd_n_m));
+    return (uint16_t)(fs_is_finite(sum) & vector_is_finite(&achieved->torque_frd_n_m) & is_memory_finite);
 }
 
 /* Run inner loop and mixer; return 0 and keep the tick, or the status bit that tells why the output is not sound. */
@@ -263,6 +287,7 @@ static uint16_t inner_loop(fs_loops *loops, const fs_vehicle_state *state, uint1
     output->attitude_target = loops->target;
     loops->reference_memory = tick.reference;
     loops->controller_memory = tick.controller;
+    loops->mixing_memory = tick.mixing;
     loops->saturation = tick.saturation;
     loops->last = *output;
     return 0U;

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from flightstack.control.control_law import ControlLaw
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import AttitudeTarget, PositionSetpoint, Quaternion, VehicleState
 from flightstack.core.portable_math import sin_cos, tan
@@ -186,3 +187,15 @@ def read_position_params(vehicle: Vehicle, gains: Table, max_tilt_rad: float) ->
     position.finish()
     altitude.finish()
     return params
+
+
+POSITION_PID = ControlLaw(
+    "pid",
+    position_pid_step,
+    PositionMemory,
+    PositionParams,
+    (0.0, 0.0, 0.0),
+    lambda vehicle, gains: read_position_params(vehicle, gains, 0.0),
+    POSITION_TUNABLES,
+)
+"""Reads the whole gains file; the largest tilt is set afterwards, from MPC_TILTMAX_AIR."""

@@ -9,9 +9,9 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from flightstack.control.attitude_controller import AttitudeController
 from flightstack.control.backend import IdleRow
-from flightstack.control.loop_parameters import loop_numbers
+from flightstack.control.controller import AnyController
+from flightstack.control.loop_parameters import NOT_GIVEN, LawValues, loop_numbers
 from flightstack.core.contract import (
     ATTITUDE_TARGET_SIZE,
     STATE_SIZE,
@@ -67,17 +67,25 @@ class LoopsSetup(NamedTuple):
     """Configuration of the loops."""
 
     vehicle: Vehicle
-    controller: AttitudeController
+    controller: AnyController
     gains: Table
     max_tilt_rad: float
     inner_hz: float
     outer_hz: float
     divisor: int
+    given: LawValues = NOT_GIVEN
+    """Parameters of laws that replace those of the gains file."""
 
     def numbers(self) -> dict[str, float]:
         """Return the numbers for C by name; raise ConfigError for an unsupported configuration."""
         values = target_numbers(
-            self.vehicle, self.controller, self.gains, self.max_tilt_rad, self.inner_hz, self.divisor
+            self.vehicle,
+            self.controller,
+            self.gains,
+            self.max_tilt_rad,
+            self.inner_hz,
+            self.divisor,
+            self.given,
         )
         return {
             name: value + 0.0 for name, value in values.items()
@@ -95,7 +103,7 @@ class CLoops:
         self.name = name
         self.version = executor.version
         self.executor = executor
-        numbers = loop_numbers(setup.vehicle, setup.controller, setup.gains, setup.max_tilt_rad)
+        numbers = loop_numbers(setup.vehicle, setup.controller, setup.gains, setup.max_tilt_rad, setup.given)
         self.parameter_specs: Sequence[ParamSpec] = numbers.specs
         self._names = frozenset(spec.name for spec in numbers.specs)
         self.attitude_target: FloatArray = np.array([1.0, 0.0, 0.0, 0.0, 0.0])

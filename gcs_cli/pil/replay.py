@@ -19,7 +19,7 @@ FlagArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
 STATE, SETPOINT, TARGET, INPUT_SIZE = slice(0, 13), slice(13, 24), slice(24, 29), 29
 OUTPUT_SIZE, STATUS_AT = 32, 31
-_OUTPUTS = {
+OUTPUTS = {
     "target_attitude": slice(0, 4),
     "target_thrust": slice(4, 5),
     "reference_attitude": slice(5, 9),
@@ -182,15 +182,15 @@ def replayed(
     return outputs
 
 
-def as_flight(record: Recording, outputs: FloatArray, flight: FlightSamples) -> FlightSamples:
-    """Return the outputs in the form of a log, for comparison with the replayed one.
+def as_flight(record: Recording, outputs: FloatArray, info: Mapping[str, Any]) -> FlightSamples:
+    """Return the outputs in the form of a log with this ``info``, for comparison with others.
 
     The attitude target is that of the outer ticks. If the log does not mark those of the outer loop, all were given,
     and none is compared.
     """
     signals = {
         name: Samples(record.time_us, outputs[:, columns].astype(np.float32))
-        for name, columns in _OUTPUTS.items()
+        for name, columns in OUTPUTS.items()
     }
     aims = record.is_outer & ((record.flags & LoopFlags.OUTER_DUE) != 0)
     for name in _OF_TARGET:
@@ -198,4 +198,4 @@ def as_flight(record: Recording, outputs: FloatArray, flight: FlightSamples) -> 
         if record.tells_targets:
             signals[name] = Samples(samples.time_us[aims], samples.values[aims])
     status = Samples(record.time_us, outputs[:, STATUS_AT:].astype(np.float32))
-    return flight._replace(signals=signals, status=status)
+    return FlightSamples(signals, status, {}, info, {}, ())

@@ -45,6 +45,13 @@ def checked_target(text: str, more: tuple[str, ...] = (), flag: str = "--target"
     return choice
 
 
+def port_or_target(port: str | None, target: str | None) -> LoopsChoice:
+    """Return the target of ``--port`` or ``--target``; raise CliError (usage), ConfigError."""
+    if (port is None) == (target is None):
+        raise CliError("give either --port DEVICE or --target", USAGE)
+    return checked_target(f"serial:{port}" if target is None else target)
+
+
 def check_there(target: LoopsChoice, controller: str) -> Path | None:
     """Return the folder of the firmware that was generated for a user's controller.
 

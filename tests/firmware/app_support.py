@@ -274,3 +274,16 @@ def command(number: int, *values: float, system: int = 1, component: int = 1) ->
 def kinds(messages: Iterable[Any]) -> list[str]:
     """Return the names of messages."""
     return [message.get_type() for message in messages]
+
+
+REAL32 = mavlink.MAV_PARAM_TYPE_REAL32
+
+
+def read(name: str = "", index: int = -1, system: int = 1, component: int = 1) -> Any:
+    """Return a PARAM_REQUEST_READ."""
+    return mavlink.MAVLink_param_request_read_message(system, component, name.encode(), index)
+
+
+def write(name: str, value: float, kind: int = REAL32, system: int = 1, component: int = 1) -> Any:
+    """Return a PARAM_SET."""
+    return mavlink.MAVLink_param_set_message(system, component, name.encode(), value, kind)

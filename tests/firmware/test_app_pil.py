@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from contextlib import closing
 
 import numpy as np
@@ -37,13 +36,6 @@ from tests.firmware.core_support import Core, Loops
 EMERGENCY = mavlink.MAV_SEVERITY_EMERGENCY
 STANDBY, ACTIVE, CRITICAL, IN_EMERGENCY = 3, 4, 5, 6
 FIELDS = ("attitude_target", "reference", "wrench", "wrench_achieved", "rotor_command")
-
-
-@pytest.fixture
-def target() -> Iterator[Target]:
-    made = Target()
-    yield made
-    made.close()
 
 
 def numbers(report: object) -> list[float]:

@@ -41,8 +41,14 @@ def fill(a: Annotated[FloatArray, 3]) -> float:
 def plain(x: float) -> float:
     return x
 
+class Box(NamedTuple):
+    values: Annotated[FloatArray, 3]
+    grid: Annotated[FloatArray, 2, 3]
+    cube: Annotated[FloatArray, 2, 2, 3]
+    x: float
+
 @compiled
-def law(x: float, n: int, flag: bool, v: Vector3, a: Annotated[FloatArray, 3]) -> float:
+def law(x: float, n: int, flag: bool, v: Vector3, a: Annotated[FloatArray, 3], box: Box) -> float:
 """
 LINE = HEAD.count("\n") + 1
 REFUSED = {
@@ -75,6 +81,12 @@ REFUSED = {
     "return a[x]": "index",
     "return a[-1]": "index",
     "v.x = 1.0\nreturn x": "assignment to an attribute",
+    "box.x = 1.0\nreturn x": "assignment to an attribute",
+    "box.values = a\nreturn x": "assignment to an attribute",
+    "box = Box(a, a, a, x)\nreturn x": "array value",
+    "other_box = box if flag else box\nreturn x": "array value",
+    "part = box.cube[1]\nreturn x": "array value",
+    "b = box.grid[0, 1:]\nreturn x": "slice",
     "if (y := x) > 0.0:\n    return y\nreturn x": "assignment expression",
     "return other(*a)": "starred expression",
     "return x ** 2": "power",

@@ -37,6 +37,10 @@ def setpoint(position=(0.0, 0.0, 0.0), yaw: float = 0.0) -> np.ndarray:
     return np.array([*position, *[0.0] * 6, yaw, 0.0])
 
 
+def memories(loops: PythonLoops) -> list[np.ndarray]:
+    return [loops._reference_memory, *loops._memories.values()]
+
+
 class Flight:
     """A backend stepped at fixed inputs; ``rows`` are copies of what it wrote."""
 
@@ -135,9 +139,8 @@ def test_a_state_that_is_not_finite_repeats_the_last_row_with_a_status_bit() -> 
         assert held[LoopRow.STATUS] == LoopStatus.INPUT_NOT_FINITE, (column, bad)
         assert held[: LoopRow.STATUS].tolist() == good[: LoopRow.STATUS].tolist(), (column, bad)
         # nothing was integrated meanwhile
-        for memory in ("_position_memory", "_reference_memory", "_controller_memory"):
-            kept, expected = getattr(flight.loops, memory), getattr(undisturbed.loops, memory)
-            assert kept.tolist() == expected.tolist(), (column, bad, memory)
+        for kept, expected in zip(memories(flight.loops), memories(undisturbed.loops), strict=True):
+            assert kept.tolist() == expected.tolist(), (column, bad)
         flight.state = at_rest()
         row = flight.tick()
         assert np.isfinite(row).all(), (column, bad)
@@ -205,11 +208,11 @@ def test_integral_of_a_saturated_axis_waits() -> None:
     flight.tick(40)
     saturated = [bool(int(row[LoopRow.STATUS]) & LoopStatus.YAW_SATURATED) for row in flight.rows]
     assert any(saturated)
-    before = flight.loops._controller_memory[2]
+    before = flight.loops._memories["attitude"][2]
     first = saturated.index(True)
     assert all(saturated[first:])
     flight.tick(40)
-    assert flight.loops._controller_memory[2] == before
+    assert flight.loops._memories["attitude"][2] == before
 
 
 def test_row_shows_what_the_rotors_make() -> None:
@@ -226,7 +229,7 @@ def test_an_attitude_given_from_outside_is_flown_in_a_straight_line_over_an_oute
     loops = make()
     flight = Flight(loops, at_rest(), setpoint())
     flight.tick(5)
-    integral = loops._position_memory.copy()
+    integral = loops._outer_memory.copy()
     pitch = 0.2
     target = np.array([math.cos(0.5 * pitch), 0.0, math.sin(0.5 * pitch), 0.0, 0.7 * PAPER.weight_n])
     references, thrusts = [], []
@@ -243,7 +246,7 @@ def test_an_attitude_given_from_outside_is_flown_in_a_straight_line_over_an_oute
     steps = np.diff(references)
     assert steps.min() >= -1e-9  # it comes from one side
     assert np.abs(np.diff(steps)).max() < 1e-3
-    assert loops._position_memory.tolist() == integral.tolist()
+    assert loops._outer_memory.tolist() == integral.tolist()
     before = loops.attitude_target.copy()
     row = np.zeros(LoopRow.SIZE)
     loops.step(flight.state, flight.wish, SPEEDS, True, row)

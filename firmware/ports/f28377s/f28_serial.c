@@ -4,7 +4,7 @@
 #include "device.h"
 
 #include "f28_board.h"
-#include "f28_ring.h"
+#include "fs_ring.h"
 #include "f28_time.h"
 
 #define FIFO_DEPTH 16U
@@ -12,7 +12,7 @@
 #define LASTING (SCI_RXSTATUS_FRAMING | SCI_RXSTATUS_PARITY | SCI_RXSTATUS_OVERRUN) /* up until a software reset */
 
 static volatile fs_octet receive_octets[F28_RECEIVE_RING], send_octets[F28_SEND_RING];
-static f28_ring received, to_send;
+static fs_ring received, to_send;
 static volatile uint32_t overruns, errors;
 static volatile uint16_t heard; /* 1: octets came since the main loop last looked */
 static uint16_t flags_seen;     /* the LASTING ones that were up when the main loop last looked */
@@ -35,7 +35,7 @@ static void fetch(void)
         if ((word & DAMAGED) != 0U) {
             errors = errors + 1UL;
         }
-        if (f28_ring_put(&received, word & 0xFFU) == 0U) {
+        if (fs_ring_put(&received, word & 0xFFU) == 0U) {
             overruns = overruns + 1UL;
         }
     }
@@ -52,14 +52,14 @@ static void feed(void)
     uint16_t n;
 
     for (n = 0U; n < FIFO_DEPTH && SCI_getTxFIFOStatus(SCIA_BASE) != SCI_FIFO_TX16; n++) {
-        if (f28_ring_take(&to_send, &octet) == 0U) {
+        if (fs_ring_take(&to_send, &octet) == 0U) {
             break;
         }
         SCI_writeCharNonBlocking(SCIA_BASE, octet);
     }
     /* cleared after the FIFO was filled: the flag rises again when it runs low, whether by level or by edge */
     SCI_clearInterruptStatus(SCIA_BASE, SCI_INT_TXFF);
-    if (f28_ring_held(&to_send) == 0U) {
+    if (fs_ring_held(&to_send) == 0U) {
         SCI_disableInterrupt(SCIA_BASE, SCI_INT_TXFF);
     } else {
         SCI_enableInterrupt(SCIA_BASE, SCI_INT_TXFF);
@@ -105,8 +105,8 @@ static void set_rate(uint32_t baud)
 
 void f28_serial_init(void)
 {
-    f28_ring_init(&received, receive_octets, F28_RECEIVE_RING);
-    f28_ring_init(&to_send, send_octets, F28_SEND_RING);
+    fs_ring_init(&received, receive_octets, F28_RECEIVE_RING);
+    fs_ring_init(&to_send, send_octets, F28_SEND_RING);
     overruns = 0UL;
     errors = 0UL;
     heard = 0U;
@@ -146,7 +146,7 @@ static uint16_t flags_may_be_lowered(uint16_t status, uint32_t now_ms)
     if (flags_seen == 0U) {
         return 0U;
     }
-    if (heard != 0U || f28_ring_held(&to_send) != 0U || SCI_getTxFIFOStatus(SCIA_BASE) != SCI_FIFO_TX0) {
+    if (heard != 0U || fs_ring_held(&to_send) != 0U || SCI_getTxFIFOStatus(SCIA_BASE) != SCI_FIFO_TX0) {
         heard = 0U;
         active_ms = now_ms;
     }
@@ -182,7 +182,7 @@ uint16_t f28_serial_take(fs_octet *out, uint16_t room)
 {
     uint16_t n = 0U;
 
-    while (n < room && f28_ring_take(&received, &out[n]) != 0U) {
+    while (n < room && fs_ring_take(&received, &out[n]) != 0U) {
         n++;
     }
     return n;
@@ -190,17 +190,17 @@ uint16_t f28_serial_take(fs_octet *out, uint16_t room)
 
 uint16_t f28_serial_room(void)
 {
-    return f28_ring_room(&to_send);
+    return fs_ring_room(&to_send);
 }
 
 uint16_t f28_serial_give(const fs_octet *octets, uint16_t count)
 {
     uint16_t n = 0U;
 
-    while (n < count && f28_ring_put(&to_send, octets[n]) != 0U) {
+    while (n < count && fs_ring_put(&to_send, octets[n]) != 0U) {
         n++;
     }
-    if (f28_ring_held(&to_send) != 0U) { /* also when nothing was given: an interrupt that was missed costs one pass */
+    if (fs_ring_held(&to_send) != 0U) { /* also when nothing was given: an interrupt that was missed costs one pass */
         (void)Interrupt_disableGlobal();
         feed();
         (void)Interrupt_enableGlobal();

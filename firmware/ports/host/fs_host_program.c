@@ -143,6 +143,7 @@ static int serve(line *ends, fs_app *app)
     struct timespec wait;
     int is_open = 1;
 
+    fs_app_poll(app, 0U);
     while (is_open) {
         struct pollfd watched[3] = {
             {.fd = ends->in, .events = POLLIN},
@@ -151,7 +152,6 @@ static int serve(line *ends, fs_app *app)
         };
 
         fs_app_run(app, fs_host_microseconds());
-        fs_app_poll(app, fs_host_milliseconds() - began_ms);
         if (send_octets(ends, app, &waiting) != 0) {
             break;
         }
@@ -161,6 +161,7 @@ static int serve(line *ends, fs_app *app)
             return fail("poll");
         }
         fs_app_run(app, fs_host_microseconds()); /* before the octets: their time is now */
+        fs_app_poll(app, fs_host_milliseconds() - began_ms); /* what is received now came after the wait */
         if ((watched[0].revents & (POLLIN | POLLHUP | POLLERR)) != 0) {
             is_open = (receive_octets(ends, app) == 0);
         }

@@ -22,6 +22,7 @@ from flightstack.firmware.generator.types import (
     Array,
     Record,
     c_type,
+    has_arrays,
 )
 from flightstack.firmware.generator.values import (
     AND,
@@ -289,7 +290,9 @@ class Expressions:
         if yes.type != no.type and {yes.type, no.type} <= NUMBERS:
             change = as_real if REAL in (yes.type, no.type) else as_whole
             yes, no = change(yes), change(no)
-        if yes.type != no.type or yes.type is NOTHING or isinstance(yes.type, Array):
+        if has_arrays(yes.type) or isinstance(yes.type, Array):
+            raise self.function.refusal(node, "array value", "choice between arrays")
+        if yes.type != no.type or yes.type is NOTHING:
             raise self.function.refusal(node, "values of different types")
         if isinstance(yes.type, Record) or yes_lines or no_lines:
             return self.writer.choice(test, (yes_lines, yes), (no_lines, no))
@@ -306,6 +309,8 @@ class Expressions:
             fields = record.fields
         except TypeError as error:
             raise self.function.refusal(node, "annotation", str(error)) from None
+        if has_arrays(record):
+            raise self.function.refusal(node, "array value", "NamedTuple made of arrays")
         values = self.calls.bound(node, list(fields.items()), {})
         return Value(record, c_type(record), ATOM, Form.FIELDS, tuple(values))
 

@@ -57,7 +57,7 @@ ADVICE: dict[str, str] = {
     "variable without a value": "assign it before the `if` or the loop",
     "annotation": "annotate it: float, int, bool, a NamedTuple, tuple[…] or Annotated[FloatArray, N]",
     "array of unknown shape": "annotate it: `Annotated[FloatArray, N]` with the constant size",
-    "array value": "use its items: `a[i]`",
+    "array value": "use its items, `a[i]`, and write to arrays in place",
     "name": "define it as a constant of the module, or as a @compiled function",
     "libm function": "use flightstack.core.portable_math, whose bits are the same on every processor",
     "function call": "call functions marked @compiled, NamedTuples, min, max, abs, float, int, and functions of math",

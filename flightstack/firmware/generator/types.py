@@ -82,6 +82,13 @@ def has_rotors(kind: Type) -> bool:
     )
 
 
+def has_arrays(kind: Type) -> bool:
+    """Return True for a record with an array, or with a record that has one."""
+    return isinstance(kind, Record) and any(
+        isinstance(field, Array) or has_arrays(field) for field in kind.fields.values()
+    )
+
+
 def prefix_of(module: str) -> str:
     """Return the prefix of the C names of a module: ``fs``, or the top-level package of a user."""
     top = module.partition(".")[0]
