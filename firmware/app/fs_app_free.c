@@ -253,11 +253,8 @@ uint32_t fs_app_run_wait_us(const fs_app *app)
 {
     uint32_t left_us = 0xFFFFFFFFUL;
 
-    if (app->free.is_on != 0U) {
+    if (app->free.is_on != 0U) { /* what was due was done by the last fs_app_run */
         left_us = (app->free.is_begun != 0U) ? (app->free.due_us - app->free.now_us) : 0UL;
-        if (left_us > 0x7FFFFFFFUL) { /* it is due already */
-            left_us = 0UL;
-        }
     }
     return left_us;
 }

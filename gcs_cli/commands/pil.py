@@ -8,7 +8,14 @@ from typing import Annotated
 
 import typer
 
-from flightstack.process.command_line import IN_LOOPS, VEHICLE, PanelCommand, expand_options, make_app
+from flightstack.process.command_line import (
+    IN_LOOPS,
+    IN_OUTPUT,
+    VEHICLE,
+    PanelCommand,
+    expand_options,
+    make_app,
+)
 from flightstack.process.options import Controller, Gains, InnerHz, OuterHz
 from gcs_cli.fly.fly_flags import FlyOptions, RunOptions, complete_options
 from gcs_cli.pil.pil_flags import JudgeOptions
@@ -46,7 +53,12 @@ def free_run(
     target: Annotated[
         str, typer.Option(metavar="TARGET", help="host, or serial:DEVICE[:BAUD].", **IN_LOOPS)
     ] = "host",
-    out: OutOption = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="DIR", help="Directory.  [default: runs/<stamp>-<name>-pil]", **IN_OUTPUT
+        ),
+    ] = None,
 ) -> None:
     """Fly a mission with the loops run by the target's own timer.
 

@@ -136,6 +136,8 @@ def test_the_newest_state_flies_and_its_age_is_told(target: Target) -> None:
     at(target, 0, state(7, RESET))
     at(target, 300, state(8))
     at(target, 500, state(9))
+    target.poll(10)
+    assert target.heard() == []  # figures come once a second
     (first,) = at(target, PERIOD_US)
     (second,) = at(target, 2 * PERIOD_US)
     assert (first.state_time_us, first.age_us) == (9, 1_500)
