@@ -10,6 +10,7 @@
 
 #define US_PER_S FS_LIT(1000000.0)
 #define DEFAULT_TIMEOUT_US 100000UL
+#define REFERENCE_SIZE 4U /* of the attitude */
 #define MOST_TICKS 1000.0F
 #define MOST_TIMEOUT_MS 10000.0F
 #define DRIVE_RESERVE (FS_OUTBOX_SIZE - 128U) /* at most two wait: an old command is worth less than none */
@@ -183,6 +184,9 @@ static void send_drive(fs_app *app, const fs_pil_report *report, uint32_t age_us
     drive.status = report->status;
     drive.age_us = age_us;
     drive.late_us = late_us;
+    for (i = 0U; i < REFERENCE_SIZE; i++) {
+        drive.reference[i] = report->reference[i];
+    }
     for (i = 0U; i < FS_MAX_ROTORS; i++) {
         drive.rotor_command[i] = report->rotor_command[i];
     }

@@ -126,9 +126,10 @@ class Target:
         bauds: Sequence[int] = (),
         overhead: int = 0,
     ) -> None:
-        """``ticks``: what the clock shows at each call; without, it stands still; None: there is no clock. ``own_port``: the host's.
+        """``ticks``: what the clock shows at each call; without, it stands still; None: there is no clock.
 
-        ``bauds``: rates that the line can run at; without any, the port has no functions for rates. ``overhead``: cost
+        ``own_port``: the host's. ``bauds``: rates that the line can run at; without any, the port has no functions for
+        rates. ``overhead``: cost
         of reading the clock that the application finds at its start, before ``ticks``.
         """
         self.baud = START_BAUD

@@ -94,6 +94,9 @@ def test_commands_are_those_of_c_one_tick_later(device: Target) -> None:
     loops, line = connected(device)
     free, here = random_flight(loops, line), random_flight(sil(), None)
     assert np.array_equal(free[1:, LoopRow.ROTOR_COMMAND], here[:-1, LoopRow.ROTOR_COMMAND])
+    reference = LoopRow.REFERENCE_ATTITUDE
+    assert np.array_equal(free[1:, reference], here[:-1, reference])
+    assert np.isfinite(free[:, reference]).all()  # the commander checks it: NaN is a tilt error
     assert np.isnan(free[:, LoopRow.WRENCH]).all()
 
 
