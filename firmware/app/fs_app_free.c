@@ -11,9 +11,10 @@
 #define US_PER_S FS_LIT(1000000.0)
 #define DEFAULT_TIMEOUT_US 100000UL
 #define REFERENCE_SIZE 4U /* of the attitude */
+#define TARGET_SIZE 5U
 #define MOST_TICKS 1000.0F
 #define MOST_TIMEOUT_MS 10000.0F
-#define DRIVE_RESERVE (FS_OUTBOX_SIZE - 128U) /* at most two wait: an old command is worth less than none */
+#define DRIVE_RESERVE (FS_OUTBOX_SIZE - 192U) /* at most two wait: an old command is worth less than none */
 
 static void begin_window(fs_app *app)
 {
@@ -186,6 +187,9 @@ static void send_drive(fs_app *app, const fs_pil_report *report, uint32_t age_us
     drive.late_us = late_us;
     for (i = 0U; i < REFERENCE_SIZE; i++) {
         drive.reference[i] = report->reference[i];
+    }
+    for (i = 0U; i < TARGET_SIZE; i++) {
+        drive.attitude_target[i] = report->attitude_target[i];
     }
     for (i = 0U; i < FS_MAX_ROTORS; i++) {
         drive.rotor_command[i] = report->rotor_command[i];

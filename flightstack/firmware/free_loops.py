@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flightstack.core.contract import FloatArray, LoopFlags
+from flightstack.core.contract import ATTITUDE_TARGET_SIZE, FloatArray, LoopFlags
 from flightstack.core.errors import TargetError
 from flightstack.firmware.c_loops import INPUT_SIZE, OUTPUT_SIZE
 from flightstack.firmware.free_running import REST, FreeRunning
@@ -27,8 +27,8 @@ _MOST_READS = 20
 class FreeLoops:
     """Sends states to a free-running target and returns its newest commands; implements ``c_loops.LoopExecutor``.
 
-    A step does not wait. Of the stages, the output has the rotor speed commands and the attitude reference, which the
-    commander checks; the rest is NaN.
+    A step does not wait. Of the stages, the output has the rotor speed commands, and the attitude reference and target,
+    which commander and guidance need; the rest is NaN.
     """
 
     def __init__(self, loops: TargetLoops) -> None:
@@ -68,8 +68,12 @@ class FreeLoops:
         self._exchange(flags, sent_numbers(flags, self.input))
         if (problem := self._free.failure(self._session.now_s)) is not None:
             self._fail(f"the target on {self._session.link.name} {problem}")
-        reference = self.input[6:10] if self._free.reference is None else self._free.reference
-        self.output[REFERENCE_AT : REFERENCE_AT + REFERENCE_ATTITUDE_SIZE] = reference
+        level = self.input[6:10].tolist()
+        attitude = (*level, *level, 0.0) if self._free.attitude is None else self._free.attitude
+        self.output[REFERENCE_AT : REFERENCE_AT + REFERENCE_ATTITUDE_SIZE] = attitude[
+            :REFERENCE_ATTITUDE_SIZE
+        ]
+        self.output[:ATTITUDE_TARGET_SIZE] = attitude[REFERENCE_ATTITUDE_SIZE:]
         self.output[ROTORS_AT:-1] = self._free.commands
         self.output[-1] = self._free.status & 0xFFFF
 

@@ -41,8 +41,8 @@ class FreeRunning:
         self.texts: deque[str] = deque(maxlen=10)
         self.commands: tuple[float, ...] = (0.0,) * 8
         """Rotor speed commands [rad/s] of the newest FS_PIL_DRIVE of this flight, zero before the first one."""
-        self.reference: tuple[float, ...] | None = None
-        """Its attitude reference (4), None before the first one."""
+        self.attitude: tuple[float, ...] | None = None
+        """Its attitude reference (4) and attitude target (5), None before the first one."""
         self.status = 0
         """Its status."""
 
@@ -54,7 +54,7 @@ class FreeRunning:
         now_us = self._time_us(now_s)
         if flags & LoopFlags.RESET:
             if not self._is_flying:
-                self.commands, self.reference, self._heard_s = (0.0,) * 8, None, now_s
+                self.commands, self.attitude, self._heard_s = (0.0,) * 8, None, now_s
             self._is_flying, self._is_begun, self._began_us, self.status = True, False, now_us, 0
         elif flags & REST:
             self._is_flying = False
@@ -87,7 +87,7 @@ class FreeRunning:
         if not self._is_flying or since_us > elapsed_us:  # of an earlier flight, or at rest
             return
         self._heard_s = now_s
-        self.reference, self.commands, self.status = values[4:8], values[8:], status
+        self.attitude, self.commands, self.status = values[4:13], values[13:], status
         if not status & BAD_INPUT:
             self._is_begun = True
             self._delays_us.append(elapsed_us - since_us)

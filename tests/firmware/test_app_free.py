@@ -98,6 +98,7 @@ def test_ticks_fly_the_bits_of_steps(target: Target) -> None:
         report = other.step(tick, flags | due, values, setpoint)
         assert drive.rotor_command == report.rotor_command
         assert drive.reference == report.reference[:4]
+        assert drive.attitude_target == report.attitude_target
         assert (drive.state_time_us, drive.status) == (tick, report.status)
         assert (drive.age_us, drive.late_us) == (1_100, 0)
     other.close()

@@ -77,16 +77,17 @@ def connected(device: Target) -> tuple[CLoops, FreeLine]:
 
 def random_flight(loops: CLoops, line: FreeLine | None) -> np.ndarray:
     """Step with random inputs and, in some outer periods, given targets; return the rows."""
-    rng, rows = np.random.default_rng(5), np.zeros((200, LoopRow.SIZE))
+    rng, rows, targets = np.random.default_rng(5), np.zeros((200, LoopRow.SIZE)), np.zeros((200, 5))
     for tick, row in enumerate(rows):
         state = np.concatenate([rng.normal(size=6), [1.0, 0.0, 0.0, 0.0], rng.normal(size=3) * 0.3])
         is_given = (tick // 5) % 4 == 3
         if is_given and tick % 5 == 0:
             loops.set_attitude_target(np.array([1.0, 0.0, 0.0, 0.0, 5.0 + rng.random()]))
         loops.step(state, rng.normal(size=11), SPEEDS, tick % 5 == 0 and not is_given, row)
+        targets[tick] = loops.attitude_target
         if line is not None:
             line.pass_us(PERIOD_US)
-    return rows
+    return np.hstack([rows, targets])
 
 
 def test_commands_are_those_of_c_one_tick_later(device: Target) -> None:
@@ -96,6 +97,9 @@ def test_commands_are_those_of_c_one_tick_later(device: Target) -> None:
     assert np.array_equal(free[1:, LoopRow.ROTOR_COMMAND], here[:-1, LoopRow.ROTOR_COMMAND])
     reference = LoopRow.REFERENCE_ATTITUDE
     assert np.array_equal(free[1:, reference], here[:-1, reference])
+    assert np.array_equal(
+        free[1:, LoopRow.SIZE :], here[:-1, LoopRow.SIZE :]
+    )  # the land detector reads its thrust
     assert np.isfinite(free[:, reference]).all()  # the commander checks it: NaN is a tilt error
     assert np.isnan(free[:, LoopRow.WRENCH]).all()
 

@@ -24,7 +24,7 @@ def sent(frame: bytes) -> tuple[int, int]:
 
 def drive(time_us: int, speed: float = 100.0, status: int = 0) -> bytes:
     message = mavlink.MAVLink_fs_pil_drive_message(
-        time_us, status, 0, 0, [1.0, 0.0, 0.0, 0.0], [speed] * 4 + [0.0] * 4
+        time_us, status, 0, 0, [1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 5.0], [speed] * 4 + [0.0] * 4
     )
     return bytes(message.pack(mavlink.MAVLink(None, 1, 1)))
 
@@ -59,7 +59,7 @@ def test_commands_of_earlier_flights_are_ignored() -> None:
         assert free.commands == (0.0,) * 8
     free.receive(drive(time_us), START_S + 0.02)
     assert free.commands == (100.0,) * 4 + (0.0,) * 4
-    assert free.reference == (1.0, 0.0, 0.0, 0.0)
+    assert free.attitude == (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 5.0)
 
 
 def test_end_to_end_delay_is_from_the_state_to_its_command() -> None:
