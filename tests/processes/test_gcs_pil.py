@@ -291,3 +291,17 @@ def test_limits_of_a_file_judge_a_replay(flown: Path, tmp_path: Path) -> None:
     done = pil("replay", log, "--target", "c", "--out", out, "--limits", limits, "--fail-over")
     assert done.returncode == FAILED, done.stdout + done.stderr
     assert "the verdict is not good: stages–target attitude target\n" in done.stderr
+
+
+def test_a_free_running_target_flies_in_real_time_and_reports_its_timing(tmp_path: Path) -> None:
+    """How far it comes is left to the machine: a busy one is late. What is reported is complete in any case."""
+    plan, out = MISSIONS / "hop.plan", tmp_path / "out"
+    done = pil("free-run", plan, "--target", "host", "--out", out, "--instance", INSTANCE, "--json")
+    assert done.returncode in (DONE, FAILED, NO_ANSWER), done.stdout + done.stderr
+    told = json.loads(done.stdout)["free_running"]
+    assert told["period_us"] == 2_000
+    assert told["ticks"] > 400
+    assert told["states"] > 0
+    assert told["commands"] > 0
+    assert 0.0 < told["end_to_end_mean_us"] <= told["end_to_end_max_us"] < 1e6
+    assert told["late_mean_us"] <= told["late_max_us"]
