@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from flightstack.mavlink.dialect import mavlink
 from tests.firmware.codec_support import ROOT, WARNINGS, compiler
 
@@ -288,3 +290,27 @@ def read(name: str = "", index: int = -1, system: int = 1, component: int = 1) -
 def write(name: str, value: float, kind: int = REAL32, system: int = 1, component: int = 1) -> Any:
     """Return a PARAM_SET."""
     return mavlink.MAVLink_param_set_message(system, component, name.encode(), value, kind)
+
+
+FIELDS = ("attitude_target", "reference", "wrench", "wrench_achieved", "rotor_command")
+
+
+def numbers(report: object) -> list[float]:
+    """Return what the loops computed, in the order of fs_loop_output."""
+    return [value for name in FIELDS for value in getattr(report, name)]
+
+
+def random_steps(count: int) -> list[tuple[int, list[float], list[float]]]:
+    """Return flags, state and setpoint of a flight that changes between setpoints and targets."""
+    rng = np.random.default_rng(5)
+    made = []
+    for index in range(count):
+        attitude = np.array([1.0, 0.0, 0.0, 0.0]) + 0.2 * rng.standard_normal(4)
+        state = [*rng.standard_normal(6), *(attitude / np.linalg.norm(attitude)), *rng.standard_normal(3)]
+        flags = (0, OUTER_DUE, SET_TARGET, RESET | OUTER_DUE)[rng.choice(4, p=[0.75, 0.18, 0.05, 0.02])]
+        setpoint = rng.standard_normal(11)
+        if flags & SET_TARGET:
+            setpoint = np.array([*(attitude / np.linalg.norm(attitude)), 5.0, *[0.0] * 6])
+        flags |= RESET if index == 0 else 0
+        made.append((flags, np.float32(state).tolist(), np.float32(setpoint).tolist()))
+    return made

@@ -29,34 +29,14 @@ from tests.firmware.app_support import (
     Target,
     command,
     kinds,
+    numbers,
+    random_steps,
     step,
 )
 from tests.firmware.core_support import Core, Loops
 
 EMERGENCY = mavlink.MAV_SEVERITY_EMERGENCY
 STANDBY, ACTIVE, CRITICAL, IN_EMERGENCY = 3, 4, 5, 6
-FIELDS = ("attitude_target", "reference", "wrench", "wrench_achieved", "rotor_command")
-
-
-def numbers(report: object) -> list[float]:
-    """Return what the loops computed, in the order of fs_loop_output."""
-    return [value for name in FIELDS for value in getattr(report, name)]
-
-
-def random_steps(count: int) -> list[tuple[int, list[float], list[float]]]:
-    """Return flags, state and setpoint of a flight that changes between setpoints and targets."""
-    rng = np.random.default_rng(5)
-    made = []
-    for index in range(count):
-        attitude = np.array([1.0, 0.0, 0.0, 0.0]) + 0.2 * rng.standard_normal(4)
-        state = [*rng.standard_normal(6), *(attitude / np.linalg.norm(attitude)), *rng.standard_normal(3)]
-        flags = (0, OUTER_DUE, SET_TARGET, RESET | OUTER_DUE)[rng.choice(4, p=[0.75, 0.18, 0.05, 0.02])]
-        setpoint = rng.standard_normal(11)
-        if flags & SET_TARGET:
-            setpoint = np.array([*(attitude / np.linalg.norm(attitude)), 5.0, *[0.0] * 6])
-        flags |= RESET if index == 0 else 0
-        made.append((flags, np.float32(state).tolist(), np.float32(setpoint).tolist()))
-    return made
 
 
 def test_a_report_has_the_very_bits_of_the_loops(target: Target) -> None:

@@ -21,10 +21,11 @@ from tests.firmware.app_support import (
     SET_TARGET,
     Target,
     kinds,
+    numbers,
+    random_steps,
     step,
     tick,
 )
-from tests.firmware.test_app_pil import numbers, random_steps
 
 WINDOW, WANT_REFERENCE = 8, 8
 

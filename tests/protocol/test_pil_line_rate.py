@@ -19,8 +19,8 @@ from flightstack.firmware.target_loops import TargetLoops
 from flightstack.transports.byte_link import LineError
 from flightstack.transports.serial_port import SerialPort
 from tests.firmware.app_support import START_BAUD, Target
-from tests.protocol.test_pil_link import HASH, setup
 from tests.support.lossy_line import LossyLine
+from tests.support.pil_setups import HASH, setup
 
 FAST, OTHER = 921_600, 460_800
 

@@ -20,8 +20,8 @@ from flightstack.firmware.line_model import (
 )
 from flightstack.firmware.target_loops import TargetLoops
 from tests.firmware.app_support import Target
-from tests.protocol.test_pil_link import HASH, setup
 from tests.support.modelled_line import ModelledLine
+from tests.support.pil_setups import HASH, setup
 
 STEPS, DIVISOR = 200, 5
 BAUDS = (115_200, 921_600, 2_000_000)

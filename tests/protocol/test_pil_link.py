@@ -15,19 +15,17 @@ from flightstack.control.attitude_pid import CONTROLLER as PID
 from flightstack.core.contract import LoopFlags, LoopRow, LoopStatus
 from flightstack.core.errors import TargetError, WrongFirmwareError
 from flightstack.firmware.build import host_library
-from flightstack.firmware.c_loops import CLoops, HostLoops, LoopsSetup
+from flightstack.firmware.c_loops import CLoops, HostLoops
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilTiming
 from flightstack.firmware.target_loops import FINAL_ATTEMPTS, TargetLoops
 from flightstack.firmware.targets import finish_loops
-from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
 from gcs_cli.pil.result import target_checks
 from gcs_cli.pil.target_record import STATES, read_record
 from tests.firmware.app_support import SAFE, Target, mavlink
 from tests.support.lossy_line import NO_FAULTS, LineFaults, LossyLine
+from tests.support.pil_setups import HASH, setup
 
-HASH = bytes(range(1, 9))
-"""What the application of the tests tells."""
 SPEEDS = np.zeros(8, np.float32)
 WEATHERS = {
     "fair": NO_FAULTS,
@@ -38,11 +36,6 @@ WEATHERS = {
     "is noisy": LineFaults(noise=0.2),
     "does everything": LineFaults(2e-4, 2e-4, 0.1, 0.01, 0.3, 0.1),
 }
-
-
-def setup(controller=PID) -> LoopsSetup:
-    tilt = math.radians(45.0)
-    return LoopsSetup(load_vehicle("x_quad"), controller, open_gains("tuned"), tilt, 500.0, 100.0, 5)
 
 
 @pytest.fixture
