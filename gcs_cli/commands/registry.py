@@ -159,6 +159,9 @@ class PilGroup(LazyGroup):
         _PIL_FLY: LazyCommand(_PIL, "Fly a mission with each of the loops, and compare."),
         "replay": LazyCommand(_PIL, "Feed a target with the inputs of a flight log."),
         "generate": LazyCommand(_PIL, "Write the firmware with your own controller as C."),
+        "build": LazyCommand(
+            _PIL, "Build the firmware for a board, and write the file that is copied to its drive."
+        ),
         "doctor": LazyCommand(_PIL, "Measure the link to a target, and suggest settings."),
     }
 

@@ -100,12 +100,12 @@ uint32_t fs_board_cycles(void)
 
 uint32_t fs_board_stack_size(void)
 {
-    return 0U; /* TODO fs_stack_size() of ports/gnu, or 0 if the stack is not painted */
+    return 0U; /* TODO fs_stack_bytes() of ports/gnu, or 0 if the stack is not painted */
 }
 
 uint32_t fs_board_stack_high_water(void)
 {
-    return 0U; /* TODO fs_stack_high_water() */
+    return 0U; /* TODO fs_stack_used() */
 }
 
 void fs_board_pass(uint32_t now_ms, uint16_t state)
