@@ -67,6 +67,9 @@ class GcsGroup(LazyGroup):
         ),
         "report": LazyCommand("gcs_cli.commands.report", "Write the report page of a flight from its log."),
         "compare": LazyCommand("gcs_cli.commands.compare", "Compare two or more flights."),
+        "estimate": LazyCommand(
+            "gcs_cli.commands.estimate", "Estimate the state of a vehicle from the sensors of its log."
+        ),
     }
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -158,6 +161,7 @@ class PilGroup(LazyGroup):
     lazy = {  # noqa: RUF012
         _PIL_FLY: LazyCommand(_PIL, "Fly a mission with each of the loops, and compare."),
         "replay": LazyCommand(_PIL, "Feed a target with the inputs of a flight log."),
+        "vectors": LazyCommand(_PIL, "Write test vectors for a replay, as CSV or MATLAB."),
         "generate": LazyCommand(_PIL, "Write the firmware with your own controller as C."),
         "build": LazyCommand(
             _PIL, "Build the firmware for a board, and write the file that is copied to its drive."

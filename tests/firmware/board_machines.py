@@ -226,6 +226,14 @@ class Nucleo(BoardMachine):
         self.services = 0
         self.light: list[int] = []
         self._transmits_until = 0
+        self._special = {
+            0x4002_3800: self._clock_control,
+            0x4002_3808: self._clock_switch,
+            0x4000_4400: self._uart_status,
+            0x4000_4404: self._received,
+            0xE000_E018: self._tick_left,
+            0xE000_1004: self._cycle_counter,
+        }
         stack, reset = (int.from_bytes(engine_read(self.engine, self.flash[0] + at)) for at in (0, 4))
         assert reset & 1
         self.engine.reg_write(arm_const.UC_ARM_REG_SP, stack)
@@ -259,22 +267,29 @@ class Nucleo(BoardMachine):
     # ------------------------------------------------------------------ registers
 
     def read_register(self, address: int) -> int:
-        value = self.values.get(address, 0)
-        if address == 0x4002_3800:
-            ready = (value >> 16 & 1 and self._crystal) << 17 | (value >> 24 & 1 and self._pll) << 25
-            return value | ready
-        if address == 0x4002_3808:
-            return value & ~0xC | (value & 3) << 2
-        if address == 0x4000_4400:
-            self._check_uart()
-            has_come = bool(self.arriving) and self.arriving[0][0] <= self.cycles
-            lost = len(self.arriving) > 1 and self.arriving[1][0] <= self.cycles
-            return has_come << 5 | (self.cycles >= self._transmits_until) << 7 | lost << 3
-        if address == 0x4000_4404:
-            return self._received()
-        if address == 0xE000_1004:
-            return self.cycles & 0xFFFF_FFFF if self.values.get(0xE000_1000, 0) & 1 else 0
-        return value
+        special = self._special.get(address)
+        return self.values.get(address, 0) if special is None else special()
+
+    def _clock_control(self) -> int:
+        value = self.values[0x4002_3800]
+        ready = (value >> 16 & 1 and self._crystal) << 17 | (value >> 24 & 1 and self._pll) << 25
+        return value | ready
+
+    def _clock_switch(self) -> int:
+        value = self.values.get(0x4002_3808, 0)
+        return value & ~0xC | (value & 3) << 2
+
+    def _uart_status(self) -> int:
+        self._check_uart()
+        has_come = bool(self.arriving) and self.arriving[0][0] <= self.cycles
+        lost = len(self.arriving) > 1 and self.arriving[1][0] <= self.cycles
+        return has_come << 5 | (self.cycles >= self._transmits_until) << 7 | lost << 3
+
+    def _tick_left(self) -> int:
+        return 0 if self.next_tick is None else max(0, self.next_tick - self.cycles - 1)
+
+    def _cycle_counter(self) -> int:
+        return self.cycles & 0xFFFF_FFFF if self.values.get(0xE000_1000, 0) & 1 else 0
 
     def _received(self) -> int:
         """Return the byte of the data register; the ones that arrived after it are lost."""

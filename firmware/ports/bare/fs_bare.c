@@ -26,6 +26,7 @@ void fs_bare_start(void)
     port.source_hash = source_hash;
     port.stack_size = fs_board_stack_size();
     port.stack_high_water = &fs_board_stack_high_water;
+    port.baud = fs_board_baud();
     fs_app_init(&app, &port);
 }
 
@@ -63,6 +64,7 @@ void fs_bare_pass(void)
     while (now_ms >= FS_STOP_AFTER_MS) {
     }
 #endif
+    fs_app_run(&app, fs_board_now_us());
     receive();
     fs_app_uart_errors(&app, fs_board_overruns(), fs_board_errors());
     fs_app_poll(&app, now_ms);

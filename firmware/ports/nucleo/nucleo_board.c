@@ -159,6 +159,11 @@ uint32_t fs_board_clock_hz(void)
     return clock_hz;
 }
 
+uint32_t fs_board_baud(void)
+{
+    return NUCLEO_BAUD;
+}
+
 uint16_t fs_board_was_watchdog(void)
 {
     const uint16_t was = ((RCC_CSR & RCC_CSR_IWDGRSTF) != 0U) ? 1U : 0U;
@@ -195,6 +200,17 @@ uint32_t fs_board_errors(void)
 uint32_t fs_board_now_ms(void)
 {
     return milliseconds;
+}
+
+uint32_t fs_board_now_us(void)
+{
+    uint32_t now_ms, left;
+
+    do { /* SysTick may start anew between the two */
+        now_ms = milliseconds;
+        left = SYSTICK_VALUE;
+    } while (now_ms != milliseconds);
+    return now_ms * 1000U + (SYSTICK_RELOAD - left) / (clock_hz / 1000000U);
 }
 
 uint32_t fs_board_cycles(void)

@@ -106,6 +106,11 @@ uint32_t fs_board_clock_hz(void)
     return CLOCK_HZ;
 }
 
+uint32_t fs_board_baud(void)
+{
+    return PICO2_BAUD;
+}
+
 uint16_t fs_board_was_watchdog(void)
 {
     return ((WATCHDOG_REASON & WATCHDOG_REASON_TIMER) != 0U) ? 1U : 0U;
@@ -159,6 +164,11 @@ uint32_t fs_board_now_ms(void)
         milliseconds++;
     }
     return milliseconds;
+}
+
+uint32_t fs_board_now_us(void)
+{
+    return TIMER0_RAW_LOW;
 }
 
 uint32_t fs_board_cycles(void)

@@ -58,6 +58,11 @@ uint32_t fs_board_clock_hz(void)
     return 100000000U; /* TODO of the processor, with which fs_board_cycles counts */
 }
 
+uint32_t fs_board_baud(void)
+{
+    return 115200U; /* TODO what fs_board_init set */
+}
+
 uint16_t fs_board_was_watchdog(void)
 {
     return 0U; /* TODO read the cause of the reset, then clear it */
@@ -91,6 +96,11 @@ uint32_t fs_board_errors(void)
 uint32_t fs_board_now_ms(void)
 {
     return milliseconds; /* a 16-bit processor reads it twice, until both are the same */
+}
+
+uint32_t fs_board_now_us(void)
+{
+    return 0U; /* TODO a counter of microseconds, or the milliseconds with the timer's present value */
 }
 
 uint32_t fs_board_cycles(void)

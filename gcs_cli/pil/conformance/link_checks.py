@@ -6,7 +6,7 @@ import random
 import struct
 
 from flightstack.core.contract import LoopFlags
-from flightstack.firmware.pil_operations import REPORT_ID, PilReport
+from flightstack.firmware.pil_steps import REPORT_IDS, PilReport
 from flightstack.mavlink.dialect import LAYOUT_BY_NAME, mavlink
 from flightstack.mavlink.frames import pack_frame
 from flightstack.mavlink.link import Message
@@ -80,7 +80,7 @@ def _report(line: Line, step: int, payload: bytes) -> PilReport | None:
 
 def report_of(message: Message, step: int) -> PilReport | None:
     """Return the report in a message if it is of this step and was computed."""
-    if message.get_msgId() != REPORT_ID:
+    if message.get_msgId() not in REPORT_IDS:
         return None
     report = PilReport.of(bytes(message.get_msgbuf()))
     return report if report.step == step and not report.is_out_of_order else None

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from flightstack.firmware.build import host_library
 from flightstack.firmware.c_loops import HostLoops
 from flightstack.firmware.numbers import default_numbers
-from flightstack.firmware.pil_operations import PilReport
+from flightstack.firmware.pil_steps import PilReport
 from flightstack.firmware.sources import source_hash
 from flightstack.transports.byte_link import ByteLink
 from gcs_cli.pil.conformance import link_checks, loop_checks, state_checks, time_checks
