@@ -67,9 +67,14 @@ def compiler_version(command: Sequence[str]) -> str:
 
 
 def cached(
-    name: str, compiler: Compiler, flags: Sequence[str], sources: Sequence[Path], headers: Sequence[Path] = ()
+    name: str,
+    compiler: Compiler,
+    flags: Sequence[str],
+    sources: Sequence[Path],
+    headers: Sequence[Path] = (),
+    libraries: Sequence[str] = (),
 ) -> Path:
-    """Return the output of ``compiler flags sources -o``, from the cache or compiled now; raise BuildError.
+    """Return the output of ``compiler flags sources libraries -o``, from the cache or compiled now; raise BuildError.
 
     ``headers`` are included by the sources and part of the cache key.
     """
@@ -79,7 +84,7 @@ def cached(
     stem, dot, ending = name.partition(".")
     place = _folder(state) / f"{stem}-{key}{dot}{ending}"
     if not place.exists():
-        _compile(place, [*compiler.command, *flags, *map(str, sources)])
+        _compile(place, [*compiler.command, *flags, *map(str, sources), *libraries])
     return place
 
 
@@ -105,7 +110,8 @@ def _folder(state: str) -> Path:
 
 
 def _compile(place: Path, command: list[str]) -> None:
-    libraries = [] if "-nostdlib" in command else ["-lm"]
+    is_bare = "-nostdlib" in command or "-ffreestanding" in command
+    libraries = [] if is_bare else ["-lm"]
     try:
         with tempfile.TemporaryDirectory(dir=place.parent, prefix=".") as folder:
             fresh = Path(folder) / place.name

@@ -1,17 +1,17 @@
-"""Segments and symbols of an ELF file for 32-bit ARM."""
+"""Segments and symbols of an ELF file for 32-bit ARM or RISC-V."""
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Iterator, Sequence
 
-_EXECUTABLE, _ARM = 2, 40
+_EXECUTABLE, _ARM, _RISCV = 2, 40, 243
 _LOAD_SEGMENT, _SYMBOL_TABLE = 1, 2
 _SYMBOL_SIZE = 16
 
 
 class ElfError(ValueError):
-    """The data is not an executable for 32-bit ARM, or is damaged."""
+    """The data is not an executable for 32-bit ARM or RISC-V, or is damaged."""
 
 
 class Elf:
@@ -23,8 +23,8 @@ class Elf:
             raise ElfError("not a 32-bit little-endian ELF file")
         try:
             kind, machine = struct.unpack_from("<HH", data, 16)
-            if (kind, machine) != (_EXECUTABLE, _ARM):
-                raise ElfError("not an executable for ARM")
+            if kind != _EXECUTABLE or machine not in (_ARM, _RISCV):
+                raise ElfError("not an executable for ARM or RISC-V")
             self.segments = tuple(_segments(data))
             self.symbols = dict(_symbols(data))
         except (struct.error, IndexError, ValueError) as error:

@@ -123,6 +123,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "gcs pil generate --controller lqr",
         "gcs pil generate --controller lqr --out build/lqr",
     ),
+    "pil build": ("gcs pil build nucleo-f446re", "gcs pil build pico2 --baud 921600 --controller lqr"),
     "pil doctor": (
         "gcs pil doctor --target emulated",
         "gcs pil doctor --port /dev/ttyUSB1 --baud 921600",

@@ -136,6 +136,28 @@ def generate(
 
 
 @app.command()
+def build(
+    board: Annotated[str, typer.Argument(help="Board: nucleo-f401re, nucleo-f446re, pico2 or pico2-riscv.")],
+    controller: Annotated[
+        str,
+        typer.Option(
+            "--controller", metavar="NAME", help="Attitude controller that the firmware flies with."
+        ),
+    ] = "pid",
+    baud: Annotated[int, typer.Option(min=1_200, max=2_500_000, help="Rate of the serial port.")] = 115_200,
+    compiler: Annotated[str, typer.Option(help="zig, or gcc for arm-none-eabi-gcc.")] = "zig",
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", metavar="DIR", help="Directory.  [default: build/<board>]")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Build the firmware for a board, and write the file that is copied to its drive."""
+    from gcs_cli.pil.board_build import run_build
+
+    run_build(board, controller, baud, compiler, out, as_json)
+
+
+@app.command()
 def doctor(
     port: Annotated[
         str | None,

@@ -164,6 +164,9 @@ class PilGroup(LazyGroup):
         "replay": LazyCommand(_PIL, "Feed a target with the inputs of a flight log."),
         "vectors": LazyCommand(_PIL, "Write test vectors for a replay, as CSV or MATLAB."),
         "generate": LazyCommand(_PIL, "Write the firmware with your own controller as C."),
+        "build": LazyCommand(
+            _PIL, "Build the firmware for a board, and write the file that is copied to its drive."
+        ),
         "doctor": LazyCommand(_PIL, "Measure the link to a target, and suggest settings."),
     }
 

@@ -30,11 +30,15 @@ KNOWN = [
     *("-DCMAKE_C_STANDARD_COMPUTED_DEFAULT=11", "-DCMAKE_C_EXTENSIONS_COMPUTED_DEFAULT=OFF"),
 ]
 """What CMake finds out by running cl2000."""
-TI_FILES = (
-    "driverlib/f2837xs/driverlib/sci.h",
-    "driverlib/f2837xs/driverlib/ccs/Release/driverlib.lib",
-    "device_support/f2837xs/common/source/device.c",
-    "device_support/f2837xs/common/source/F2837xS_CodeStartBranch.asm",
+TI_FILES = tuple(
+    name
+    for family in ("F2837xS", "F2837xD")
+    for name in (
+        f"driverlib/{family.lower()}/driverlib/sci.h",
+        f"driverlib/{family.lower()}/driverlib/ccs/Release/driverlib.lib",
+        f"device_support/{family.lower()}/common/source/device.c",
+        f"device_support/{family.lower()}/common/source/{family}_CodeStartBranch.asm",
+    )
 )
 
 
@@ -91,6 +95,26 @@ def test_every_source_is_compiled_as_the_core_demands(tmp_path: Path) -> None:
     assert hash_in(Path(re.findall(r"--preinclude=(\S+)", run)[0])) == source_hash()
 
 
+def test_the_f28379d_is_built_with_its_own_files_of_ti(tmp_path: Path) -> None:
+    calls = commands(tmp_path, "-DF28_LAUNCHPAD=F28379D")
+    own = [call for call in calls if "/f28_" in call and "--c_file=" in call]
+    assert own
+    assert all("-D_LAUNCHXL_F28379D" in call for call in own)
+    assert not [call for call in calls if "2837xs" in call.lower()]
+    assert any("/F2837xD_CodeStartBranch.asm" in call for call in calls)
+
+
+def test_loops_from_ram_and_the_tmu_are_options_of_the_build(tmp_path: Path) -> None:
+    calls = [
+        call for call in commands(tmp_path, "-DF28_RAMFUNCS=ON", "-DF28_MATH=relaxed") if "--c_file=" in call
+    ]
+    in_ram = {
+        Path(re.findall(r"--c_file=(\S+)", call)[0]).parent.name for call in calls if "--ramfunc=on" in call
+    }
+    assert in_ram == {"core"}
+    assert all("--fp_mode=relaxed" in call for call in calls if "/core/" in call)
+
+
 @pytest.mark.parametrize("memory", ["flash", "ram"])
 def test_the_memory_that_was_chosen_is_linked(memory: str, tmp_path: Path) -> None:
     *compiled, link = commands(tmp_path, f"-DF28_MEMORY={memory}", "-DF28_STACK_WORDS=1024")
@@ -107,6 +131,8 @@ def test_the_memory_that_was_chosen_is_linked(memory: str, tmp_path: Path) -> No
     [
         ("-DC2000WARE_ROOT=/nowhere", "C2000Ware not found"),
         ("-DF28_MEMORY=rom", "F28_MEMORY is flash or ram"),
+        ("-DF28_LAUNCHPAD=F28335", "F28_LAUNCHPAD is F28377S or F28379D"),
+        ("-DF28_MATH=fast", "F28_MATH is strict or relaxed"),
     ],
 )
 def test_what_is_missing_is_said_in_a_sentence(option: str, word: str, tmp_path: Path) -> None:
@@ -157,7 +183,7 @@ def test_the_ccs_project_lists_the_sources_and_options_of_cmake() -> None:
         assert f"../../../{folder}" in files
         assert (PORT / "ccs" / f"../../../{folder}").resolve() == FIRMWARE / folder
     cmake = (PORT / "CMakeLists.txt").read_text()
-    options = re.search(r"set\(own_options (.*?)\)", cmake)
+    options = re.search(r"set\(own_options (.*?)\)", cmake.replace("${F28_MATH}", "strict"))
     assert options is not None
     for configuration in project.findall("configuration"):
         words = configuration.get("compilerBuildOptions", "").split()

@@ -16,21 +16,22 @@ CONSTANT = re.compile(r"^#define ([A-Z]\w+) (\d\w*|GPIO_\w+)$", re.MULTILINE)
 MEMBER = re.compile(r"\b((?:SCI|SYSCTL|GPIO)_\w+) = (\w+)")
 
 
-def folders() -> list[Path]:
+def folders(family: str = "f2837xs") -> list[Path]:
     """Return where the headers of TI are; skips the test without them."""
     root = os.environ.get("C2000WARE_ROOT", "")
     if not root:
         pytest.skip("C2000WARE_ROOT is not set: the port is not checked against TI's headers here")
     return [
-        Path(root, "driverlib/f2837xs/driverlib"),
-        Path(root, "device_support/f2837xs/common/include"),
+        Path(root, "driverlib", family, "driverlib"),
+        Path(root, "device_support", family, "common/include"),
     ]
 
 
-def said_of(source: Path) -> str:
+def said_of(source: Path, launchpad: str = "F28377S") -> str:
     """Return what the compiler says of a file read with TI's headers; "" is content."""
-    system = [word for folder in folders() for word in ("-isystem", str(folder))]
-    shim = ["-include", str(FAKE / "c28x_shim.h"), "-D_LAUNCHXL_F28377S", "-DCPU1"]
+    family = f"f2837x{launchpad[-1].lower()}"
+    system = [word for folder in folders(family) for word in ("-isystem", str(folder))]
+    shim = ["-include", str(FAKE / "c28x_shim.h"), f"-D_LAUNCHXL_{launchpad}", "-DCPU1"]
     strict = [
         "-std=gnu99",
         "-fsyntax-only",
@@ -44,10 +45,11 @@ def said_of(source: Path) -> str:
     return subprocess.run(command, check=False, capture_output=True, text=True).stderr
 
 
+@pytest.mark.parametrize("launchpad", ["F28377S", "F28379D"])
 @pytest.mark.parametrize("source", sorted(PORT.glob("*.c")), ids=lambda path: path.name)
-def test_the_port_compiles_with_the_headers_of_ti(source: Path) -> None:
+def test_the_port_compiles_with_the_headers_of_ti(source: Path, launchpad: str) -> None:
     """Every call has the parameters, and every constant the type, that driverlib declares."""
-    assert said_of(source) == ""
+    assert said_of(source, launchpad) == ""
 
 
 def test_the_fake_has_the_constants_of_ti(tmp_path: Path) -> None:

@@ -10,23 +10,25 @@
 
 #define MOST_OCTETS 64U /* of each direction in one pass */
 
-static const fs_octet source_hash[8] = {FS_SOURCE_HASH};
-static fs_port port;
-static fs_app app;
+static fs_app bare_app;
 
 void fs_bare_start(void)
 {
+    static const fs_octet bare_hash[8] = {FS_SOURCE_HASH};
+    static fs_port bare_port; /* the application keeps its address */
+
     fs_board_init();
-    port.clock = &fs_board_cycles;
-    port.clock_hz = fs_board_clock_hz();
-    port.cost_unit = FS_COST_CYCLES;
-    port.was_watchdog = fs_board_was_watchdog();
-    port.board = FS_BOARD;
-    port.compiler = FS_COMPILER;
-    port.source_hash = source_hash;
-    port.stack_size = fs_board_stack_size();
-    port.stack_high_water = &fs_board_stack_high_water;
-    fs_app_init(&app, &port);
+    bare_port.clock = &fs_board_cycles;
+    bare_port.clock_hz = fs_board_clock_hz();
+    bare_port.cost_unit = FS_COST_CYCLES;
+    bare_port.was_watchdog = fs_board_was_watchdog();
+    bare_port.board = FS_BOARD;
+    bare_port.compiler = FS_COMPILER;
+    bare_port.source_hash = bare_hash;
+    bare_port.stack_size = fs_board_stack_size();
+    bare_port.stack_high_water = &fs_board_stack_high_water;
+    bare_port.baud = fs_board_baud();
+    fs_app_init(&bare_app, &bare_port);
 }
 
 static void receive(void)
@@ -38,7 +40,7 @@ static void receive(void)
         if (fs_board_receive(&octet) == 0U) {
             break;
         }
-        fs_app_receive(&app, octet);
+        fs_app_receive(&bare_app, octet);
     }
 }
 
@@ -48,7 +50,7 @@ static void transmit(void)
     uint16_t n;
 
     for (n = 0U; n < MOST_OCTETS; n++) {
-        if ((fs_board_can_send() == 0U) || (fs_app_transmit(&app, &octet, 1U) == 0U)) {
+        if ((fs_board_can_send() == 0U) || (fs_app_transmit(&bare_app, &octet, 1U) == 0U)) {
             break;
         }
         fs_board_send(octet);
@@ -63,9 +65,10 @@ void fs_bare_pass(void)
     while (now_ms >= FS_STOP_AFTER_MS) {
     }
 #endif
+    fs_app_run(&bare_app, fs_board_now_us());
     receive();
-    fs_app_uart_errors(&app, fs_board_overruns(), fs_board_errors());
-    fs_app_poll(&app, now_ms);
+    fs_app_uart_errors(&bare_app, fs_board_overruns(), fs_board_errors());
+    fs_app_poll(&bare_app, now_ms);
     transmit();
-    fs_board_pass(now_ms, fs_app_state(&app));
+    fs_board_pass(now_ms, fs_app_state(&bare_app));
 }

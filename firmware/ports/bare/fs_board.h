@@ -13,6 +13,9 @@ void fs_board_init(void);
 /* Clock of the processor [Hz], as fs_board_init set it. The cost counter counts its cycles. */
 uint32_t fs_board_clock_hz(void);
 
+/* Baud rate of the line. */
+uint32_t fs_board_baud(void);
+
 /* 1: the watchdog caused this start. Called once, after fs_board_init. */
 uint16_t fs_board_was_watchdog(void);
 
@@ -31,6 +34,9 @@ uint32_t fs_board_errors(void);
 
 /* Milliseconds since the start, counting up modulo 2^32. */
 uint32_t fs_board_now_ms(void);
+
+/* Microseconds since the start, counting up modulo 2^32: when a tick of the free-running loops is due. */
+uint32_t fs_board_now_us(void);
 
 /* Cycles of the processor, counting up modulo 2^32. */
 uint32_t fs_board_cycles(void);

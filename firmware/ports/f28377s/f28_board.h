@@ -2,15 +2,29 @@
  * Numbers of this port: clock, baud rate, buffers, stack. What can be wrong about them stops the build here.
  *
  * Sources: TI's C2000Ware (device.h, sci.c, sysctl.h of driverlib/f2837xs) and the technical reference manual of the
- * TMS320F2837xS (SPRUHX5): SCI baud rate, FIFO interrupts, watchdog.
+ * TMS320F2837xS (SPRUHX5; of the F2837xD: SPRUHM8): SCI baud rate, FIFO interrupts, watchdog.
  */
 #ifndef F28_BOARD_H
 #define F28_BOARD_H
 
 #include "fs_wire.h"
 
+/* F28_BOARD is what FS_PIL_IDENTITY tells; the lights are LEDs by their GPIO, lit at 0. TI's device.h has the pins of SCIA. */
+#ifdef _LAUNCHXL_F28379D
+#define F28_LAUNCHPAD "LAUNCHXL-F28379D"
+#define F28_LIGHT_HEARTBEAT 31UL
+#define F28_LIGHT_HEARTBEAT_PIN GPIO_31_GPIO31
+#define F28_LIGHT_SAFE 34UL
+#define F28_LIGHT_SAFE_PIN GPIO_34_GPIO34
+#else
+#define F28_LAUNCHPAD "LAUNCHXL-F28377S"
+#define F28_LIGHT_HEARTBEAT 12UL
+#define F28_LIGHT_HEARTBEAT_PIN GPIO_12_GPIO12
+#define F28_LIGHT_SAFE 13UL
+#define F28_LIGHT_SAFE_PIN GPIO_13_GPIO13
+#endif
 #ifndef F28_BOARD
-#define F28_BOARD "LAUNCHXL-F28377S" /* what FS_PIL_IDENTITY tells; a build for anything else overrides it */
+#define F28_BOARD F28_LAUNCHPAD /* a build for anything else overrides it */
 #endif
 
 #define F28_SYSCLK_HZ 200000000UL
@@ -43,8 +57,5 @@
 #define F28_STACK_WORDS 0x600U /* 16-bit words; the linker's --stack_size has to be the same number */
 #endif
 #define F28_STACK_MARGIN 64U   /* words at its beginning that start-up code and main may use before it is painted */
-
-#define F28_LIGHT_HEARTBEAT 12UL /* GPIO of the one LED, which TI's device.h calls LD9; both light at 0 */
-#define F28_LIGHT_SAFE 13UL      /* GPIO of the other one, LD10 */
 
 #endif

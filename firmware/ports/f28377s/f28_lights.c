@@ -19,8 +19,8 @@ static void init_light(uint32_t pin, uint32_t configuration)
 
 void f28_lights_init(void)
 {
-    init_light(F28_LIGHT_HEARTBEAT, GPIO_12_GPIO12);
-    init_light(F28_LIGHT_SAFE, GPIO_13_GPIO13);
+    init_light(F28_LIGHT_HEARTBEAT, F28_LIGHT_HEARTBEAT_PIN);
+    init_light(F28_LIGHT_SAFE, F28_LIGHT_SAFE_PIN);
 }
 
 void f28_lights_show(uint32_t now_ms, uint16_t state)

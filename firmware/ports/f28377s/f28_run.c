@@ -13,7 +13,7 @@
 #include "fs_build.h"
 
 #if !defined(DEVICE_SYSCLK_FREQ) || DEVICE_SYSCLK_FREQ != 200000000
-#error "device.h is set for another crystal: define _LAUNCHXL_F28377S, which has 10 MHz"
+#error "device.h is set for another crystal: define _LAUNCHXL_F28377S or _LAUNCHXL_F28379D, which have 10 MHz"
 #endif
 
 static const fs_octet source_hash[8] = {FS_SOURCE_HASH};

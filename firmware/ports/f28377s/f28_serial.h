@@ -1,5 +1,5 @@
 /*
- * SCIA (GPIO 84 out, 85 in: the USB bridge of the LaunchPad) through its FIFOs, interrupts and two rings. 8N1.
+ * SCIA (GPIO 84 out, 85 in; F28379D: 42 out, 43 in: the USB bridge of the LaunchPad) through its FIFOs, interrupts and two rings. 8N1.
  *
  * The receive interrupt comes with every 8th octet: a burst costs little, and the time of 8 octets is left for it.
  * What lies below that level in the FIFO is fetched by the main loop, since the SCI has no interrupt for a line that

@@ -37,12 +37,12 @@ __attribute__((noreturn)) void fs_start(void)
     }
 }
 
-uint32_t fs_stack_size(void)
+uint32_t fs_stack_bytes(void)
 {
     return (uint32_t)(fs_stack_top - fs_stack_bottom) * 4U;
 }
 
-uint32_t fs_stack_high_water(void)
+uint32_t fs_stack_used(void)
 {
     const uint32_t *at = fs_stack_bottom;
 

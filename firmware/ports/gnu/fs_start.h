@@ -7,7 +7,7 @@
 /* Called by a board's reset code with the stack pointer set and the floating-point unit on. */
 __attribute__((noreturn)) void fs_start(void);
 
-uint32_t fs_stack_size(void);       /* bytes */
-uint32_t fs_stack_high_water(void); /* bytes of it that were ever used */
+uint32_t fs_stack_bytes(void);       /* bytes */
+uint32_t fs_stack_used(void); /* bytes of it that were ever used */
 
 #endif

@@ -58,6 +58,11 @@ uint32_t fs_board_clock_hz(void)
     return 100000000U; /* TODO of the processor, with which fs_board_cycles counts */
 }
 
+uint32_t fs_board_baud(void)
+{
+    return 115200U; /* TODO what fs_board_init set */
+}
+
 uint16_t fs_board_was_watchdog(void)
 {
     return 0U; /* TODO read the cause of the reset, then clear it */
@@ -93,6 +98,11 @@ uint32_t fs_board_now_ms(void)
     return milliseconds; /* a 16-bit processor reads it twice, until both are the same */
 }
 
+uint32_t fs_board_now_us(void)
+{
+    return 0U; /* TODO a counter of microseconds, or the milliseconds with the timer's present value */
+}
+
 uint32_t fs_board_cycles(void)
 {
     return 0U; /* TODO counts up; complement a counter that counts down */
@@ -100,12 +110,12 @@ uint32_t fs_board_cycles(void)
 
 uint32_t fs_board_stack_size(void)
 {
-    return 0U; /* TODO fs_stack_size() of ports/gnu, or 0 if the stack is not painted */
+    return 0U; /* TODO fs_stack_bytes() of ports/gnu, or 0 if the stack is not painted */
 }
 
 uint32_t fs_board_stack_high_water(void)
 {
-    return 0U; /* TODO fs_stack_high_water() */
+    return 0U; /* TODO fs_stack_used() */
 }
 
 void fs_board_pass(uint32_t now_ms, uint16_t state)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from contextlib import closing
 
 from flightstack.firmware.build import BuildError
@@ -29,9 +30,10 @@ def run_conformance(port: str | None, target: str | None, bauds: list[int] | Non
         link = open_link(choice)
     except (BuildError, LineError) as error:
         raise CliError(str(error), USAGE) from None
+    clock_s = None if choice.kind == EMULATED else time.monotonic
     with closing(link):
         try:
-            for each in conformance(link, timing_of(choice).timeout_s, choice.kind == EMULATED):
+            for each in conformance(link, timing_of(choice).timeout_s, clock_s):
                 count += 1
                 failed += [each.name] * (each.result == check.FAILED)
                 output.say("check", _sentence(each), **each._asdict())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple, TypeVar
 
@@ -28,18 +28,24 @@ class Heard(NamedTuple):
 class Line:
     """A link with its codec and its clock."""
 
-    def __init__(self, link: ByteLink, timeout_s: float, is_emulated: bool = False) -> None:
-        """``timeout_s`` is the longest wait for an answer. The time of an emulated target passes by waiting alone."""
-        self._link, self.timeout_s, self._is_emulated = link, timeout_s, is_emulated
+    def __init__(self, link: ByteLink, timeout_s: float, clock_s: Callable[[], float] | None) -> None:
+        """``timeout_s`` is the longest wait for an answer.
+
+        Without ``clock_s`` the time is that spent waiting: of an emulated target, whose reads return at once.
+        """
+        self._link, self.timeout_s, self._clock_s = link, timeout_s, clock_s
         self._codec = Link(OWN_SYSTEM, OWN_COMPONENT)
         self._waited_s = 0.0
+        self._heard: deque[Heard] = deque()
+        self.heartbeats = 0
+        """Heartbeats that have arrived."""
         self.own_frames = 0
         """Own frames that came back: the line, or a console on the target, echoes."""
 
     @property
     def now_s(self) -> float:
         """Time of the line [s]."""
-        return self._waited_s if self._is_emulated else time.monotonic()
+        return self._waited_s if self._clock_s is None else self._clock_s()
 
     def pack(self, message: Message) -> bytes:
         """Return the frame of a message."""
@@ -53,6 +59,8 @@ class Line:
         """Yield the messages that arrive within a time; raise LineError."""
         end_s = self.now_s + duration_s
         for _ in range(_MOST_READS):
+            while self._heard:  # what the caller does not take stays for the next one
+                yield self._heard.popleft()
             left_s = min(end_s - self.now_s, _READ_S)
             if left_s <= 0.0:
                 return
@@ -64,7 +72,8 @@ class Line:
                 if message.get_srcComponent() == OWN_COMPONENT:
                     self.own_frames += 1
                 else:
-                    yield Heard(at_s, message)
+                    self.heartbeats += message.get_type() == "HEARTBEAT"
+                    self._heard.append(Heard(at_s, message))
 
     def wait(self, duration_s: float) -> list[Heard]:
         """Return the messages that arrive within a time; raise LineError."""

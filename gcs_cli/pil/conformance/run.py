@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from flightstack.firmware.build import host_library
 from flightstack.firmware.c_loops import HostLoops
@@ -16,12 +16,12 @@ from gcs_cli.pil.conformance.line import Line, status_of
 from gcs_cli.pil.target_record import RESTARTED, state_words
 
 
-def conformance(link: ByteLink, timeout_s: float, is_emulated: bool = False) -> Iterator[Check]:
+def conformance(link: ByteLink, timeout_s: float, clock_s: Callable[[], float] | None) -> Iterator[Check]:
     """Yield the result of each check; raise BuildError without a C compiler, LineError if the link breaks.
 
-    A target that does not answer ends the checks with the first one. ``is_emulated``: see ``Line``.
+    A target that does not answer ends the checks with the first one. ``clock_s``: see ``Line``.
     """
-    line = Line(link, timeout_s, is_emulated)
+    line = Line(link, timeout_s, clock_s)
     identity = line.request("FS_PIL_IDENTITY")
     status = None if identity is None else line.request("FS_PIL_STATUS")
     if identity is None or status is None:

@@ -27,15 +27,15 @@ class _Sample(NamedTuple):
 
 def time_base(line: Line) -> list[Check]:
     """Compare the target's milliseconds with this machine's clock, and count its heartbeats."""
-    samples, beats, began_s = list[_Sample](), 0, line.now_s
+    samples, beats, began_s = list[_Sample](), line.heartbeats, line.now_s
     for _ in range(SAMPLES + 1):
         sent_s = line.now_s
         status = line.request("FS_PIL_STATUS")
         if status is not None:
             now_s = line.now_s
             samples.append(_Sample((sent_s + now_s) / 2.0, now_s - sent_s, status_of(status)["time_boot_ms"]))
-        beats += sum(message.get_type() == "HEARTBEAT" for _, message in line.wait(WATCHED_S / SAMPLES))
-    return [_milliseconds(samples), _heartbeats(beats, line.now_s - began_s)]
+        line.wait(WATCHED_S / SAMPLES)
+    return [_milliseconds(samples), _heartbeats(line.heartbeats - beats, line.now_s - began_s)]
 
 
 def _milliseconds(samples: list[_Sample]) -> Check:

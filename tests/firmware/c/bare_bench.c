@@ -97,6 +97,11 @@ uint32_t fs_board_clock_hz(void)
     return 100000000U;
 }
 
+uint32_t fs_board_baud(void)
+{
+    return 0U;
+}
+
 uint16_t fs_board_was_watchdog(void)
 {
     return (bench_fault == WAS_WATCHDOG) ? 1U : 0U;
@@ -150,6 +155,11 @@ uint32_t fs_board_now_ms(void)
     default:
         return ms;
     }
+}
+
+uint32_t fs_board_now_us(void)
+{
+    return now_us;
 }
 
 uint32_t fs_board_cycles(void)

@@ -1,0 +1,86 @@
+/*
+ * The registers of STM32F401 and STM32F446 that this port uses; both have them at the same addresses.
+ *
+ * Sources: ST's reference manuals RM0368 (STM32F401) and RM0390 (STM32F446): memory map, 2.3 and 2.2; flash interface, 3;
+ * PWR, 5; RCC, 6; GPIO, 8 and 7; IWDG; USART, 19 and 25. Arm's ARMv7-M manual: SysTick B3.3, NVIC B3.4, DWT C1.8.
+ */
+#ifndef NUCLEO_REGISTERS_H
+#define NUCLEO_REGISTERS_H
+
+#include <stdint.h>
+
+#define NUCLEO_REGISTER(address) (*(volatile uint32_t *)(address))
+
+#define RCC_CR NUCLEO_REGISTER(0x40023800UL)
+#define RCC_CR_HSEON (1UL << 16)
+#define RCC_CR_HSERDY (1UL << 17)
+#define RCC_CR_HSEBYP (1UL << 18)
+#define RCC_CR_PLLON (1UL << 24)
+#define RCC_CR_PLLRDY (1UL << 25)
+#define RCC_PLLCFGR NUCLEO_REGISTER(0x40023804UL)
+#define RCC_PLLCFGR_HSE (1UL << 22)
+#define RCC_CFGR NUCLEO_REGISTER(0x40023808UL)
+#define RCC_CFGR_SW_PLL 2UL
+#define RCC_CFGR_SWS (3UL << 2)
+#define RCC_CFGR_SWS_PLL (2UL << 2)
+#define RCC_CFGR_PPRE1_2 (4UL << 10)
+#define RCC_CFGR_PPRE1_4 (5UL << 10)
+#define RCC_CFGR_PPRE2_2 (4UL << 13)
+#define RCC_AHB1ENR NUCLEO_REGISTER(0x40023830UL)
+#define RCC_AHB1ENR_GPIOA 1UL
+#define RCC_APB1ENR NUCLEO_REGISTER(0x40023840UL)
+#define RCC_APB1ENR_USART2 (1UL << 17)
+#define RCC_APB1ENR_PWR (1UL << 28)
+#define RCC_CSR NUCLEO_REGISTER(0x40023874UL)
+#define RCC_CSR_RMVF (1UL << 24)
+#define RCC_CSR_IWDGRSTF (1UL << 29)
+
+#define PWR_CR NUCLEO_REGISTER(0x40007000UL)
+#define PWR_CR_VOS (3UL << 14)
+#define FLASH_ACR NUCLEO_REGISTER(0x40023C00UL)
+#define FLASH_ACR_CACHES (7UL << 8) /* prefetch, instruction and data cache */
+#define FLASH_ACR_LATENCY 15UL
+
+#define GPIOA_MODER NUCLEO_REGISTER(0x40020000UL)
+#define GPIOA_PUPDR NUCLEO_REGISTER(0x4002000CUL)
+#define GPIOA_BSRR NUCLEO_REGISTER(0x40020018UL)
+#define GPIOA_AFRL NUCLEO_REGISTER(0x40020020UL)
+
+#define USART2_SR NUCLEO_REGISTER(0x40004400UL)
+#define USART_SR_DAMAGED 7UL /* parity, framing, noise */
+#define USART_SR_ORE (1UL << 3)
+#define USART_SR_RXNE (1UL << 5)
+#define USART_SR_TXE (1UL << 7)
+#define USART2_DR NUCLEO_REGISTER(0x40004404UL)
+#define USART2_BRR NUCLEO_REGISTER(0x40004408UL)
+#define USART2_CR1 NUCLEO_REGISTER(0x4000440CUL)
+#define USART_CR1_RE (1UL << 2)
+#define USART_CR1_TE (1UL << 3)
+#define USART_CR1_RXNEIE (1UL << 5)
+#define USART_CR1_UE (1UL << 13)
+#define USART2_IRQ 38U
+
+#define IWDG_KR NUCLEO_REGISTER(0x40003000UL)
+#define IWDG_KR_RELOAD 0xAAAAUL
+#define IWDG_KR_UNLOCK 0x5555UL
+#define IWDG_KR_START 0xCCCCUL
+#define IWDG_PR NUCLEO_REGISTER(0x40003004UL)
+#define IWDG_RLR NUCLEO_REGISTER(0x40003008UL)
+
+#define SYSTICK_CONTROL NUCLEO_REGISTER(0xE000E010UL)
+#define SYSTICK_RELOAD NUCLEO_REGISTER(0xE000E014UL)
+#define SYSTICK_VALUE NUCLEO_REGISTER(0xE000E018UL)
+#define SYSTICK_RUN 7UL /* processor clock, interrupt, enable */
+#define NVIC_ENABLE_32_TO_63 NUCLEO_REGISTER(0xE000E104UL)
+#define FPU_ACCESS NUCLEO_REGISTER(0xE000ED88UL)
+#define DEBUG_CONTROL NUCLEO_REGISTER(0xE000EDFCUL)
+#define DEBUG_CONTROL_TRACE (1UL << 24)
+#define DWT_CONTROL NUCLEO_REGISTER(0xE0001000UL)
+#define DWT_CONTROL_CYCLES 1UL
+#define DWT_CYCLES NUCLEO_REGISTER(0xE0001004UL)
+
+/* Handlers of nucleo_board.c, for the vectors of nucleo_start.c. */
+void nucleo_millisecond(void);
+void nucleo_received(void);
+
+#endif

@@ -1,0 +1,220 @@
+"""Images of boards on emulated chips: start code, clocks, UART, timers and watchdog by their registers."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import select
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from flightstack.firmware.boards import GCC, ZIG
+from flightstack.firmware.build import host_library
+from flightstack.firmware.c_loops import HostLoops
+from flightstack.firmware.numbers import default_numbers
+from gcs_cli.pil.conformance.check import FAILED, PASSED
+from gcs_cli.pil.conformance.line import Line
+from gcs_cli.pil.conformance.link_checks import all_bytes, burst, cut_frame, sizes
+from gcs_cli.pil.conformance.loop_checks import expected_outputs, stepped, vectors
+from gcs_cli.pil.conformance.run import conformance
+from tests.firmware.board_machines import BoardMachine, Nucleo, Pico2, RegisterMisuseError
+from tests.firmware.step_machines import tool
+from tests.firmware.test_board_images import image
+from tests.support.tools import NIGHTLY
+
+TIMEOUT_S = 0.25
+RESEND_S = 5.0
+"""After which a frame is sent to QEMU again, three times in all."""
+STARTED = 3_000_000
+"""Cycles after which every image serves its main loop; an instruction takes some 20 of them."""
+LATE_START = 20_000_000
+"""The same after waiting for a clock in vain."""
+
+
+def nucleo(name: str, compiler: str = ZIG, *flags: str, **chip: bool) -> Nucleo:
+    machine = Nucleo(name, image(name, compiler, *flags), **chip)
+    machine.run_to(STARTED)
+    return machine
+
+
+def pico2(name: str = "pico2", compiler: str = ZIG, *flags: str, **chip: bool) -> Pico2:
+    machine = Pico2(image(name, compiler, *flags), **chip)
+    machine.run_to(STARTED)
+    return machine
+
+
+def failed(machine: BoardMachine) -> list[str]:
+    found = [check.name for check in conformance(machine, TIMEOUT_S, machine.now_s) if check.result == FAILED]
+    machine.close()
+    return found
+
+
+def test_a_nucleo_f401_conforms() -> None:
+    machine = nucleo("nucleo-f401re", GCC)
+    assert machine.baud == pytest.approx(115_200, rel=0.002)  # 365 of 42 MHz: -0.11 %
+    assert failed(machine) == []
+    assert machine.watchdog_s == pytest.approx(0.125, rel=0.01)
+    assert machine.services > 1000
+
+
+@pytest.mark.parametrize("name", Nucleo.MAX_HZ)
+def test_a_nucleo_built_by_zig_exchanges_bytes_and_bursts(name: str) -> None:
+    machine = nucleo(name)
+    assert machine.clock_hz == Nucleo.MAX_HZ[name][0]
+    assert machine.baud == pytest.approx(115_200, rel=0.002)
+    line = Line(machine, TIMEOUT_S, machine.now_s)
+    assert [check(line).result for check in (all_bytes, burst, cut_frame)] == [PASSED] * 3
+    machine.close()
+
+
+def test_a_pico2_exchanges_bytes_bursts_and_cut_frames() -> None:
+    """NIGHTLY=1 runs all conformance checks, 17 s of its time."""
+    machine = pico2("pico2", GCC)
+    assert machine.clock_hz == 150e6
+    assert machine.baud == pytest.approx(115_200, rel=0.0002)
+    if NIGHTLY:
+        assert failed(machine) == []
+        return
+    line = Line(machine, TIMEOUT_S, machine.now_s)
+    assert [check(line).result for check in (all_bytes, sizes, burst, cut_frame)] == [PASSED] * 4
+    assert line.heartbeats >= 1
+    assert machine.services > 500
+    machine.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "board"), [("pico2", "Pico 2, Cortex-M33"), ("pico2-riscv", "Pico 2, Hazard3")]
+)
+def test_a_pico2_built_by_zig_has_the_bits_of_the_host(name: str, board: str) -> None:
+    """The floating-point arithmetic of Hazard3 is zig's run-time library."""
+    machine, steps = pico2(name), vectors(20)
+    line = Line(machine, 1.0, machine.now_s)
+    identity = line.request("FS_PIL_IDENTITY")
+    assert identity.board == board
+    reports = stepped(line, steps)
+    machine.close()
+    expected = expected_outputs(HostLoops(host_library(), default_numbers()), steps)
+    assert [list(report.outputs) for report in reports] == expected[:, :-1].tolist()
+    assert [report.status & 0xFFFF for report in reports] == expected[:, -1].tolist()
+
+
+class QemuLink:
+    """USART2 of QEMU's netduinoplus2, an STM32F405 with it at the same addresses, but without RCC, DWT and IWDG."""
+
+    name = "QEMU"
+
+    def __init__(self, image: Path) -> None:
+        command = [
+            tool("qemu-system-arm", "qemu-system-arm"),
+            "-M",
+            "netduinoplus2",
+            "-nographic",
+            "-monitor",
+            "none",
+        ]
+        serial = ["-serial", "null", "-serial", "stdio", "-kernel", str(image)]
+        self.process = subprocess.Popen(
+            [*command, *serial], stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0
+        )
+
+    def write(self, data: bytes) -> None:
+        assert self.process.stdin is not None
+        self.process.stdin.write(data)
+
+    def read(self, timeout_s: float) -> bytes:
+        assert self.process.stdout is not None
+        ready, _, _ = select.select([self.process.stdout], [], [], timeout_s)
+        return os.read(self.process.stdout.fileno(), 4096) if ready else b""
+
+    def close(self) -> None:
+        self.process.kill()  # SIGTERM may not end it
+        self.process.wait()
+        for pipe in (self.process.stdin, self.process.stdout):
+            assert pipe is not None
+            pipe.close()
+
+
+def test_a_nucleos_image_runs_in_qemu_by_its_interrupts() -> None:
+    """Vectors, SysTick and USART2 by QEMU's interrupt controller; its clock registers are missing: 16 MHz.
+
+    The time of the image runs faster than this machine's there, so that a frame which QEMU delivers in two pieces on a
+    busy machine may be given up: it is sent again.
+    """
+    steps = vectors(30)
+    link = QemuLink(image("nucleo-f401re", GCC))
+    line = Line(link, RESEND_S, time.monotonic)
+    identity = line.request("FS_PIL_IDENTITY")
+    reports = stepped(line, steps)
+    link.close()
+    assert (identity.board, identity.clock_hz) == ("NUCLEO-F401RE", 16_000_000)
+    expected = expected_outputs(HostLoops(host_library(), default_numbers()), steps)
+    assert [list(report.outputs) for report in reports] == expected[:, :-1].tolist()
+
+
+@pytest.mark.parametrize("name", Nucleo.MAX_HZ)
+def test_a_nucleo_without_the_st_links_clock_runs_from_its_own(name: str) -> None:
+    machine = nucleo(name, crystal=False)
+    machine.run_to(LATE_START)
+    assert machine.clock_hz == Nucleo.MAX_HZ[name][0]
+    identity = Line(machine, TIMEOUT_S, machine.now_s).request("FS_PIL_IDENTITY")
+    assert identity.clock_hz == machine.clock_hz
+    machine.close()
+
+
+def test_a_nucleo_without_pll_answers_at_16_mhz() -> None:
+    machine = nucleo("nucleo-f446re", pll=False)
+    machine.run_to(LATE_START)
+    assert machine.baud == pytest.approx(115_200, rel=0.002)
+    assert Line(machine, TIMEOUT_S, machine.now_s).request("FS_PIL_IDENTITY").clock_hz == 16_000_000
+    machine.close()
+
+
+@pytest.mark.parametrize("name", ["nucleo-f401re", "pico2"])
+def test_a_restart_by_the_watchdog_is_told(name: str) -> None:
+    machine = nucleo(name, watchdog=True) if name.startswith("nucleo") else pico2(name, watchdog=True)
+    checks = conformance(machine, TIMEOUT_S, machine.now_s)
+    assert [next(checks).result for _ in range(2)] == [PASSED, PASSED]
+    machine.close()
+
+
+@pytest.mark.parametrize("name", ["nucleo-f401re", "pico2"])
+def test_a_stopped_main_loop_leaves_the_watchdog(name: str) -> None:
+    flag = "-DFS_STOP_AFTER_MS=100"
+    machine = nucleo(name, ZIG, flag) if name.startswith("nucleo") else pico2(name, ZIG, flag)
+    machine.run_to(round(0.11 * machine.clock_hz))
+    services = machine.services
+    assert 60 <= services <= 100
+    machine.run_to(round(0.15 * machine.clock_hz))
+    assert machine.services == services
+    machine.close()
+
+
+def test_the_light_beats_each_512_ms() -> None:
+    machine = nucleo("nucleo-f401re")
+    machine.run_to(round(1.1 * machine.clock_hz))
+    lit = [value == 1 << 5 for value in machine.light]
+    assert sum(before != after for before, after in itertools.pairwise(lit)) == 2
+    machine.close()
+
+
+def test_every_byte_of_a_burst_reaches_a_nucleo_at_921600_baud() -> None:
+    """One byte fits into its receiver, so that each takes an interrupt: 11 us apart."""
+    machine = Nucleo(
+        "nucleo-f401re", image("nucleo-f401re", ZIG, "-UNUCLEO_BAUD", "-DNUCLEO_BAUD=921600UL"), slowness=2
+    )
+    machine.run_to(STARTED)
+    line = Line(machine, TIMEOUT_S, machine.now_s)
+    line.send(b"".join(line.ping_frame(1 << 63 | n, n) for n in range(12)))
+    echoed = [message.seq for _, message in line.wait(0.1) if message.get_type() == "PING"]
+    assert echoed == list(range(12))
+    machine.close()
+
+
+def test_a_uart_that_is_used_too_early_is_seen() -> None:
+    machine = Nucleo("nucleo-f401re", image("nucleo-f401re", ZIG))
+    with pytest.raises(RegisterMisuseError, match="before it is on"):
+        machine.read_register(0x4000_4400)
+    machine.close()
