@@ -66,6 +66,7 @@ imports: $(READY)
 
 generated: $(READY)
 	$(BIN)/python -m tools.generate_dialect --check
+	$(BIN)/python -m tools.derive_estimator --check
 	$(BIN)/python -m tools.generate_params --check
 	$(BIN)/python -m tools.generate_cli --check
 	$(BIN)/python -m tools.generate_tables --check
@@ -74,6 +75,7 @@ generated: $(READY)
 
 generate: $(READY) ## Regenerate files made from others
 	$(BIN)/python -m tools.generate_dialect
+	$(BIN)/python -m tools.derive_estimator
 	$(BIN)/python -m tools.generate_params
 	$(BIN)/python -m tools.generate_cli
 	$(BIN)/python -m tools.generate_tables

@@ -251,12 +251,14 @@ static uint16_t inner_loop(fs_loops *loops, const fs_vehicle_state *state, uint1
     }
     is_sound = attitude_loop(loops, state, &tick, output);
     controlled = now(clock);
+    cost->readings++;
     cost->inner = controlled - began;
     if (!is_sound) {
         return FS_STATUS_OUTPUT_NOT_FINITE;
     }
     is_sound = mix(loops, &tick, output);
     cost->mixer = now(clock) - controlled;
+    cost->readings++;
     if (!is_sound) {
         return FS_STATUS_OUTPUT_NOT_FINITE;
     }
@@ -286,6 +288,7 @@ void fs_loops_step(fs_loops *loops, const fs_loop_input *input, fs_clock clock, 
         loops->is_target_sound = target_is_finite(&loops->target);
     }
     cost->outer = 0UL;
+    cost->readings = 3U; /* at the start, here and at the end */
     inner_began = now(clock);
     if ((input->flags & FS_OUTER_DUE) != 0U) {
         const uint32_t outer_began = inner_began;
@@ -293,6 +296,7 @@ void fs_loops_step(fs_loops *loops, const fs_loop_input *input, fs_clock clock, 
         outer_loop(loops, input, state_is_sound);
         inner_began = now(clock);
         cost->outer = inner_began - outer_began;
+        cost->readings++;
     }
     loops->fraction += loops->rates.fraction_step;
     unsound = inner_loop(loops, &input->state, state_is_sound, clock, inner_began, output, cost);

@@ -36,10 +36,12 @@ typedef uint32_t (*fs_clock)(void); /* cost counter of the port, counting up mod
 
 /*
  * What a step cost, in the clock's unit: differences modulo 2^32. The inner loop's part is reference filter and
- * attitude controller, without the mixer. All zero without a clock.
+ * attitude controller, without the mixer. All zero without a clock. Each includes the time of a clock reading, the whole
+ * step one less than there were readings.
  */
 typedef struct {
     uint32_t outer, inner, mixer, whole;
+    uint16_t readings;
 } fs_loop_cost;
 
 /* What follows from the setup. */

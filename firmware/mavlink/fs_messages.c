@@ -66,6 +66,14 @@ uint16_t fs_message_kind_of(uint32_t id, fs_message_kind *kind)
         kind->length = FS_PIL_IDENTITY_LENGTH;
         kind->crc_extra = 240U;
         break;
+    case FS_PIL_TICK_ID:
+        kind->length = FS_PIL_TICK_LENGTH;
+        kind->crc_extra = 185U;
+        break;
+    case FS_PIL_OUTPUT_ID:
+        kind->length = FS_PIL_OUTPUT_LENGTH;
+        kind->crc_extra = 152U;
+        break;
     default:
         known = 0U;
         break;
@@ -390,6 +398,10 @@ uint16_t fs_pil_identity_encode(const fs_pil_identity *m, fs_octet *payload)
     fs_put_octet(&payload[14], m->char_bits);
     fs_put_octets(&payload[15], m->board, 24U);
     fs_put_octets(&payload[39], m->compiler, 48U);
+    fs_put_octet(&payload[87], m->protocol);
+    fs_put_octet(&payload[88], m->window);
+    fs_put_u32(&payload[89], m->baud);
+    fs_put_u32(&payload[93], m->clock_overhead);
     return fs_trimmed(payload, FS_PIL_IDENTITY_LENGTH);
 }
 
@@ -402,4 +414,40 @@ void fs_pil_identity_decode(const fs_octet *payload, uint16_t length, fs_pil_ide
     m->char_bits = fs_get_octet(payload, length, 14U);
     fs_get_octets(payload, length, 15U, m->board, 24U);
     fs_get_octets(payload, length, 39U, m->compiler, 48U);
+    m->protocol = fs_get_octet(payload, length, 87U);
+    m->window = fs_get_octet(payload, length, 88U);
+    m->baud = fs_get_u32(payload, length, 89U);
+    m->clock_overhead = fs_get_u32(payload, length, 93U);
+}
+
+uint16_t fs_pil_tick_encode(const fs_pil_tick *m, fs_octet *payload)
+{
+    fs_put_u32(&payload[0], m->step);
+    fs_put_u32(&payload[4], m->flags);
+    fs_put_floats(&payload[8], m->values, 24U);
+    return fs_trimmed(payload, FS_PIL_TICK_LENGTH);
+}
+
+void fs_pil_tick_decode(const fs_octet *payload, uint16_t length, fs_pil_tick *m)
+{
+    m->step = fs_get_u32(payload, length, 0U);
+    m->flags = fs_get_u32(payload, length, 4U);
+    fs_get_floats(payload, length, 8U, m->values, 24U);
+}
+
+uint16_t fs_pil_output_encode(const fs_pil_output *m, fs_octet *payload)
+{
+    fs_put_u32(&payload[0], m->step);
+    fs_put_u32(&payload[4], m->status);
+    fs_put_u32(&payload[8], m->cycles);
+    fs_put_floats(&payload[12], m->values, 17U);
+    return fs_trimmed(payload, FS_PIL_OUTPUT_LENGTH);
+}
+
+void fs_pil_output_decode(const fs_octet *payload, uint16_t length, fs_pil_output *m)
+{
+    m->step = fs_get_u32(payload, length, 0U);
+    m->status = fs_get_u32(payload, length, 4U);
+    m->cycles = fs_get_u32(payload, length, 8U);
+    fs_get_floats(payload, length, 12U, m->values, 17U);
 }

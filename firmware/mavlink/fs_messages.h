@@ -227,7 +227,7 @@ void fs_pil_status_decode(const fs_octet *payload, uint16_t length, fs_pil_statu
 
 /* FS_PIL_IDENTITY */
 #define FS_PIL_IDENTITY_ID 53013U
-#define FS_PIL_IDENTITY_LENGTH 87U
+#define FS_PIL_IDENTITY_LENGTH 97U
 typedef struct {
     uint32_t clock_hz; /* Hz */
     fs_octet source_hash[8];
@@ -236,8 +236,35 @@ typedef struct {
     fs_octet char_bits;
     fs_octet board[24];
     fs_octet compiler[48];
+    fs_octet protocol;
+    fs_octet window;
+    uint32_t baud; /* Bd */
+    uint32_t clock_overhead;
 } fs_pil_identity;
 uint16_t fs_pil_identity_encode(const fs_pil_identity *m, fs_octet *payload);
 void fs_pil_identity_decode(const fs_octet *payload, uint16_t length, fs_pil_identity *m);
+
+/* FS_PIL_TICK */
+#define FS_PIL_TICK_ID 53014U
+#define FS_PIL_TICK_LENGTH 104U
+typedef struct {
+    uint32_t step;
+    uint32_t flags;
+    float values[24];
+} fs_pil_tick;
+uint16_t fs_pil_tick_encode(const fs_pil_tick *m, fs_octet *payload);
+void fs_pil_tick_decode(const fs_octet *payload, uint16_t length, fs_pil_tick *m);
+
+/* FS_PIL_OUTPUT */
+#define FS_PIL_OUTPUT_ID 53015U
+#define FS_PIL_OUTPUT_LENGTH 80U
+typedef struct {
+    uint32_t step;
+    uint32_t status;
+    uint32_t cycles;
+    float values[17];
+} fs_pil_output;
+uint16_t fs_pil_output_encode(const fs_pil_output *m, fs_octet *payload);
+void fs_pil_output_decode(const fs_octet *payload, uint16_t length, fs_pil_output *m);
 
 #endif

@@ -30,9 +30,10 @@ from flightstack.params.toml_file import Table
 from flightstack.params.vehicle import Vehicle
 
 
-def _bound_to(template: Callable[..., Any], laws: Mapping[str, ControlLaw]) -> Callable[..., Any]:
-    """Return a kernel compiled with these laws."""
-    names: dict[str, Any] = {}
+def bound_to(
+    template: Callable[..., Any], laws: Mapping[str, ControlLaw], **names: Any
+) -> Callable[..., Any]:
+    """Return a kernel compiled with these laws, and with ``names`` that depend on the laws alone."""
     for role, law in laws.items():
         step, memory, params, size = BOUND_NAMES[role]
         names |= {step: law.step, memory: law.memory_type, params: law.params_type}
@@ -42,16 +43,16 @@ def _bound_to(template: Callable[..., Any], laws: Mapping[str, ControlLaw]) -> C
     return specialise(template, "_".join(chosen), **names)
 
 
-def _outer_kernel_of(controller: Controller) -> Callable[..., Any]:
+def outer_kernel_of(controller: Controller) -> Callable[..., Any]:
     """Return the outer kernel with the controller's laws; the shared one for the built-in laws."""
     outer = (GUIDANCE, POSITION)
     if not controller.own_laws.keys() & set(outer):
         return outer_kernel
     template = getattr(outer_kernel, "py_func", outer_kernel)
-    return _bound_to(template, {role: controller.laws[role] for role in outer})
+    return bound_to(template, {role: controller.laws[role] for role in outer})
 
 
-def _joined(values: Mapping[str, FloatArray]) -> tuple[FloatArray, dict[str, FloatArray]]:
+def joined(values: Mapping[str, FloatArray]) -> tuple[FloatArray, dict[str, FloatArray]]:
     """Return the values of the position law and of guidance in one array, and a view of each."""
     whole, split = np.concatenate([values[POSITION], values[GUIDANCE]]), values[POSITION].size
     return whole, {POSITION: whole[:split], GUIDANCE: whole[split:]}
@@ -86,9 +87,9 @@ class PythonLoops:
         record["dt_s"], record["reference_params"] = 1.0 / inner_hz, numbers.reference
         record["attitude_params"], record["mixer_params"] = numbers.laws[ATTITUDE], numbers.laws[MIXER]
         self._initial = {role: np.array(law.initial_memory, np.float64) for role, law in laws.items()}
-        self._outer_memory, outer = _joined(self._initial)
+        self._outer_memory, outer = joined(self._initial)
         self._memories = {**outer, ATTITUDE: record["attitude"], MIXER: record["mixer"]}
-        self._outer_params, outer = _joined(numbers.laws)
+        self._outer_params, outer = joined(numbers.laws)
         live = {**outer, ATTITUDE: record["attitude_params"], MIXER: record["mixer_params"]}
         numbers = numbers._replace(laws=live, reference=record["reference_params"])
         self._parameters = LoopParameters(numbers, controller, self._memories)
@@ -98,8 +99,8 @@ class PythonLoops:
         self._reference_memory: FloatArray = record["reference"]
         self._last: FloatArray = record["last"]
         self._idle = IdleRow(vehicle)
-        self._kernel = _bound_to(inner_kernel, {role: laws[role] for role in (ATTITUDE, MIXER)})
-        self._outer_kernel = _outer_kernel_of(controller)
+        self._kernel = bound_to(inner_kernel, {role: laws[role] for role in (ATTITUDE, MIXER)})
+        self._outer_kernel = outer_kernel_of(controller)
         self._last_arrays: tuple[FloatArray, FloatArray] | None = None
         self._bound: tuple[FloatArray, FloatArray] | None = None
         self._inner, self._outer = self._kernel, self._outer_kernel

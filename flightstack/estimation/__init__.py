@@ -1,4 +1,1 @@
-"""State estimation. Pure. Planned: the interface ``StateEstimator`` and an EKF on simulated sensors.
-
-The package is empty so far: the control loops, guidance and commander use the true state that the simulator sends.
-"""
+"""State estimation: an error-state Kalman filter with delayed measurements and an output predictor. Pure, compiled."""

@@ -53,6 +53,9 @@ class LoopExecutor(Protocol):
     def step(self, flags: int) -> None:
         """Run a tick from ``input`` to ``output``; ``flags`` are ``LoopFlags``."""
 
+    def run(self, flags: Sequence[int], inputs: FloatArray) -> FloatArray:
+        """Run ticks on ``inputs`` (n, 29), one after another; return the outputs (n, 32)."""
+
     def close(self) -> None:
         """Release resources; no step may follow."""
 
@@ -207,6 +210,15 @@ class HostLoops:
     def step(self, flags: int) -> None:
         """Run one tick on ``input`` and write ``output``; ``flags`` as in FS_PIL_STEP."""
         self._step(self._loops, self._in, flags, self._out)
+
+    def run(self, flags: Sequence[int], inputs: FloatArray) -> FloatArray:
+        """Run ticks on ``inputs`` (n, 29), one after another; return the outputs (n, 32)."""
+        outputs = np.empty((len(inputs), OUTPUT_SIZE))
+        for at, flag in enumerate(flags):
+            self.input[:] = inputs[at]
+            self.step(flag)
+            outputs[at] = self.output
+        return outputs
 
     def set(self, name: str, value: float) -> None:
         """Set a number; raise KeyError if unknown, ValueError if out of range."""

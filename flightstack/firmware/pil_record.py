@@ -13,7 +13,7 @@ import numpy as np
 from flightstack.core.atomic_file import write_bytes_atomically, write_text_atomically
 from flightstack.core.contract import LoopFlags
 from flightstack.firmware.pil_client import PilCounters
-from flightstack.firmware.pil_operations import PilReport
+from flightstack.firmware.pil_steps import PilReport
 
 LINK_FILE, STEPS_FILE = "pil-link.json", "pil-steps.npz"
 COST_UNITS = ("none", "cycles", "instructions", "ns")
@@ -34,8 +34,18 @@ of attempts, and wall time from the first attempt to the report."""
 class PilRecord:
     """Rows of all steps, and information about target and link."""
 
-    def __init__(self, target: str, identity: dict[str, Any], status_at_start: dict[str, Any]) -> None:
-        """``status_at_start`` is FS_PIL_STATUS before the first step: its counters continue from earlier flights."""
+    def __init__(
+        self,
+        target: str,
+        identity: dict[str, Any],
+        status_at_start: dict[str, Any],
+        note: str | None = None,
+    ) -> None:
+        """``status_at_start`` is FS_PIL_STATUS before the first step: its counters continue from earlier flights.
+
+        ``note`` is a sentence about the link.
+        """
+        self._note = note
         self._target, self._identity, self._status_at_start = target, identity, status_at_start
         self._rows: np.ndarray[Any, np.dtype[np.void]] = np.zeros(1024, STEP_ROW)
         self._count = 0
@@ -61,6 +71,7 @@ class PilRecord:
         trips = self.steps["round_trip_s"]
         return {
             "target": self._target,
+            "note": self._note,
             "identity": self._identity,
             "steps": self._count,
             "link": asdict(counters),

@@ -2,6 +2,10 @@
 
 from flightstack.mavlink.layout import Field, Layout
 
+ENTRIES = {
+    "MAV_CMD_FS_SET_BAUD_RATE": 53000,
+}
+
 LAYOUTS = (
     Layout(
         291,
@@ -213,6 +217,31 @@ LAYOUTS = (
             Field("char_bits", "B", 1, False, "uint8_t", "", 4),
             Field("board", "s", 24, True, "char", "", 5),
             Field("compiler", "s", 48, True, "char", "", 6),
+            Field("protocol", "B", 1, False, "uint8_t", "", 7, True),
+            Field("window", "B", 1, False, "uint8_t", "", 8, True),
+            Field("baud", "I", 1, False, "uint32_t", "Bd", 9, True),
+            Field("clock_overhead", "I", 1, False, "uint32_t", "", 10, True),
+        ),
+    ),
+    Layout(
+        53014,
+        "FS_PIL_TICK",
+        185,
+        (
+            Field("step", "I", 1, False, "uint32_t", "", 0),
+            Field("flags", "I", 1, False, "uint32_t", "", 1),
+            Field("values", "f", 24, True, "float", "", 2),
+        ),
+    ),
+    Layout(
+        53015,
+        "FS_PIL_OUTPUT",
+        152,
+        (
+            Field("step", "I", 1, False, "uint32_t", "", 0),
+            Field("status", "I", 1, False, "uint32_t", "", 1),
+            Field("cycles", "I", 1, False, "uint32_t", "", 2),
+            Field("values", "f", 17, True, "float", "", 3),
         ),
     ),
 )

@@ -78,6 +78,10 @@ class Table:
             raise self.error(key, f"{value!r} is neither true nor false")
         return value
 
+    def is_flag(self, key: str) -> bool:
+        """Return True if ``key`` is true or false."""
+        return isinstance(self._values.get(key), bool)
+
     def choice(self, key: str, choices: tuple[str, ...]) -> str:
         """Return one of ``choices``."""
         value = self.text(key)

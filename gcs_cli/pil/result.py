@@ -20,11 +20,12 @@ from gcs_cli.pil.report_charts import DeviationChart
 from gcs_cli.pil.signals import BY_NAME
 from gcs_cli.pil.target_record import TargetRecord
 from gcs_cli.pil.verdict import (
-    CLOSED_LOOP_ULPS,
+    DEFAULT_LIMITS,
     MIL,
     PIL,
     SIL,
     Check,
+    Limits,
     all_passed,
     board_limits,
     difference_checks,
@@ -74,7 +75,11 @@ def pair_name(first: str, second: str) -> str:
 
 
 def closed_loop(
-    flights: Mapping[str, Flown], record: TargetRecord | None, same_bits: bool, facts: Mapping[str, Any]
+    flights: Mapping[str, Flown],
+    record: TargetRecord | None,
+    same_bits: bool,
+    facts: Mapping[str, Any],
+    limits: Limits = DEFAULT_LIMITS.flight,
 ) -> Outcome:
     """Compare the flights MIL, SIL and PIL, each with its own vehicle, and check them.
 
@@ -92,7 +97,7 @@ def closed_loop(
             chart.pairs[pair] = deviation(BY_NAME[name], first, second, airborne=not exact)
     checks = [
         Check("flights that failed", 0.0, _failures(flights), "", _reasons(flights)),
-        *_closed_loop_checks(there, differences, same_bits),
+        *_closed_loop_checks(there, differences, same_bits, limits),
         *(target_checks(record, len(there[PIL].flown_us)) if PIL in there else ()),
     ]
     listed = [difference for pair in differences.values() for difference in pair]
@@ -157,7 +162,10 @@ def _reasons(flights: Mapping[str, Flown]) -> str:
 
 
 def _closed_loop_checks(
-    flights: Mapping[str, FlightSamples], differences: Mapping[str, Sequence[Difference]], same_bits: bool
+    flights: Mapping[str, FlightSamples],
+    differences: Mapping[str, Sequence[Difference]],
+    same_bits: bool,
+    limits: Limits,
 ) -> Iterator[Check]:
     for a, b in combinations(flights, 2):
         pair, first, second = pair_name(a, b), flights[a], flights[b]
@@ -166,10 +174,10 @@ def _closed_loop_checks(
         yield Check(f"{pair} ticks flown by one alone", 0.0 if exact else _LANDING_TICKS, apart, "")
         if MIL not in (a, b):
             yield status_check(f"{pair} ticks of another status", first, second, exact)
-        limits: Mapping[str, float] = CLOSED_LOOP_ULPS
+        of_pair = limits
         if MIL not in (a, b):
-            limits = same_bits_limits(limits) if exact else board_limits(limits)
-        yield from difference_checks(pair, differences[pair], limits)
+            of_pair = same_bits_limits(limits) if exact else board_limits(limits)
+        yield from difference_checks(pair, differences[pair], of_pair)
 
 
 def status_check(name: str, first: FlightSamples, second: FlightSamples, exact: bool) -> Check:

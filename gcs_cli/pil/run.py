@@ -24,7 +24,7 @@ from gcs_cli.pil.report import render_report
 from gcs_cli.pil.result import COMPLETED, Flown, Outcome, closed_loop
 from gcs_cli.pil.target_record import TargetRecord, read_record
 from gcs_cli.pil.targets import check_there, checked_target, has_same_bits, meaning
-from gcs_cli.pil.verdict import MIL, PIL, SIL
+from gcs_cli.pil.verdict import DEFAULT_LIMITS, MIL, PIL, SIL, Limits
 from gcs_cli.report.run_directory import LOG_NAME, RUNS, fresh_directory
 
 JSON_NAME, HTML_NAME = "pil.json", "pil.html"
@@ -57,7 +57,13 @@ class Finished(NamedTuple):
 
 
 def run(
-    options: FlyOptions, plan: Plan, target: str, out: Path | None, console: Console, overwrite: bool = False
+    options: FlyOptions,
+    plan: Plan,
+    target: str,
+    out: Path | None,
+    console: Console,
+    overwrite: bool = False,
+    limits: Limits = DEFAULT_LIMITS.flight,
 ) -> Finished:
     """Fly the mission three times and write ``pil.json`` and ``pil.html``; raise CliError, ConfigError.
 
@@ -84,7 +90,7 @@ def run(
         "meaning": meaning(choice),
         "conditions": _conditions(options, target),
     }
-    outcome = closed_loop(flights, record, has_same_bits(choice), facts)
+    outcome = closed_loop(flights, record, has_same_bits(choice), facts, limits)
     write_outcome(folder, outcome)
     return Finished(folder, outcome, problem)
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from flightstack.core.contract import FloatArray
 from flightstack.core.errors import ConfigError
-from flightstack.firmware.pil_operations import BAD_INPUT, OVERRUN
 from flightstack.firmware.pil_record import COST_UNITS, LINK_FILE, STEPS_FILE
+from flightstack.firmware.pil_steps import BAD_INPUT, OVERRUN
 
 StatusArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 NO_COUNTERS = ("time_boot_ms", "stack_size", "stack_high_water", "state")

@@ -41,7 +41,7 @@ NAMES = [
         "PARAM_ERROR",
     ),
     *("COMMAND_LONG", "COMMAND_ACK", "AUTOPILOT_VERSION", "STATUSTEXT"),
-    *("FS_PIL_STEP", "FS_PIL_REPORT", "FS_PIL_STATUS", "FS_PIL_IDENTITY"),
+    *("FS_PIL_STEP", "FS_PIL_REPORT", "FS_PIL_STATUS", "FS_PIL_IDENTITY", "FS_PIL_TICK", "FS_PIL_OUTPUT"),
 ]
 KINDS: dict[int, Any] = {kind.id: kind for kind in mavlink.mavlink_map.values() if kind.msgname in NAMES}
 """The messages of the codec, as pymavlink has them."""

@@ -109,6 +109,9 @@ static void serve_uart(void)
 {
     fs_octet octets[CHUNK];
 
+    port.baud = MPS2_BAUD;
+    port.can_set_baud = mps2_uart_can_set_baud;
+    port.set_baud = mps2_uart_set_baud;
     begin(mps2_nanoseconds, FS_COST_NANOSECONDS);
     mps2_tick_init();
     mps2_uart_init();

@@ -7,10 +7,30 @@
 
 static volatile uint32_t milliseconds;
 
+static volatile uint32_t interrupted; /* cycles that interrupts took */
+
+static uint32_t count_up(void)
+{
+    return 0xFFFFFFFFUL - CPUTimer_getTimerCount(CPUTIMER1_BASE);
+}
+
+uint32_t f28_interrupt_begins(void)
+{
+    return count_up();
+}
+
+void f28_interrupt_ends(uint32_t began)
+{
+    interrupted = interrupted + (count_up() - began);
+}
+
 static __interrupt void on_millisecond(void)
 {
+    const uint32_t began = f28_interrupt_begins();
+
     milliseconds = milliseconds + 1UL;
     Interrupt_clearACKGroup(INTERRUPT_ACK_GROUP1);
+    f28_interrupt_ends(began);
 }
 
 /* Let a timer count down from `last` to 0, over and over, at SYSCLK. */
@@ -26,6 +46,7 @@ static void start(uint32_t base, uint32_t last)
 void f28_time_init(void)
 {
     milliseconds = 0UL;
+    interrupted = 0UL;
     start(CPUTIMER0_BASE, F28_SYSCLK_HZ / 1000UL - 1UL);
     start(CPUTIMER1_BASE, 0xFFFFFFFFUL);
     Interrupt_register(INT_TIMER0, &on_millisecond);
@@ -48,5 +69,11 @@ uint32_t f28_now_ms(void)
 
 uint32_t f28_cycles(void)
 {
-    return 0xFFFFFFFFUL - CPUTimer_getTimerCount(CPUTIMER1_BASE);
+    const bool was_off = Interrupt_disableGlobal(); /* both counts are of the same moment */
+    const uint32_t cycles = count_up() - interrupted;
+
+    if (!was_off) {
+        (void)Interrupt_enableGlobal();
+    }
+    return cycles;
 }

@@ -128,6 +128,7 @@ static int serve(line *ends, fs_app *app)
     const uint32_t began_ms = fs_host_milliseconds();
     int is_open = 1;
 
+    fs_app_poll(app, 0U);
     while (is_open) {
         struct pollfd watched[3] = {
             {.fd = ends->in, .events = POLLIN},
@@ -135,7 +136,6 @@ static int serve(line *ends, fs_app *app)
             {.fd = ends->parent, .events = 0}, /* only its end is of interest */
         };
 
-        fs_app_poll(app, fs_host_milliseconds() - began_ms);
         if (send_octets(ends, app, &waiting) != 0) {
             break;
         }
@@ -143,6 +143,7 @@ static int serve(line *ends, fs_app *app)
         if (poll(watched, 3, (int)fs_app_wait_ms(app)) < 0 && errno != EINTR) {
             return fail("poll");
         }
+        fs_app_poll(app, fs_host_milliseconds() - began_ms); /* what is received now came after the wait */
         if ((watched[0].revents & (POLLIN | POLLHUP | POLLERR)) != 0) {
             is_open = (receive_octets(ends, app) == 0);
         }

@@ -25,6 +25,8 @@ uint16_t codec_recode(uint32_t id, const fs_octet *payload, uint16_t length, fs_
         RECODE(PIL_REPORT, pil_report)
         RECODE(PIL_STATUS, pil_status)
         RECODE(PIL_IDENTITY, pil_identity)
+        RECODE(PIL_TICK, pil_tick)
+        RECODE(PIL_OUTPUT, pil_output)
     default:
         return 0U;
     }

@@ -1,0 +1,129 @@
+"""Initial state: tilt from the specific force, yaw from the magnetometer, biases zero; and resets to measurements."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, TypeAlias
+
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import FloatArray, Quaternion, Vector3
+from flightstack.core.geometry import quaternion_from_euler, rotate
+from flightstack.core.portable_math import atan2, sin_cos
+from flightstack.estimation.error_state import (
+    ACCEL_BIAS,
+    ATTITUDE,
+    BARO_BIAS,
+    BODY_FIELD,
+    EARTH_FIELD,
+    ERROR_STATES,
+    GNSS_BIAS,
+    GYRO_BIAS,
+    POSITION,
+    VELOCITY,
+    WIND,
+    Covariance,
+    read_nominal,
+    read_vector,
+    turned,
+    write_vector,
+)
+from flightstack.estimation.estimator_params import EstimatorParams
+from flightstack.estimation.fusion import fuse_field
+from flightstack.estimation.kalman import Filter, reset_variance
+
+ALIGNMENT_SIZE = 9
+"""Sums of specific force (3) and magnetic field (3), their numbers of samples, and seconds."""
+Alignment: TypeAlias = Annotated[FloatArray, ALIGNMENT_SIZE]
+
+ALIGNMENT_S = 0.4
+WAIT_FOR_MAG_S = 2.0
+_UNKNOWN_YAW_RAD = 1.0
+
+
+@compiled
+def level_attitude(force: Vector3, yaw_rad: float) -> Quaternion:
+    """Return the attitude of a vehicle that stands, from its specific force."""
+    roll = atan2(-force.y, -force.z)
+    pitch = atan2(force.x, math.sqrt(force.y * force.y + force.z * force.z))
+    return quaternion_from_euler(roll, pitch, yaw_rad)
+
+
+@compiled
+def set_initial_variances(f: Filter, params: EstimatorParams, speed_m_s: float, tilt_rad: float) -> None:
+    """Set the covariance to that of an aligned filter without correlations."""
+    p = f.covariance
+    reset_variance(p, 0, ERROR_STATES, 1e-8)
+    reset_variance(p, ATTITUDE, 2, tilt_rad * tilt_rad)
+    reset_variance(p, ATTITUDE + 2, 1, _UNKNOWN_YAW_RAD * _UNKNOWN_YAW_RAD)
+    reset_variance(p, VELOCITY, 3, speed_m_s * speed_m_s)
+    reset_variance(p, POSITION, 3, 1e-4)
+    reset_variance(p, GYRO_BIAS, 3, params.gyro_bias_rad_s * params.gyro_bias_rad_s)
+    reset_variance(p, ACCEL_BIAS, 3, params.accel_bias_m_s2 * params.accel_bias_m_s2)
+    reset_variance(p, WIND, 2, 1.0)
+    reset_variance(p, BARO_BIAS, 1, 1e4)
+    reset_variance(p, GNSS_BIAS, 3, 1e-8)
+
+
+@compiled
+def align(
+    f: Filter, sums: Alignment, earth: Vector3, declination_rad: float, params: EstimatorParams
+) -> None:
+    """Set attitude, field and covariance from the sums of a vehicle that stands.
+
+    ``earth`` is the Earth's field [gauss, NED] at the place; zero if unknown: then the measured field is taken, turned
+    to the declination.
+    """
+    force = read_vector(sums, 0)
+    off = abs(
+        math.sqrt(force.x * force.x + force.y * force.y + force.z * force.z) / sums[6] - params.gravity_m_s2
+    )
+    moves = off > 1.0
+    for i in range(f.nominal.size):
+        f.nominal[i] = 0.0
+    set_initial_variances(f, params, 5.0 if moves else 0.1, 0.3 if moves else params.tilt_rad)
+    _set_attitude(f, level_attitude(force, 0.0))
+    if sums[7] > 0.0:
+        field = Vector3(sums[3] / sums[7], sums[4] / sums[7], sums[5] / sums[7])
+        align_yaw(f, field, earth, declination_rad, params)
+
+
+@compiled
+def _set_attitude(f: Filter, q: Quaternion) -> None:
+    f.nominal[0], f.nominal[1], f.nominal[2], f.nominal[3] = q.w, q.x, q.y, q.z
+
+
+@compiled
+def align_yaw(
+    f: Filter, field: Vector3, earth: Vector3, declination_rad: float, params: EstimatorParams
+) -> None:
+    """Turn the attitude to the yaw of the measured field, and set the states of the magnetic field."""
+    n = read_nominal(f.nominal)
+    level = rotate(n.attitude, field)
+    known = earth.x != 0.0 or earth.y != 0.0
+    north = atan2(earth.y, earth.x) if known else declination_rad
+    turn = north - atan2(level.y, level.x)
+    _set_attitude(f, turned(n.attitude, Vector3(0.0, 0.0, turn)))
+    horizontal = math.sqrt(level.x * level.x + level.y * level.y)
+    sine, cosine = sin_cos(north)
+    measured = Vector3(cosine * horizontal, sine * horizontal, level.z)
+    write_vector(f.nominal, 16, earth if known else measured)
+    write_vector(f.nominal, 19, Vector3(0.0, 0.0, 0.0))
+    reset_variance(f.covariance, ATTITUDE + 2, 1, _UNKNOWN_YAW_RAD * _UNKNOWN_YAW_RAD)
+    _set_field_variances(f.covariance, earth if known else measured, params)
+    fuse_field(f, field, params)
+
+
+@compiled
+def _set_field_variances(p: Covariance, earth: Vector3, params: EstimatorParams) -> None:
+    """Set the covariance of the magnetic field: along the field by the sensor's scale, across it by the declination."""
+    across, size = (
+        params.earth_field_gauss * params.earth_field_gauss,
+        params.field_scale * params.field_scale,
+    )
+    reset_variance(p, EARTH_FIELD, 3, across)
+    p[EARTH_FIELD, EARTH_FIELD] += size * earth.x * earth.x
+    p[EARTH_FIELD, EARTH_FIELD + 1] = size * earth.x * earth.y
+    p[EARTH_FIELD + 1, EARTH_FIELD] = size * earth.x * earth.y
+    p[EARTH_FIELD + 1, EARTH_FIELD + 1] += size * earth.y * earth.y
+    p[EARTH_FIELD + 2, EARTH_FIELD + 2] += size * earth.z * earth.z
+    reset_variance(p, BODY_FIELD, 3, params.body_field_gauss * params.body_field_gauss)

@@ -1,0 +1,130 @@
+"""Accumulation of raw IMU samples to steps of the filter, with coning and sculling, and the noise of the samples."""
+
+from __future__ import annotations
+
+from typing import Annotated, TypeAlias
+
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import FloatArray, Quaternion, Vector3
+from flightstack.core.geometry import normalised, quaternion_product, rotate, rotation_over, rotation_vector
+from flightstack.estimation.error_state import read_vector, scaled, write_vector
+from flightstack.estimation.prediction import DeltaSample
+
+SUMS_SIZE = 64
+"""Elapsed time, rotation (4), velocity change (3); smoothed rate and specific force (6); number of samples; noise of
+gyro and accelerometer (6); sums of two steps (7), their last four means (24), and the number of means."""
+Sums: TypeAlias = Annotated[FloatArray, SUMS_SIZE]
+
+_MEAN, _COUNT, _NOISE, _PAIR_S, _PAIR, _PAST, _PAIRS = 8, 14, 15, 21, 22, 28, 52
+_SMOOTHING_S = 0.1
+_NOISE_SMOOTHING_S = 2.0
+_PAIR_LENGTH_S = 0.0155
+_DIFFERENCE_VARIANCE = 70.0
+"""Variance of the fourth difference of white noise of variance 1."""
+
+
+@compiled
+def add_sample(sums: Sums, gyro: Vector3, accel: Vector3, dt_s: float) -> None:
+    """Add one raw sample."""
+    angle = scaled(gyro, dt_s)
+    before = Quaternion(sums[1], sums[2], sums[3], sums[4])
+    middle = normalised(quaternion_product(before, rotation_over(angle, 0.5)))
+    after = normalised(quaternion_product(before, rotation_over(angle, 1.0)))
+    dv = rotate(middle, scaled(accel, dt_s))
+    sums[0] += dt_s
+    sums[1], sums[2], sums[3], sums[4] = after.w, after.x, after.y, after.z
+    sums[5] += dv.x
+    sums[6] += dv.y
+    sums[7] += dv.z
+    share = min(dt_s / _SMOOTHING_S, 1.0) if sums[_COUNT] > 0.0 else 1.0
+    _smooth(sums, _MEAN, gyro, share)
+    _smooth(sums, _MEAN + 3, accel, share)
+    sums[_COUNT] += 1.0
+
+
+@compiled
+def _smooth(sums: Sums, at: int, value: Vector3, share: float) -> None:
+    sums[at] += share * (value.x - sums[at])
+    sums[at + 1] += share * (value.y - sums[at + 1])
+    sums[at + 2] += share * (value.z - sums[at + 2])
+
+
+@compiled
+def _measure_noise(sums: Sums, sample_dt_s: float, angle: Vector3, velocity: Vector3) -> None:
+    """Update the noise densities from the fourth difference of means over 16 ms.
+
+    The vehicle's motion has little power there, and vibration, which averages out within 16 ms, does not count.
+    """
+    sums[_PAIR_S] += sample_dt_s
+    sums[_PAIR] += angle.x
+    sums[_PAIR + 1] += angle.y
+    sums[_PAIR + 2] += angle.z
+    sums[_PAIR + 3] += velocity.x
+    sums[_PAIR + 4] += velocity.y
+    sums[_PAIR + 5] += velocity.z
+    length_s = sums[_PAIR_S]
+    if length_s < _PAIR_LENGTH_S:
+        return
+    share = max(
+        min(length_s / _NOISE_SMOOTHING_S, 1.0), 1.0 / (sums[_PAIRS] - 2.0 if sums[_PAIRS] > 3.0 else 2.0)
+    )
+    for i in range(6):
+        mean, at = sums[_PAIR + i] / length_s, _PAST + 4 * i
+        fourth = mean - 4.0 * sums[at] + 6.0 * sums[at + 1] - 4.0 * sums[at + 2] + sums[at + 3]
+        if sums[_PAIRS] >= 4.0:
+            density = fourth * fourth * (length_s / _DIFFERENCE_VARIANCE)
+            sums[_NOISE + i] += share * (density - sums[_NOISE + i])
+        sums[at + 3], sums[at + 2], sums[at + 1], sums[at] = sums[at + 2], sums[at + 1], sums[at], mean
+        sums[_PAIR + i] = 0.0
+    sums[_PAIR_S] = 0.0
+    sums[_PAIRS] += 1.0
+
+
+@compiled
+def mean_rate(sums: Sums) -> Vector3:
+    """Return the rate [rad/s], smoothed over 0.1 s."""
+    return read_vector(sums, _MEAN)
+
+
+@compiled
+def mean_force(sums: Sums) -> Vector3:
+    """Return the specific force [m/s²], smoothed over 0.1 s."""
+    return read_vector(sums, _MEAN + 3)
+
+
+@compiled
+def take_step(sums: Sums, time_s: float) -> DeltaSample:
+    """Return the accumulated step that ends at ``time_s``, and start the next one."""
+    angle = rotation_vector(Quaternion(sums[1], sums[2], sums[3], sums[4]))
+    velocity = read_vector(sums, 5)
+    _measure_noise(sums, sums[0], angle, velocity)
+    sample = DeltaSample(
+        time_s, sums[0], angle, velocity, read_vector(sums, _NOISE), read_vector(sums, _NOISE + 3)
+    )
+    for i in range(8):
+        sums[i] = 0.0
+    sums[1] = 1.0
+    return sample
+
+
+@compiled
+def write_step(row: FloatArray, sample: DeltaSample) -> None:
+    """Write a step to a row of the IMU ring, shape (14,)."""
+    row[0], row[1] = sample.time_s, sample.dt_s
+    write_vector(row, 2, sample.angle_rad)
+    write_vector(row, 5, sample.velocity_m_s)
+    write_vector(row, 8, sample.gyro_density)
+    write_vector(row, 11, sample.accel_density)
+
+
+@compiled
+def read_step(row: FloatArray) -> DeltaSample:
+    """Read a step from a row of the IMU ring."""
+    return DeltaSample(
+        row[0],
+        row[1],
+        read_vector(row, 2),
+        read_vector(row, 5),
+        read_vector(row, 8),
+        read_vector(row, 11),
+    )

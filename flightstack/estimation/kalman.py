@@ -1,0 +1,155 @@
+"""Scalar measurement updates of the error-state Kalman filter, with gates and adaptive measurement noise."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, NamedTuple, TypeAlias
+
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import FloatArray
+from flightstack.estimation.error_state import (
+    ERROR_STATES,
+    Covariance,
+    ErrorVector,
+    corrected,
+    read_nominal,
+    write_nominal,
+)
+
+OBSERVATIONS = 22
+GNSS_VELOCITY, GNSS_POSITION, BARO, MAG, YAW, RANGE, REST_VELOCITY, REST_RATE, DRAG = (
+    0,
+    3,
+    6,
+    7,
+    10,
+    11,
+    12,
+    15,
+    18,
+)
+HOLD_POSITION = 20
+"""First row of each sensor in ``Filter.observations``."""
+
+INNOVATION, INNOVATION_VARIANCE, TEST_RATIO, FUSED_S, NOISE = 0, 1, 2, 3, 4
+OBSERVATION_COLUMNS = 5
+"""Columns: innovation, its variance, squared ratio to the gate, time of the last accepted one, noise variance."""
+
+_ADAPTATION = 0.01
+"""Share of an innovation in the estimate of the noise variance."""
+
+Observations: TypeAlias = Annotated[FloatArray, OBSERVATIONS, OBSERVATION_COLUMNS]
+
+
+class Filter(NamedTuple):
+    """The filter's arrays, all written in place."""
+
+    nominal: Annotated[FloatArray, 28]
+    covariance: Covariance
+    observations: Observations
+    h: ErrorVector
+    """Jacobian of the measurement at hand."""
+    ph: ErrorVector
+    gain: ErrorVector
+    time_s: Annotated[FloatArray, 1]
+    """Time of the state, at the delayed horizon."""
+
+
+class Noise(NamedTuple):
+    """Range of a measurement's noise [1σ]. The filter estimates the noise within it from its innovations."""
+
+    least: float
+    largest: float
+    gate: float
+
+
+@compiled
+def clear(x: ErrorVector) -> None:
+    """Set every item to zero."""
+    for i in range(ERROR_STATES):
+        x[i] = 0.0
+
+
+@compiled
+def mirror(p: Covariance) -> None:
+    """Copy the elements above the diagonal below it."""
+    for i in range(ERROR_STATES):
+        for j in range(i):
+            p[i, j] = p[j, i]
+
+
+@compiled
+def _project(f: Filter) -> float:
+    """Write P hᵀ to ``ph`` and return h P hᵀ."""
+    clear(f.ph)
+    for k in range(ERROR_STATES):
+        if f.h[k] != 0.0:
+            for i in range(ERROR_STATES):
+                f.ph[i] += f.h[k] * f.covariance[k, i]
+    total = 0.0
+    for i in range(ERROR_STATES):
+        total += f.h[i] * f.ph[i]
+    return total
+
+
+@compiled
+def _correct(f: Filter, innovation: float, variance: float) -> None:
+    """Correct state and covariance with ``gain``, by Joseph's form, which holds for any gain."""
+    p, gain, ph = f.covariance, f.gain, f.ph
+    for i in range(ERROR_STATES):
+        own = gain[i] * variance - ph[i]
+        for j in range(ERROR_STATES):
+            p[i, j] += own * gain[j] - gain[i] * ph[j]
+    for i in range(ERROR_STATES):
+        p[i, i] = max(p[i, i], 1e-12)
+        gain[i] *= innovation
+    write_nominal(f.nominal, corrected(read_nominal(f.nominal), gain))
+
+
+@compiled
+def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> bool:
+    """Fuse a scalar measurement with the Jacobian ``f.h``; return True if it is within its gate.
+
+    With ``holds`` above zero, tilt, velocity, position and accelerometer bias keep their values and their
+    uncertainty (a Schmidt-Kalman update).
+    """
+    o = f.observations
+    least, largest = noise.least * noise.least, noise.largest * noise.largest
+    r = min(max(o[row, NOISE], least), largest)
+    projected = _project(f)
+    variance = projected + r
+    ratio = innovation * innovation / (noise.gate * noise.gate * variance)
+    o[row, INNOVATION], o[row, INNOVATION_VARIANCE], o[row, TEST_RATIO] = innovation, variance, ratio
+    if not ratio <= 1.0:
+        return False
+    estimate = innovation * innovation - projected
+    o[row, NOISE] = min(max(r + _ADAPTATION * (estimate - r), least), largest)
+    for i in range(ERROR_STATES):
+        f.gain[i] = f.ph[i] / variance
+    if holds > 0.0:
+        f.gain[0], f.gain[1] = 0.0, 0.0
+        for i in range(3, 9):
+            f.gain[i] = 0.0
+        for i in range(12, 15):
+            f.gain[i] = 0.0
+    _correct(f, innovation, variance)
+    o[row, FUSED_S] = f.time_s[0]
+    return True
+
+
+@compiled
+def reset_variance(p: Covariance, at: int, count: int, variance: float) -> None:
+    """Make ``count`` states from ``at`` independent of all others, each with ``variance``."""
+    for i in range(at, at + count):
+        for j in range(ERROR_STATES):
+            p[i, j], p[j, i] = 0.0, 0.0
+        p[i, i] = variance
+
+
+@compiled
+def deviation(f: Filter, at: int, count: int) -> float:
+    """Return the root of the summed variances of ``count`` states from ``at``."""
+    total = 0.0
+    for i in range(at, at + count):
+        total += f.covariance[i, i]
+    return math.sqrt(total)

@@ -1,0 +1,146 @@
+"""Prediction of the filter's state and covariance with one accumulated IMU sample."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import Quaternion, Vector3
+from flightstack.core.geometry import cross, normalised, quaternion_product, rotate, rotation_over
+from flightstack.estimation.derived_generated import predict_covariance
+from flightstack.estimation.error_state import (
+    ACCEL_BIAS,
+    ATTITUDE,
+    BARO_BIAS,
+    BODY_FIELD,
+    EARTH_FIELD,
+    GYRO_BIAS,
+    POSITION,
+    VELOCITY,
+    WIND,
+    Covariance,
+    Nominal,
+    read_nominal,
+    write_nominal,
+)
+from flightstack.estimation.estimator_params import EstimatorParams
+from flightstack.estimation.kalman import Filter, mirror
+
+
+class DeltaSample(NamedTuple):
+    """Rotation vector and velocity change over ``dt_s``, in the body frame at its start, biases included.
+
+    The densities are those measured of the white noise of each axis, [rad²/s] and [m²/s³].
+    """
+
+    time_s: float
+    dt_s: float
+    angle_rad: Vector3
+    velocity_m_s: Vector3
+    gyro_density: Vector3
+    accel_density: Vector3
+
+
+class Motion(NamedTuple):
+    """Attitude, velocity and position."""
+
+    attitude: Quaternion
+    velocity_ned_m_s: Vector3
+    position_ned_m: Vector3
+
+
+@compiled
+def less_bias(v: Vector3, bias: Vector3, dt_s: float) -> Vector3:
+    """Return a delta angle or velocity without the bias of its rate."""
+    return Vector3(v.x - bias.x * dt_s, v.y - bias.y * dt_s, v.z - bias.z * dt_s)
+
+
+@compiled
+def moved(start: Motion, angle: Vector3, delta_velocity: Vector3, dt_s: float, gravity: float) -> Motion:
+    """Integrate one step: ``angle`` and ``delta_velocity`` in the body frame at the start, velocity by trapezoids."""
+    dv = rotate(start.attitude, delta_velocity)
+    v = start.velocity_ned_m_s
+    end = Vector3(v.x + dv.x, v.y + dv.y, v.z + dv.z + gravity * dt_s)
+    p, half = start.position_ned_m, 0.5 * dt_s
+    return Motion(
+        normalised(quaternion_product(start.attitude, rotation_over(angle, 1.0))),
+        end,
+        Vector3(p.x + half * (v.x + end.x), p.y + half * (v.y + end.y), p.z + half * (v.z + end.z)),
+    )
+
+
+@compiled
+def motion_of(n: Nominal) -> Motion:
+    """Return the part of the nominal state that moves."""
+    return Motion(n.attitude, n.velocity_ned_m_s, n.position_ned_m)
+
+
+@compiled
+def with_motion(n: Nominal, motion: Motion) -> Nominal:
+    """Return the nominal state with another motion."""
+    return Nominal(
+        motion.attitude,
+        motion.velocity_ned_m_s,
+        motion.position_ned_m,
+        n.gyro_bias_rad_s,
+        n.accel_bias_m_s2,
+        n.earth_field_ned_gauss,
+        n.body_field_frd_gauss,
+        n.wind_north_m_s,
+        n.wind_east_m_s,
+        n.baro_bias_m,
+        n.gnss_bias_ned_m,
+    )
+
+
+@compiled
+def _add(p: Covariance, at: int, count: int, variance: float) -> None:
+    for i in range(at, at + count):
+        p[i, i] += variance
+
+
+@compiled
+def _add_body_noise(p: Covariance, at: int, axis: Vector3, variance: float) -> None:
+    """Add the noise of one axis of the body, a unit vector in the world frame."""
+    p[at, at] += variance * axis.x * axis.x
+    p[at, at + 1] += variance * axis.x * axis.y
+    p[at, at + 2] += variance * axis.x * axis.z
+    p[at + 1, at + 1] += variance * axis.y * axis.y
+    p[at + 1, at + 2] += variance * axis.y * axis.z
+    p[at + 2, at + 2] += variance * axis.z * axis.z
+
+
+@compiled
+def _add_process_noise(p: Covariance, q: Quaternion, sample: DeltaSample, params: EstimatorParams) -> None:
+    dt_s, gyro, accel = sample.dt_s, params.gyro_noise, params.accel_noise
+    x = rotate(q, Vector3(1.0, 0.0, 0.0))
+    y = rotate(q, Vector3(0.0, 1.0, 0.0))
+    z = cross(x, y)
+    _add_body_noise(p, ATTITUDE, x, max(gyro * gyro, sample.gyro_density.x) * dt_s)
+    _add_body_noise(p, ATTITUDE, y, max(gyro * gyro, sample.gyro_density.y) * dt_s)
+    _add_body_noise(p, ATTITUDE, z, max(gyro * gyro, sample.gyro_density.z) * dt_s)
+    _add_body_noise(p, VELOCITY, x, max(accel * accel, sample.accel_density.x) * dt_s)
+    _add_body_noise(p, VELOCITY, y, max(accel * accel, sample.accel_density.y) * dt_s)
+    _add_body_noise(p, VELOCITY, z, max(accel * accel, sample.accel_density.z) * dt_s)
+    _add(p, POSITION, 3, 1e-8 * dt_s)
+    _add(p, GYRO_BIAS, 3, params.gyro_bias_walk * params.gyro_bias_walk * dt_s)
+    _add(p, ACCEL_BIAS, 3, params.accel_bias_walk * params.accel_bias_walk * dt_s)
+    _add(p, EARTH_FIELD, 3, params.earth_field_walk * params.earth_field_walk * dt_s)
+    _add(p, BODY_FIELD, 3, params.body_field_walk * params.body_field_walk * dt_s)
+    _add(p, WIND, 2, params.wind_walk * params.wind_walk * dt_s)
+    _add(p, BARO_BIAS, 1, params.baro_walk * params.baro_walk * dt_s)
+
+
+@compiled
+def predict(f: Filter, sample: DeltaSample, params: EstimatorParams) -> None:
+    """Propagate state and covariance over the sample."""
+    n = read_nominal(f.nominal)
+    angle = less_bias(sample.angle_rad, n.gyro_bias_rad_s, sample.dt_s)
+    delta_velocity = less_bias(sample.velocity_m_s, n.accel_bias_m_s2, sample.dt_s)
+    middle = quaternion_product(n.attitude, rotation_over(angle, 0.5))
+    after = moved(motion_of(n), angle, delta_velocity, sample.dt_s, params.gravity_m_s2)
+    predict_covariance(f.covariance, middle, delta_velocity, sample.dt_s)
+    _add_process_noise(f.covariance, middle, sample, params)
+    mirror(f.covariance)
+    write_nominal(f.nominal, with_motion(n, after))
+    f.time_s[0] = sample.time_s

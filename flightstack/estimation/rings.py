@@ -1,0 +1,68 @@
+"""Ring buffers of rows of floats, for measurements that wait until the delayed horizon reaches their time."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple, TypeAlias
+
+import numpy as np
+
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import FloatArray
+
+GNSS_ROWS, MAG_ROWS, BARO_ROWS, RANGE_ROWS, IMU_ROWS = 8, 32, 32, 32, 64
+GNSS_RING, MAG_RING, BARO_RING, RANGE_RING, IMU_RING, RINGS = 0, 1, 2, 3, 4, 5
+IMU_COLUMNS, TRACK_COLUMNS = 14, 11
+
+Cursors: TypeAlias = "Annotated[np.ndarray[tuple[int, int], np.dtype[np.int64]], RINGS, 2]"
+"""For each ring the slot of its oldest row, and the number of its rows."""
+
+
+class Rings(NamedTuple):
+    """Measurements in the order of their arrival; the first column of each row is the time."""
+
+    gnss: Annotated[FloatArray, GNSS_ROWS, 10]
+    mag: Annotated[FloatArray, MAG_ROWS, 4]
+    baro: Annotated[FloatArray, BARO_ROWS, 2]
+    range: Annotated[FloatArray, RANGE_ROWS, 2]
+    imu: Annotated[FloatArray, IMU_ROWS, IMU_COLUMNS]
+    track: Annotated[FloatArray, IMU_ROWS, TRACK_COLUMNS]
+    """The output at the time of each row of ``imu``: time, attitude, velocity, position."""
+    cursors: Cursors
+
+
+@compiled
+def slot_of(rings: Rings, ring: int, size: int, number: int) -> int:
+    """Return the slot of row ``number``, counted from the oldest."""
+    slot: int = rings.cursors[ring, 0] + number
+    return slot - size if slot >= size else slot
+
+
+@compiled
+def is_due(rings: Rings, ring: int, row_s: float, now_s: float) -> bool:
+    """Return True if the ring has rows and its oldest one, measured at ``row_s``, is not in the future."""
+    count: int = rings.cursors[ring, 1]
+    return count > 0 and row_s <= now_s
+
+
+@compiled
+def push(rings: Rings, ring: int, size: int) -> int:
+    """Return the slot for a new row; the oldest row of a full ring is dropped."""
+    if rings.cursors[ring, 1] >= size:
+        pop(rings, ring, size)
+    slot = slot_of(rings, ring, size, rings.cursors[ring, 1])
+    rings.cursors[ring, 1] += 1
+    return slot
+
+
+@compiled
+def pop(rings: Rings, ring: int, size: int) -> None:
+    """Remove the oldest row."""
+    rings.cursors[ring, 0] = slot_of(rings, ring, size, 1)
+    rings.cursors[ring, 1] -= 1
+
+
+@compiled
+def write_row(rows: FloatArray, slot: int, values: FloatArray) -> None:
+    """Copy ``values`` to a row."""
+    for column in range(rows.shape[1]):
+        rows[slot, column] = values[column]
