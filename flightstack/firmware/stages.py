@@ -285,7 +285,7 @@ class StageModel:
         vehicle, controller = setup.vehicle, controller_of(setup.controller)
         check_python(controller)
         laws = controller.laws
-        numbers = loop_numbers(vehicle, controller, setup.gains, setup.max_tilt_rad)
+        numbers = loop_numbers(vehicle, controller, setup.gains, setup.max_tilt_rad, setup.given)
         self._memory = _memory_of(controller, len(vehicle.rotors), numbers)
         record = self._memory[0]
         record["dt_s"], record["outer_dt_s"] = 1.0 / setup.inner_hz, setup.divisor / setup.inner_hz

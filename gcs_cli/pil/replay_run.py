@@ -16,6 +16,7 @@ from flightstack.core.errors import ConfigError, TargetError
 from flightstack.firmware.c_loops import CLoops, LoopsSetup
 from flightstack.firmware.choice import PYTHON, SERIAL, LoopsChoice
 from flightstack.firmware.law_tree import controller_named, logged_params
+from flightstack.firmware.numbers import FIRST_NUMBERS
 from flightstack.firmware.targets import finish_loops, make_loops
 from flightstack.flight_log.flight_log import vehicle_fields
 from flightstack.params.behaviour import SPECS
@@ -159,7 +160,7 @@ def fed(replay: Replay, target: str, folder: Path, console: Console) -> tuple[Fl
         assert isinstance(loops, CLoops)
         with ExitStack() as last:
             last.callback(finish_loops, loops, folder / LOG_NAME)
-            for name, value in replay.numbers.items():
+            for name, value in (*FIRST_NUMBERS.items(), *replay.numbers.items()):
                 loops.executor.set(name, value)
             with step_bar(f"replay on {target}", console) as bar:
                 outputs = replayed(replay.record, loops.executor, names.__contains__, bar.show)
@@ -210,19 +211,29 @@ def judged(
     """Compare the outputs with the log and with Python's stages, and check them. Pure."""
     flight, steps = replay.flight, replay.record
     made = as_flight(steps, outputs, {})
-    expected = as_flight(steps, expected_outputs(steps, outputs, replay.setup, replay.numbers), {})
+    expected = None
+    if replay.setup.has_python:
+        expected = as_flight(steps, expected_outputs(steps, outputs, replay.setup, replay.numbers), {})
     pair, stages = pair_name(LOG, "target"), pair_name(STAGEWISE, "target")
     differences = list(compared(pair, flight, made))
-    by_stage = list(compared(stages, expected, made))
+    by_stage = [] if expected is None else list(compared(stages, expected, made))
     left_out = None if steps.tells_targets else TARGET
     of_stages = limits.stages if same_bits else board_limits(limits.stages)
     checks = [
         *(_log_checks(pair, differences, replay, made, same_bits, limits.replay) if flight.signals else ()),
-        *difference_checks(stages, by_stage, of_stages, left_out),
-        status_check(f"{stages} steps of another status", expected, made, False),
+        *(() if expected is None else difference_checks(stages, by_stage, of_stages, left_out)),
+        *(
+            ()
+            if expected is None
+            else [status_check(f"{stages} steps of another status", expected, made, False)]
+        ),
         *(target_checks(record, len(outputs)) if record is not None else ()),
     ]
     result = assembled([*differences, *by_stage], checks, record, facts)
+    if expected is None:
+        result["meaning"] += (
+            " A law of the controller is written in C: there are no stages in Python to compare with."
+        )
     if not replay.record.tells_targets:
         result["meaning"] += (
             " This log does not tell which attitude targets the outer loop made: all were given to the inner loop, "
@@ -233,7 +244,7 @@ def judged(
         {"name": f"largest difference {shown}", "value": largest_difference(differences or by_stage)},
         *target_tiles(record),
     ]
-    first = flight if differences else expected
+    first = flight if differences or expected is None else expected
     charts = [
         DeviationChart(BY_NAME[name], {shown: deviation(BY_NAME[name], first, made)}) for name in _SHOWN
     ]
