@@ -51,6 +51,7 @@ void fs_app_init(fs_app *app, const fs_port *port)
     app->alarm_severity = 0U;
     app->next_listed = fs_param_count();
     fs_app_baud_init(app);
+    fs_app_free_init(app);
     fs_app_forget_flight(app);
     app->state = FS_APP_READY;
     if (port->was_watchdog != 0U) {
@@ -76,6 +77,9 @@ static void handle(fs_app *app)
         break;
     case FS_PIL_TICK_ID:
         fs_app_on_tick(app);
+        break;
+    case FS_PIL_STATE_ID:
+        fs_app_on_state(app);
         break;
     case FS_PARAM_REQUEST_LIST_ID:
         fs_app_on_param_list(app);
@@ -164,6 +168,7 @@ void fs_app_poll(fs_app *app, uint32_t now_ms)
         app->state = FS_APP_READY; /* nothing is forgotten: the host may go on */
     }
     tell_news(app);
+    fs_app_free_tell(app);
     app->is_polled = 1U;
 }
 

@@ -6,12 +6,14 @@
  *
  *     for (;;) {
  *         while (octets have come)  { fs_app_receive(&app, octet); }
+ *         fs_app_run(&app, now_us);
  *         fs_app_poll(&app, now_ms);
  *         count = fs_app_transmit(&app, octets, room);  ...send them
  *     }
  *
- * A step is computed inside fs_app_receive, when the last octet of its frame is given. Nothing is computed without a
- * host: a target has no sensors of its own, and it drives no rotors.
+ * A step is computed inside fs_app_receive, when the last octet of its frame is given. A free-running target computes
+ * inside fs_app_run, at its own time. Nothing flies without a host: a target has no sensors of its own, and it drives no
+ * rotors.
  */
 #ifndef FS_APP_H
 #define FS_APP_H
@@ -35,6 +37,8 @@
 #define FS_APP_STEPPING 1U   /* a host steps */
 #define FS_APP_SAFE 2U       /* bad input came: rotors stopped until a step with RESET */
 #define FS_APP_RESTARTED 3U  /* the watchdog restarted the target: parameters are lost; until a step with RESET */
+
+#define FS_APP_FREE 4U       /* the loops run by the target's timer */
 
 /* FS_PIL_REPORT.status, above the 16 bits of the loops */
 #define FS_APP_REPEATED 0x10000UL
@@ -79,6 +83,19 @@ typedef struct {
     uint16_t is_short; /* 1: it came as an FS_PIL_TICK, and is answered by an FS_PIL_OUTPUT */
 } fs_answered;
 
+/* Free-running; see fs_app_free.c. */
+typedef struct {
+    uint16_t is_on, is_flying;
+    uint16_t is_begun; /* a deadline is set */
+    uint16_t is_reset; /* the next tick resets the loops */
+    uint16_t is_new;   /* no tick has used the state yet */
+    uint16_t every, ticks, phase; /* ticks per FS_PIL_DRIVE, since the last one; since the outer loop was due */
+    uint32_t now_us, due_us, arrived_us, timeout_us;
+    fs_pil_step state; /* its number is the host's time */
+    fs_pil_timing timing;
+    uint32_t late_sum_us, age_sum_us, aged, window_ms;
+} fs_free;
+
 /* The state of the application: the caller owns it, and looks only at what fs_app_* functions tell. */
 typedef struct {
     const fs_port *port;
@@ -100,6 +117,7 @@ typedef struct {
     uint32_t steps, repeats, out_of_order, loop_overruns, safe_states;
 
     fs_line line;
+    fs_free free;
     uint32_t uart_overruns, uart_errors, told_overruns; /* the last: of those that were complained about */
     const char *alarm;                                  /* a text that waits for room in the outbox; NULL: none */
     uint16_t alarm_severity;
@@ -117,6 +135,12 @@ void fs_app_uart_errors(fs_app *app, uint32_t overruns, uint32_t errors);
 
 /* Do what is due by the port's time, which counts modulo 2^32: heartbeat, status, time-outs. */
 void fs_app_poll(fs_app *app, uint32_t now_ms);
+
+/* Free-running: note the port's time, which counts modulo 2^32, and run the tick that is due. From each pass. */
+void fs_app_run(fs_app *app, uint32_t now_us);
+
+/* Return in how many microseconds after the last fs_app_run a tick is due; 2^32 - 1 if none is. */
+uint32_t fs_app_run_wait_us(const fs_app *app);
 
 /* Return in how many milliseconds after the last fs_app_poll there is something due, if no octet comes before. */
 uint32_t fs_app_wait_ms(const fs_app *app);

@@ -98,7 +98,7 @@ static uint16_t reboot(fs_app *app, float what)
 
     if (what != REBOOT) {
         result = FS_MAV_RESULT_DENIED; /* there is nothing else to reboot, and nothing to shut down */
-    } else if (app->state == FS_APP_STEPPING) {
+    } else if ((app->state == FS_APP_STEPPING) || (app->free.is_on != 0U)) {
         result = FS_MAV_RESULT_TEMPORARILY_REJECTED;
     } else {
         fs_app_forget_flight(app);
@@ -137,6 +137,8 @@ void fs_app_on_command(fs_app *app)
         result = reboot(app, message.param1);
     } else if (message.command == FS_MAV_CMD_FS_SET_BAUD_RATE) {
         result = fs_app_set_baud(app, message.param1);
+    } else if (message.command == FS_MAV_CMD_FS_FREE_RUN) {
+        result = fs_app_free_command(app, message.param1, message.param2, message.param3);
     } else {
         /* no other command */
     }

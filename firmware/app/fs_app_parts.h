@@ -31,6 +31,16 @@ void fs_app_on_tick(fs_app *app);
 void fs_app_on_new_numbers(fs_app *app);
 void fs_app_forget_flight(fs_app *app); /* step 0 or one with RESET is expected next; the state stays */
 
+uint16_t fs_app_is_overrun(const fs_app *app, const fs_loop_cost *cost);
+void fs_app_take_overhead_out(const fs_app *app, fs_loop_cost *cost); /* the readings of the clock */
+
+/* fs_app_free.c */
+void fs_app_free_init(fs_app *app);
+uint16_t fs_app_free_command(fs_app *app, float what, float every, float timeout_ms);
+void fs_app_free_stop(fs_app *app);
+void fs_app_on_state(fs_app *app);
+void fs_app_free_tell(fs_app *app);
+
 /* fs_app_params.c */
 void fs_app_on_param_list(fs_app *app);
 void fs_app_on_param_read(fs_app *app);

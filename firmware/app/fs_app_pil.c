@@ -57,7 +57,7 @@ static uint32_t less(uint32_t cost, uint32_t overhead)
 }
 
 /* Take the readings of the clock out of what it measured. */
-static void take_overhead_out(const fs_app *app, fs_loop_cost *cost)
+void fs_app_take_overhead_out(const fs_app *app, fs_loop_cost *cost)
 {
     cost->outer = less(cost->outer, app->clock_overhead);
     cost->inner = less(cost->inner, app->clock_overhead);
@@ -66,7 +66,7 @@ static void take_overhead_out(const fs_app *app, fs_loop_cost *cost)
 }
 
 /* Tell whether a step took longer than a period of the inner loop, where the clock's rate is known. */
-static uint16_t is_overrun(const fs_app *app, const fs_loop_cost *cost)
+uint16_t fs_app_is_overrun(const fs_app *app, const fs_loop_cost *cost)
 {
     fs_real clock_hz = FS_LIT(0.0);
 
@@ -102,7 +102,7 @@ static void compute(fs_app *app, const fs_pil_step *step, uint16_t is_short)
 
     fs_pil_to_input(step, &input);
     fs_loops_step(&app->loops, &input, app->port->clock, &output, &cost);
-    take_overhead_out(app, &cost);
+    fs_app_take_overhead_out(app, &cost);
     answered->step = *step;
     answered->is_short = is_short;
     app->expected = step->step + 1UL;
@@ -111,7 +111,7 @@ static void compute(fs_app *app, const fs_pil_step *step, uint16_t is_short)
     app->steps++;
     answered->report.step = step->step;
     fs_pil_to_report(&output, &cost, &answered->report);
-    if (is_overrun(app, &cost) != 0U) {
+    if (fs_app_is_overrun(app, &cost) != 0U) {
         answered->report.status |= FS_APP_OVERRUN;
         app->loop_overruns++;
     }
@@ -155,12 +155,16 @@ static void take_step(fs_app *app, const fs_pil_step *step, uint16_t is_short)
     const char *fault = fs_pil_fault_of(step, is_short);
     uint16_t is_reset = ((step->flags & FS_RESET) != 0UL) ? 1U : 0U;
 
+    if ((app->free.is_on != 0U) && (app->free.is_flying == 0U) && (is_reset != 0U)) {
+        fs_app_free_stop(app); /* the host that let it run is gone */
+    }
     if (before != NULL) {
         app->repeats++;
         send_report(app, &before->report, step->flags, is_short);
     } else if ((app->state == FS_APP_SAFE) && (is_reset == 0U)) {
         send_refusal(app, step->step, FS_APP_BAD_INPUT, is_short);
-    } else if ((is_reset == 0U) && ((app->state == FS_APP_RESTARTED) || (step->step != app->expected))) {
+    } else if ((app->free.is_on != 0U) ||
+               ((is_reset == 0U) && ((app->state == FS_APP_RESTARTED) || (step->step != app->expected)))) {
         app->out_of_order++;
         send_refusal(app, app->expected, FS_APP_OUT_OF_ORDER, is_short);
     } else if (fault != NULL) {

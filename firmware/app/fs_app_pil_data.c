@@ -173,6 +173,14 @@ void fs_pil_from_tick(const fs_pil_tick *tick, fs_pil_step *step)
     }
 }
 
+void fs_pil_from_state(const fs_pil_state *state, fs_pil_step *step)
+{
+    step->step = state->time_us;
+    step->flags = state->flags | (((state->flags & FS_SET_TARGET) != 0UL) ? 0U : FS_OUTER_DUE);
+    copy(step->state, state->state, STATE_SIZE);
+    copy(step->setpoint, state->setpoint, SETPOINT_SIZE);
+}
+
 void fs_pil_to_output(const fs_pil_report *report, uint32_t flags, uint16_t rotors, fs_pil_output *output)
 {
     static const fs_pil_output blank = {0};

@@ -19,6 +19,11 @@ const char *fs_pil_fault_of(const fs_pil_step *step, uint16_t is_short);
 /* Write the step that a short one stands for; what it leaves out is zero, and not read. */
 void fs_pil_from_tick(const fs_pil_tick *tick, fs_pil_step *step);
 
+#define FS_PIL_REST 16UL /* FS_PIL_STATE.flags, beside those of the loops */
+
+/* Write the step that a state stands for in an outer tick; its number is the host's time. */
+void fs_pil_from_state(const fs_pil_state *state, fs_pil_step *step);
+
 /* Write the short form of a report; `flags` are the step's. */
 void fs_pil_to_output(const fs_pil_report *report, uint32_t flags, uint16_t rotors, fs_pil_output *output);
 

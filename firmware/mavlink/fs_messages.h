@@ -267,4 +267,50 @@ typedef struct {
 uint16_t fs_pil_output_encode(const fs_pil_output *m, fs_octet *payload);
 void fs_pil_output_decode(const fs_octet *payload, uint16_t length, fs_pil_output *m);
 
+/* FS_PIL_STATE */
+#define FS_PIL_STATE_ID 53016U
+#define FS_PIL_STATE_LENGTH 104U
+typedef struct {
+    uint32_t time_us; /* us */
+    uint32_t flags;
+    float state[13];
+    float setpoint[11];
+} fs_pil_state;
+uint16_t fs_pil_state_encode(const fs_pil_state *m, fs_octet *payload);
+void fs_pil_state_decode(const fs_octet *payload, uint16_t length, fs_pil_state *m);
+
+/* FS_PIL_DRIVE */
+#define FS_PIL_DRIVE_ID 53017U
+#define FS_PIL_DRIVE_LENGTH 48U
+typedef struct {
+    uint32_t state_time_us; /* us */
+    uint32_t status;
+    uint32_t age_us; /* us */
+    uint32_t late_us; /* us */
+    float rotor_command[8];
+} fs_pil_drive;
+uint16_t fs_pil_drive_encode(const fs_pil_drive *m, fs_octet *payload);
+void fs_pil_drive_decode(const fs_octet *payload, uint16_t length, fs_pil_drive *m);
+
+/* FS_PIL_TIMING */
+#define FS_PIL_TIMING_ID 53018U
+#define FS_PIL_TIMING_LENGTH 52U
+typedef struct {
+    uint32_t ticks;
+    uint32_t missed;
+    uint32_t overruns;
+    uint32_t states;
+    uint32_t skipped;
+    uint32_t held;
+    uint32_t timeouts;
+    uint32_t period_us; /* us */
+    uint32_t late_max_us; /* us */
+    uint32_t age_max_us; /* us */
+    uint32_t cost_max;
+    float late_mean_us; /* us */
+    float age_mean_us; /* us */
+} fs_pil_timing;
+uint16_t fs_pil_timing_encode(const fs_pil_timing *m, fs_octet *payload);
+void fs_pil_timing_decode(const fs_octet *payload, uint16_t length, fs_pil_timing *m);
+
 #endif

@@ -48,6 +48,9 @@ MESSAGES = (
     "FS_PIL_IDENTITY",
     "FS_PIL_TICK",
     "FS_PIL_OUTPUT",
+    "FS_PIL_STATE",
+    "FS_PIL_DRIVE",
+    "FS_PIL_TIMING",
 )
 """What a target speaks. The parser passes over every other message."""
 
@@ -81,6 +84,7 @@ SINGLE_ENTRIES = (
     "MAV_CMD_REQUEST_MESSAGE",
     "MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN",
     "MAV_CMD_FS_SET_BAUD_RATE",
+    "MAV_CMD_FS_FREE_RUN",
 )
 """Values wanted out of large enumerations."""
 

@@ -10,8 +10,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from flightstack.control.backend import IdleRow
-from flightstack.control.control_law import CStep
-from flightstack.control.controller import AnyController, controller_of
+from flightstack.control.controller import AnyController
 from flightstack.control.loop_parameters import NOT_GIVEN, LawValues, loop_numbers
 from flightstack.core.contract import (
     ATTITUDE_TARGET_SIZE,
@@ -73,12 +72,6 @@ class LoopsSetup(NamedTuple):
     divisor: int
     given: LawValues = NOT_GIVEN
     """Parameters of laws that replace those of the gains file."""
-
-    @property
-    def has_python(self) -> bool:
-        """True if every law has a step in Python."""
-        laws = controller_of(self.controller).laws.values()
-        return not any(isinstance(law.step, CStep) for law in laws)
 
     def numbers(self) -> dict[str, float]:
         """Return the numbers for C by name; raise ConfigError for an unsupported configuration."""

@@ -19,7 +19,7 @@ from flightstack.control.attitude_reference import (
     attitude_reference_step,
     in_body_frame,
 )
-from flightstack.control.control_law import NoMemory, NoParams
+from flightstack.control.control_law import CStep, NoMemory, NoParams
 from flightstack.control.controller import ATTITUDE, GUIDANCE, MIXER, POSITION, Controller, controller_of
 from flightstack.control.controller_loading import check_python
 from flightstack.control.loop_kernels import (
@@ -319,6 +319,11 @@ class StageModel:
         wanted = np.zeros((len(flags), OUTPUT_SIZE))
         self._kernel(inputs, flags, outputs, self._memory, wanted)
         return wanted
+
+
+def has_model(setup: LoopsSetup) -> bool:
+    """Return True if all laws are Python; one that is written in C has nothing to compare with."""
+    return not any(isinstance(law.step, CStep) for law in controller_of(setup.controller).laws.values())
 
 
 def _memory_of(controller: Controller, rotors: int, numbers: LoopNumbers) -> RecordArray:

@@ -17,7 +17,7 @@ from flightstack.firmware.c_loops import INPUT_SIZE, OUTPUT_SIZE, SETPOINT_AT, T
 from flightstack.firmware.identity import check_identity, described
 from flightstack.firmware.numbers import FIRST_NUMBERS
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilCounters, PilTiming
-from flightstack.firmware.pil_record import PilRecord
+from flightstack.firmware.pil_record import PilRecord, TracedLink
 from flightstack.firmware.pil_session import PilSession
 from flightstack.firmware.pil_steps import WANT_REFERENCE, StepInput
 from flightstack.firmware.sources import source_hash
@@ -143,6 +143,8 @@ class TargetLoops:
             responds = any(step.result is not None for step in self._client.steps)
             if self.ending is None or responds:
                 self.record.status = self._final_counters()
+            if isinstance(self._link, TracedLink):
+                self.record.trace = self._link.trace
         finally:
             self._link.close()
 

@@ -15,14 +15,16 @@ from flightstack.core.contract import FloatArray
 from flightstack.core.errors import ConfigError, TargetError
 from flightstack.firmware.c_loops import CLoops, LoopsSetup
 from flightstack.firmware.choice import PYTHON, SERIAL, LoopsChoice
-from flightstack.firmware.law_tree import controller_named, logged_params
+from flightstack.firmware.law_tree import controller_named, logged_params, own_params
 from flightstack.firmware.numbers import FIRST_NUMBERS
+from flightstack.firmware.stages import has_model
 from flightstack.firmware.targets import finish_loops, make_loops
 from flightstack.flight_log.flight_log import vehicle_fields
 from flightstack.params.behaviour import SPECS
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
 from flightstack.params.vehicle import Vehicle, load_vehicle
 from gcs_cli.errors import NO_ANSWER, USAGE, CliError
+from gcs_cli.pil.code_facts import code_facts
 from gcs_cli.pil.compare import Difference, compared, deviation
 from gcs_cli.pil.flight_samples import FlightSamples, read_samples
 from gcs_cli.pil.replay import Recording, UnfitLogError, as_flight, recording, replayed
@@ -30,6 +32,7 @@ from gcs_cli.pil.report_charts import DeviationChart
 from gcs_cli.pil.result import (
     Outcome,
     assembled,
+    costs_of,
     largest_difference,
     pair_name,
     profiles_of,
@@ -109,7 +112,7 @@ def configured(
         max(1, round(inner_hz / outer_hz)),
     )
     info = {**vehicle_fields(flown), "controller": controller, "gains": gains}
-    info |= {"inner_hz": inner_hz, "outer_hz": outer_hz}
+    info |= {"inner_hz": inner_hz, "outer_hz": outer_hz, **own_params(setup)}
     own = {name: value for name, value in setup.numbers().items() if not name.startswith(_OF_TARGET)}
     return setup, info, own
 
@@ -190,6 +193,8 @@ def replay(
         "compared with the log's, and stage by stage with Python's, computed in float64 from what the target reports. "
         f"{meaning(choice, replay=True)}",
         "conditions": _conditions(log, target, prepared_replay),
+        "inner_hz": prepared_replay.setup.inner_hz,
+        **code_facts(record, prepared_replay.setup.controller.name),
     }
     return judged(prepared_replay, outputs, record, has_same_bits(choice), facts, limits)
 
@@ -211,29 +216,22 @@ def judged(
     """Compare the outputs with the log and with Python's stages, and check them. Pure."""
     flight, steps = replay.flight, replay.record
     made = as_flight(steps, outputs, {})
-    expected = None
-    if replay.setup.has_python:
-        expected = as_flight(steps, expected_outputs(steps, outputs, replay.setup, replay.numbers), {})
+    modelled = has_model(replay.setup)
+    computed = expected_outputs(steps, outputs, replay.setup, replay.numbers) if modelled else outputs
+    expected = as_flight(steps, computed, {})
     pair, stages = pair_name(LOG, "target"), pair_name(STAGEWISE, "target")
     differences = list(compared(pair, flight, made))
-    by_stage = [] if expected is None else list(compared(stages, expected, made))
+    by_stage = list(compared(stages, expected, made)) if modelled else []
     left_out = None if steps.tells_targets else TARGET
     of_stages = limits.stages if same_bits else board_limits(limits.stages)
     checks = [
         *(_log_checks(pair, differences, replay, made, same_bits, limits.replay) if flight.signals else ()),
-        *(() if expected is None else difference_checks(stages, by_stage, of_stages, left_out)),
-        *(
-            ()
-            if expected is None
-            else [status_check(f"{stages} steps of another status", expected, made, False)]
-        ),
+        *(_stage_checks(stages, by_stage, of_stages, left_out, expected, made) if modelled else ()),
         *(target_checks(record, len(outputs)) if record is not None else ()),
     ]
     result = assembled([*differences, *by_stage], checks, record, facts)
-    if expected is None:
-        result["meaning"] += (
-            " A law of the controller is written in C: there are no stages in Python to compare with."
-        )
+    if not modelled:
+        result["meaning"] += " A law is written in C: it has no stage in Python to compare with."
     if not replay.record.tells_targets:
         result["meaning"] += (
             " This log does not tell which attitude targets the outer loop made: all were given to the inner loop, "
@@ -249,8 +247,24 @@ def judged(
         DeviationChart(BY_NAME[name], {shown: deviation(BY_NAME[name], first, made)}) for name in _SHOWN
     ]
     return Outcome(
-        result, [chart for chart in charts if np.size(chart.pairs[shown].size)], profiles_of(record)
+        result,
+        [chart for chart in charts if np.size(chart.pairs[shown].size)],
+        profiles_of(record),
+        costs_of(record),
     )
+
+
+def _stage_checks(
+    pair: str,
+    differences: Sequence[Difference],
+    limits: Limits,
+    left_out: str | None,
+    expected: FlightSamples,
+    made: FlightSamples,
+) -> Iterator[Check]:
+    """Yield the checks against Python's stages."""
+    yield from difference_checks(pair, differences, limits, left_out)
+    yield status_check(f"{pair} steps of another status", expected, made, False)
 
 
 def _log_checks(

@@ -105,7 +105,7 @@ def library(path: str = "", real: str = "float") -> ctypes.CDLL:
         path = os.environ.get(LIBRARY, "")
     loaded = ctypes.CDLL(path or str(cached(f"app-{real}.so", *flags)))
     loaded.fs_host_app_new.restype = ctypes.c_void_p
-    for name in ("fs_host_app_transmit", "fs_app_wait_ms"):
+    for name in ("fs_host_app_transmit", "fs_app_wait_ms", "fs_app_run_wait_us"):
         getattr(loaded, name).restype = ctypes.c_uint32
     loaded.fs_app_state.restype = ctypes.c_uint16
     return loaded
@@ -187,6 +187,15 @@ class Target:
         """Let time pass, then the application do what is due."""
         self.now_ms = (self.now_ms + passed_ms) & 0xFFFF_FFFF
         self._library.fs_app_poll(self._app, ctypes.c_uint32(self.now_ms))
+
+    def run(self, now_us: int) -> None:
+        """Let the application run the tick that is due at this time."""
+        self._library.fs_app_run(self._app, ctypes.c_uint32(now_us & 0xFFFF_FFFF))
+
+    @property
+    def run_wait_us(self) -> int:
+        """In how many microseconds a tick is due."""
+        return int(self._library.fs_app_run_wait_us(self._app))
 
     def uart_errors(self, overruns: int, errors: int) -> None:
         """Tell the totals of the serial port."""

@@ -169,7 +169,10 @@ def test_milliseconds_and_cycles_agree_with_the_clock(tmp_path: Path) -> None:
     board.run(ms=766)
     passed = board.c.fake_time() - time
     assert board.c.f28_now_ms() - ms == pytest.approx(passed / 200_000, abs=1.01)
-    assert board.c.f28_cycles() - cycles == pytest.approx(passed, abs=50)
+    without = passed - (board.c.f28_cycles() - cycles)
+    assert (
+        10 * 2_000 < without < 50 * board.c.fake_interrupts(INT_TIMER0)
+    )  # the counter stands still in interrupts
     assert board.c.fake_interrupts(INT_TIMER0) == board.c.f28_now_ms()
 
 
@@ -181,7 +184,7 @@ def test_the_cost_counter_wraps_without_a_jump(tmp_path: Path) -> None:
         before, time = board.c.f28_cycles(), board.c.fake_time()
         board.idle(ms=1_000)
         after, passed = board.c.f28_cycles(), board.c.fake_time() - time
-        assert (after - before) % 2**32 == pytest.approx(passed, abs=20)
+        assert 0 < passed - (after - before) % 2**32 < 50 * 1_001  # without 1000 interrupts
     assert board.c.fake_time() > 2**32
 
 

@@ -120,5 +120,5 @@ def test_a_flight_of_a_law_in_c_is_replayed(
     assert outcome.passed
     assert outcome.result["differences"]
     assert all(row["largest"] == 0.0 for row in outcome.result["differences"])
-    assert outcome.result["meaning"].endswith("there are no stages in Python to compare with.")
+    assert outcome.result["meaning"].endswith("it has no stage in Python to compare with.")
     assert not judged(replay, outputs * 1.01, None, True, facts).passed

@@ -121,6 +121,10 @@ def test_the_emulated_target_counts_instructions_and_makes_the_same_bits(flown: 
     assert result["profile"]["unit"] == "instructions"
     assert result["stack"]["high_water"] > 0
     assert "no board" in result["meaning"]
+    assert 0.0 < result["load"]["mean_percent"] < result["load"]["max_percent"] < 2.0
+    ran = result["coverage"]["files"]
+    assert ran["core/fs_attitude_pid.c"]["missed"] == []
+    assert ran["core/fs_attitude_backstepping.c"]["executed"] == 0
     assert "F28377S" not in json.dumps([result["target"], result["profile"], result["title"]])
     of_host = result_of(flown)
     assert result["flights"]["SIL"]["log_sha256"] == of_host["flights"]["SIL"]["log_sha256"]

@@ -194,6 +194,14 @@ def test_gnss_jumps_and_is_spoofed_slowly() -> None:
     assert since[-1].vn == 50  # a spoofer that is consistent
 
 
+def test_drift_begins_when_it_is_injected() -> None:
+    bench = Bench()
+    before = of_type(bench.run(1.0), "HIL_SENSOR")[0]
+    bench.simulator.inject(parse_fault("sensor:baro:drift=1", 4))
+    first = [m for m in of_type(bench.run(0.1), "HIL_SENSOR") if m.fields_updated & BARO][-1]
+    assert 0.0 < first.abs_pressure - before.abs_pressure < 0.11
+
+
 def test_frozen_sensor_repeats_its_last_measurement() -> None:
     noisy = with_sensors("consumer")
     before, since = after("sensor:mag:freeze", "HIL_SENSOR", noisy)

@@ -57,6 +57,7 @@ void mps2_time_init(void);        /* the timer */
 void mps2_tick_init(void);        /* SysTick's interrupt, every millisecond */
 uint32_t mps2_now_ms(void);       /* by SysTick's interrupt */
 uint32_t mps2_instructions(void); /* under QEMU's -icount shift=10 only */
+uint32_t mps2_microseconds(void); /* of the emulated clock, modulo 2^32 */
 uint32_t mps2_nanoseconds(void);  /* of the emulated clock, modulo 2^32 */
 void mps2_tick_interrupt(void);
 

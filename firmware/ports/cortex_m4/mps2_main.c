@@ -119,6 +119,7 @@ static void serve_uart(void)
         int octet = mps2_uart_take();
         uint16_t room, count, i;
 
+        fs_app_run(&app, mps2_microseconds());
         for (; octet >= 0; octet = mps2_uart_take()) {
             fs_app_receive(&app, (fs_octet)octet);
         }

@@ -61,6 +61,7 @@ void f28_pass(void)
     uint16_t n, count;
 
     f28_serial_service();
+    fs_app_run(&app, f28_now_us());
     count = f28_serial_take(octets, F28_CHUNK);
     for (n = 0U; n < count; n++) {
         fs_app_receive(&app, octets[n]);

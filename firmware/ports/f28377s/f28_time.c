@@ -7,6 +7,9 @@
 
 static volatile uint32_t milliseconds;
 
+#define CYCLES_PER_US ((uint32_t)(F28_SYSCLK_HZ / 1000000UL))
+
+static uint32_t taken, microseconds; /* cycles that are counted as microseconds */
 static volatile uint32_t interrupted; /* cycles that interrupts took */
 
 static uint32_t count_up(void)
@@ -47,6 +50,7 @@ void f28_time_init(void)
 {
     milliseconds = 0UL;
     interrupted = 0UL;
+    microseconds = 0UL;
     start(CPUTIMER0_BASE, F28_SYSCLK_HZ / 1000UL - 1UL);
     start(CPUTIMER1_BASE, 0xFFFFFFFFUL);
     Interrupt_register(INT_TIMER0, &on_millisecond);
@@ -54,6 +58,7 @@ void f28_time_init(void)
     Interrupt_enable(INT_TIMER0);
     CPUTimer_startTimer(CPUTIMER0_BASE);
     CPUTimer_startTimer(CPUTIMER1_BASE);
+    taken = count_up();
 }
 
 uint32_t f28_now_ms(void)
@@ -65,6 +70,16 @@ uint32_t f28_now_ms(void)
         second = milliseconds;
     } while (first != second);
     return first;
+}
+
+/* Whole microseconds are taken off the counter, whose wrap is no whole number of them. */
+uint32_t f28_now_us(void)
+{
+    const uint32_t passed = (count_up() - taken) / CYCLES_PER_US;
+
+    taken += passed * CYCLES_PER_US;
+    microseconds += passed;
+    return microseconds;
 }
 
 uint32_t f28_cycles(void)

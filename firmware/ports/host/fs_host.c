@@ -8,6 +8,7 @@
 
 #define NANOSECONDS_PER_S 1000000000ULL
 #define BAUD 115200UL
+#define NANOSECONDS_PER_US 1000ULL
 #define NANOSECONDS_PER_MS 1000000ULL
 
 static const fs_octet source_hash[8] = {FS_SOURCE_HASH};
@@ -49,6 +50,11 @@ static uint64_t now_ns(void)
 uint32_t fs_host_nanoseconds(void)
 {
     return (uint32_t)(now_ns() & 0xFFFFFFFFULL);
+}
+
+uint32_t fs_host_microseconds(void)
+{
+    return (uint32_t)((now_ns() / NANOSECONDS_PER_US) & 0xFFFFFFFFULL);
 }
 
 uint32_t fs_host_milliseconds(void)

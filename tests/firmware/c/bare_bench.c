@@ -17,7 +17,9 @@ enum {
 int bench_fault;
 static volatile fs_octet received_octets[RING], sent_octets[32768];
 static fs_ring received, sent;
-static uint32_t now_us, cycles, overruns, octets_sent;
+/* The firmware measures the cost of a reading at its start; later there is work between two of them. */
+#define START_READINGS 32U
+static uint32_t now_us, cycles, readings, overruns, octets_sent;
 
 void bench_start(int fault);
 void bench_receive(const unsigned char *octets, uint32_t count);
@@ -31,6 +33,7 @@ void bench_start(int fault)
     fs_ring_init(&sent, sent_octets, 32768U);
     now_us = 0U;
     cycles = 0U;
+    readings = 0U;
     overruns = 0U;
     octets_sent = 0U;
     fs_bare_start();
@@ -151,8 +154,10 @@ uint32_t fs_board_now_ms(void)
 
 uint32_t fs_board_cycles(void)
 {
+    const uint32_t passed = (readings++ < START_READINGS) ? 40U : 400U;
+
     if (bench_fault != NO_CYCLES) {
-        cycles += (bench_fault == CYCLES_COUNT_DOWN) ? 0U - 400U : 400U;
+        cycles += (bench_fault == CYCLES_COUNT_DOWN) ? 0U - passed : passed;
     }
     return cycles;
 }
