@@ -65,7 +65,7 @@ typedef struct {
     uint32_t stack_size;               /* in the smallest addressable unit */
     uint32_t (*stack_high_water)(void); /* most of it that was ever used; NULL: unknown */
     uint32_t baud;                      /* of the line at the start; 0: it has no rate */
-    uint16_t (*can_set_baud)(uint32_t baud); /* 1: the line can run at this rate; NULL: at no other one */
+    uint16_t (*can_set_baud)(uint32_t baud); /* 1: the line can run at this rate; NULL: the rate is fixed */
     uint16_t (*set_baud)(uint32_t baud);     /* change the rate; 0: not yet, octets are still being sent */
 } fs_port;
 

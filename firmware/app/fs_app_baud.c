@@ -27,11 +27,11 @@ uint16_t fs_app_set_baud(fs_app *app, float baud)
 {
     uint16_t result = FS_MAV_RESULT_ACCEPTED;
 
-    if ((app->port->can_set_baud == NULL) || (app->port->set_baud == NULL)) {
+    if (app->port->can_set_baud == NULL) {
         result = FS_MAV_RESULT_UNSUPPORTED;
     } else if (!((baud >= SLOWEST) && (baud <= FASTEST)) || (app->port->can_set_baud((uint32_t)baud) == 0U)) {
         result = FS_MAV_RESULT_DENIED;
-    } else if ((app->line.next != app->line.baud) || (app->line.is_on_trial != 0U)) {
+    } else if (app->line.next != app->line.baud) { /* a trial is none: this command is a frame, which ends it */
         result = FS_MAV_RESULT_TEMPORARILY_REJECTED;
     } else {
         app->line.next = (uint32_t)baud;
@@ -72,9 +72,6 @@ static void go_to_next(fs_app *app)
         app->line.baud = app->line.next;
         app->line.is_unframed = 0U;
         app->line.since_ms = app->now_ms;
-        while (fs_parser_flush(&app->parser, &app->frame) != 0U) {
-            /* what is held came at the former rate, and is no frame */
-        }
         if (app->line.is_on_trial == 0U) {
             (void)fs_app_send_text(app, FS_MAV_SEVERITY_NOTICE, "Baud rate: no frame came, back at the former one",
                                    FS_OUTBOX_NEWS);

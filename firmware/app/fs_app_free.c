@@ -10,9 +10,11 @@
 
 #define US_PER_S FS_LIT(1000000.0)
 #define DEFAULT_TIMEOUT_US 100000UL
+#define REFERENCE_SIZE 4U /* of the attitude */
+#define TARGET_SIZE 5U
 #define MOST_TICKS 1000.0F
 #define MOST_TIMEOUT_MS 10000.0F
-#define DRIVE_RESERVE (FS_OUTBOX_SIZE - 128U) /* at most two wait: an old command is worth less than none */
+#define DRIVE_RESERVE (FS_OUTBOX_SIZE - 192U) /* at most two wait: an old command is worth less than none */
 
 static void begin_window(fs_app *app)
 {
@@ -183,6 +185,12 @@ static void send_drive(fs_app *app, const fs_pil_report *report, uint32_t age_us
     drive.status = report->status;
     drive.age_us = age_us;
     drive.late_us = late_us;
+    for (i = 0U; i < REFERENCE_SIZE; i++) {
+        drive.reference[i] = report->reference[i];
+    }
+    for (i = 0U; i < TARGET_SIZE; i++) {
+        drive.attitude_target[i] = report->attitude_target[i];
+    }
     for (i = 0U; i < FS_MAX_ROTORS; i++) {
         drive.rotor_command[i] = report->rotor_command[i];
     }
@@ -253,11 +261,8 @@ uint32_t fs_app_run_wait_us(const fs_app *app)
 {
     uint32_t left_us = 0xFFFFFFFFUL;
 
-    if (app->free.is_on != 0U) {
+    if (app->free.is_on != 0U) { /* what was due was done by the last fs_app_run */
         left_us = (app->free.is_begun != 0U) ? (app->free.due_us - app->free.now_us) : 0UL;
-        if (left_us > 0x7FFFFFFFUL) { /* it is due already */
-            left_us = 0UL;
-        }
     }
     return left_us;
 }

@@ -80,7 +80,7 @@ uint16_t fs_message_kind_of(uint32_t id, fs_message_kind *kind)
         break;
     case FS_PIL_DRIVE_ID:
         kind->length = FS_PIL_DRIVE_LENGTH;
-        kind->crc_extra = 159U;
+        kind->crc_extra = 234U;
         break;
     case FS_PIL_TIMING_ID:
         kind->length = FS_PIL_TIMING_LENGTH;
@@ -487,7 +487,9 @@ uint16_t fs_pil_drive_encode(const fs_pil_drive *m, fs_octet *payload)
     fs_put_u32(&payload[4], m->status);
     fs_put_u32(&payload[8], m->age_us);
     fs_put_u32(&payload[12], m->late_us);
-    fs_put_floats(&payload[16], m->rotor_command, 8U);
+    fs_put_floats(&payload[16], m->reference, 4U);
+    fs_put_floats(&payload[32], m->attitude_target, 5U);
+    fs_put_floats(&payload[52], m->rotor_command, 8U);
     return fs_trimmed(payload, FS_PIL_DRIVE_LENGTH);
 }
 
@@ -497,7 +499,9 @@ void fs_pil_drive_decode(const fs_octet *payload, uint16_t length, fs_pil_drive 
     m->status = fs_get_u32(payload, length, 4U);
     m->age_us = fs_get_u32(payload, length, 8U);
     m->late_us = fs_get_u32(payload, length, 12U);
-    fs_get_floats(payload, length, 16U, m->rotor_command, 8U);
+    fs_get_floats(payload, length, 16U, m->reference, 4U);
+    fs_get_floats(payload, length, 32U, m->attitude_target, 5U);
+    fs_get_floats(payload, length, 52U, m->rotor_command, 8U);
 }
 
 uint16_t fs_pil_timing_encode(const fs_pil_timing *m, fs_octet *payload)

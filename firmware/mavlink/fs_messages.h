@@ -281,12 +281,14 @@ void fs_pil_state_decode(const fs_octet *payload, uint16_t length, fs_pil_state 
 
 /* FS_PIL_DRIVE */
 #define FS_PIL_DRIVE_ID 53017U
-#define FS_PIL_DRIVE_LENGTH 48U
+#define FS_PIL_DRIVE_LENGTH 84U
 typedef struct {
     uint32_t state_time_us; /* us */
     uint32_t status;
     uint32_t age_us; /* us */
     uint32_t late_us; /* us */
+    float reference[4];
+    float attitude_target[5];
     float rotor_command[8];
 } fs_pil_drive;
 uint16_t fs_pil_drive_encode(const fs_pil_drive *m, fs_octet *payload);

@@ -56,6 +56,9 @@ class LoopExecutor(Protocol):
     def run(self, flags: Sequence[int], inputs: FloatArray) -> FloatArray:
         """Run ticks on ``inputs`` (n, 29), one after another; return the outputs (n, 32)."""
 
+    def rest(self) -> None:
+        """Note a tick on the ground, in which the loops do not run."""
+
     def close(self) -> None:
         """Release resources; no step may follow."""
 
@@ -169,6 +172,7 @@ class CLoops:
 
     def idle(self, state: FloatArray, rotor_speed_rad_s: FloatArray, armed: bool, row: FloatArray) -> None:
         """Write ``row`` for a vehicle on the ground: rotors at idle speed if armed, else stopped."""
+        self.executor.rest()
         self._idle.write(state, rotor_speed_rad_s, armed, row)
 
     def close(self) -> None:
@@ -231,6 +235,9 @@ class HostLoops:
     def get(self, name: str) -> float:
         """Return a number; 0 if unknown."""
         return float(self._functions.fs_sil_get(self._loops, name.encode()))
+
+    def rest(self) -> None:
+        """Do nothing."""
 
     def close(self) -> None:
         """Do nothing: memory is freed with the object."""

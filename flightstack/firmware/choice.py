@@ -13,8 +13,10 @@ SLOWEST_BAUD = 1_200
 FASTEST_BAUD = 20_000_000
 SHORT = "short"
 """Ending of a target: send and report only what a flight needs, for a slow line."""
+FREE = "free"
+"""Ending of a target that runs the loops by its own timer, in real time."""
 _KNOWN = f"{PYTHON}, {C}, {HOST}, {EMULATED} and {SERIAL}:DEVICE[:BAUD]"
-_ENDINGS = (SHORT,)
+_ENDINGS = (SHORT, FREE)
 
 
 class LoopsChoice(NamedTuple):
@@ -24,7 +26,7 @@ class LoopsChoice(NamedTuple):
     device: str = ""
     baud: int = DEFAULT_BAUD
     ending: str = ""
-    """``SHORT`` or nothing."""
+    """``SHORT``, ``FREE`` or nothing."""
 
     @property
     def is_target(self) -> bool:
@@ -33,7 +35,7 @@ class LoopsChoice(NamedTuple):
 
 
 def parse_loops(text: str, flag: str = "--loops") -> LoopsChoice:
-    """Read ``python``, ``c``, or a target, which may end in ``,short``; raise ConfigError.
+    """Read ``python``, ``c``, or a target, which may end in ``,short`` or ``,free``; raise ConfigError.
 
     A target is ``host``, ``emulated`` or ``serial:DEVICE[:BAUD]``.
     """

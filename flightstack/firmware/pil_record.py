@@ -71,6 +71,8 @@ class PilRecord:
         """FS_PIL_STATUS after the last step, or None."""
         self.trace: Trace | None = None
         """Executed code of an emulated target, or None."""
+        self.free_running: dict[str, Any] | None = None
+        """Figures of a free-running target, see ``free_running.FreeRunning.figures``, or None."""
 
     def add(self, flags: int, report: PilReport, attempts: int, round_trip_s: float) -> None:
         """Record a step; discard a single trial step before the first flight."""
@@ -98,6 +100,7 @@ class PilRecord:
             "round_trip_s": _figures(trips) if len(trips) else None,
             "status_at_start": self._status_at_start,
             "status": self.status,
+            "free_running": self.free_running,
             "ending": ending,
             "trace": None if self.trace is None else self.trace._asdict(),
         }

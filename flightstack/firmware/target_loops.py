@@ -52,8 +52,8 @@ class TargetLoops:
         commands, in outer ticks the attitude target, once per outer period the attitude reference, else NaN.
         ``note`` is a sentence about the link for version and record.
         """
-        self._session = PilSession(link, timing, clock_s)
-        self._link, self._client = link, self._session.client
+        self.session = PilSession(link, timing, clock_s)
+        self._link, self._client = link, self.session.client
         self._numbers: dict[str, float] = {}
         self._pending: list[tuple[str, float]] = []  # set one by one: integrals are scaled at each
         self._is_closed = False
@@ -78,7 +78,7 @@ class TargetLoops:
         self.version = f"C, float, {', '.join(details)}"
         for name, value in (*FIRST_NUMBERS.items(), *numbers.items()):
             self.set(name, value)
-        self._send_numbers()
+        self.send_numbers()
 
     # ------------------------------------------------------------------ LoopExecutor
 
@@ -95,7 +95,7 @@ class TargetLoops:
 
     def step(self, flags: int) -> None:
         """Run a tick on the target from ``input`` to ``output``; raise TargetError."""
-        self._send_numbers()
+        self.send_numbers()
         client, short = self._client, self._short
         if short is None:
             client.start_step(flags, sent_numbers(flags, self.input))
@@ -111,7 +111,7 @@ class TargetLoops:
 
     def run(self, flags: Sequence[int], inputs: FloatArray) -> FloatArray:
         """Run ticks on ``inputs`` (n, 29), several of them in one exchange; return the outputs (n, 32)."""
-        self._send_numbers()
+        self.send_numbers()
         outputs = np.empty((len(inputs), OUTPUT_SIZE))
         for begin in range(0, len(inputs), self._window):
             end = min(begin + self._window, len(inputs))
@@ -125,14 +125,17 @@ class TargetLoops:
 
     def _run_steps(self, flags: Sequence[int]) -> None:
         """Finish the steps of the client and record them, also those before a failure."""
-        began_s = self._session.clock_s()
+        began_s = self.session.clock_s()
         try:
             self._finish()
         finally:  # a step that ended in the safe state has a report too
-            share_s = (self._session.clock_s() - began_s) / len(flags)
+            share_s = (self.session.clock_s() - began_s) / len(flags)
             for flag, step in zip(flags, self._client.steps, strict=True):
                 if step.result is not None:
                     self.record.add(flag, step.result, step.attempts, share_s)
+
+    def rest(self) -> None:
+        """Do nothing: a target in lockstep waits for the next step."""
 
     def close(self) -> None:
         """Read the target's counters and close the link; a second call does nothing."""
@@ -164,7 +167,7 @@ class TargetLoops:
         """Run the link until the operation ends; return its result or raise TargetError."""
         client = self._client
         try:
-            result = self._session.finish()
+            result = self.session.finish()
         except (OSError, RuntimeError) as error:  # link or emulated processor failed
             self.ending = str(error)
             raise TargetError(str(error)) from error
@@ -180,7 +183,13 @@ class TargetLoops:
         self._client.start_request(name)
         return self._finish()
 
-    def _send_numbers(self) -> None:
+    def command(self, number: int, refusal: str, *values: float) -> None:
+        """Send a command; raise TargetError with ``refusal``, a clause about the target, if it is refused."""
+        self._client.start_command(number, refusal, *values)
+        self._finish()
+
+    def send_numbers(self) -> None:
+        """Set the numbers that were changed; raise TargetError."""
         while self._pending:
             self._client.start_set(*self._pending[0])
             self._finish()

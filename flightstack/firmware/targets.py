@@ -13,6 +13,7 @@ from flightstack.firmware.c_loops import CLoops, HostLoops, LoopsSetup
 from flightstack.firmware.choice import (
     DEFAULT_BAUD,
     EMULATED,
+    FREE,
     PYTHON,
     SERIAL,
     SHORT,
@@ -20,6 +21,7 @@ from flightstack.firmware.choice import (
     LoopsChoice,
     parse_loops,
 )
+from flightstack.firmware.free_loops import FreeLoops
 from flightstack.firmware.law_tree import firmware_for
 from flightstack.firmware.line_rate import negotiate_baud
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilTiming
@@ -88,9 +90,7 @@ EXCHANGE_BITS = 2800.0
 def make_loops(loops: str, setup: LoopsSetup, lockstep: bool = True) -> ControlBackend:
     """Return the loops of ``loops`` with all their numbers; raise ConfigError, TargetError."""
     choice = parse_loops(loops)
-    if choice.is_target and not lockstep:
-        problem = f"loops on a target ({loops}) require lockstep: their link is not real-time"
-        raise ConfigError("--clock", "realtime", problem)
+    _check_clock(choice, loops, lockstep)
     if choice.kind == PYTHON:
         return PythonLoops(
             setup.vehicle,
@@ -108,6 +108,15 @@ def make_loops(loops: str, setup: LoopsSetup, lockstep: bool = True) -> ControlB
             return CLoops(loops, connect(choice, numbers), setup)
     except (BuildError, LineError, WrongFirmwareError) as error:
         raise ConfigError("--loops", loops, str(error).removeprefix(f"{choice.device}: ")) from error
+
+
+def _check_clock(choice: LoopsChoice, loops: str, lockstep: bool) -> None:
+    if choice.ending == FREE and lockstep:
+        problem = f"a free-running target ({loops}) requires --clock realtime: it has its own time"
+        raise ConfigError("--clock", "lockstep", problem)
+    if choice.is_target and choice.ending != FREE and not lockstep:
+        problem = f"loops on a target ({loops}) require lockstep: their link is not real-time"
+        raise ConfigError("--clock", "realtime", problem)
 
 
 def open_link(choice: LoopsChoice) -> ByteLink:
@@ -139,13 +148,14 @@ def timing_of(choice: LoopsChoice) -> PilTiming:
     return DEFAULT_TIMING._replace(timeout_s=DEFAULT_TIMING.timeout_s + 3.0 * exchange_s, step_s=exchange_s)
 
 
-def connect(choice: LoopsChoice, numbers: dict[str, float]) -> TargetLoops:
+def connect(choice: LoopsChoice, numbers: dict[str, float]) -> TargetLoops | FreeLoops:
     """Return the loops on a target with their numbers; raise BuildError, LineError, TargetError, WrongFirmwareError."""
     link, timing, note = open_link(choice), timing_of(choice), None
     try:
         if isinstance(link, SerialPort):
             note = negotiate_baud(link, choice.baud, timing)
-        return TargetLoops(link, numbers, timing, short=choice.ending == SHORT, note=note)
+        loops = TargetLoops(link, numbers, timing, short=choice.ending == SHORT, note=note)
+        return FreeLoops(loops) if choice.ending == FREE else loops
     except BaseException:
         link.close()
         raise
@@ -154,5 +164,5 @@ def connect(choice: LoopsChoice, numbers: dict[str, float]) -> TargetLoops:
 def finish_loops(loops: ControlBackend, log: Path | None) -> None:
     """Close the loops and write the record of a target's link beside ``log``; raise OSError."""
     loops.close()
-    if log is not None and isinstance(loops, CLoops) and isinstance(loops.executor, TargetLoops):
+    if log is not None and isinstance(loops, CLoops) and isinstance(loops.executor, TargetLoops | FreeLoops):
         loops.executor.write_record(log)

@@ -259,13 +259,15 @@ LAYOUTS = (
     Layout(
         53017,
         "FS_PIL_DRIVE",
-        159,
+        234,
         (
             Field("state_time_us", "I", 1, False, "uint32_t", "us", 0),
             Field("status", "I", 1, False, "uint32_t", "", 1),
             Field("age_us", "I", 1, False, "uint32_t", "us", 2),
             Field("late_us", "I", 1, False, "uint32_t", "us", 3),
-            Field("rotor_command", "f", 8, True, "float", "", 4),
+            Field("reference", "f", 4, True, "float", "", 4),
+            Field("attitude_target", "f", 5, True, "float", "", 5),
+            Field("rotor_command", "f", 8, True, "float", "", 6),
         ),
     ),
     Layout(

@@ -44,7 +44,8 @@ Loops = Annotated[
     str,
     typer.Option(
         help="Control loops: python, c (compiled here), or on a target: host (a process), emulated (a Cortex-M4F) "
-        "or serial:DEVICE[:BAUD] (a board); TARGET,short sends less, for a slow line.",
+        "or serial:DEVICE[:BAUD] (a board); TARGET,short sends less, for a slow line; TARGET,free "
+        "runs them by the target's own timer, with --clock realtime.",
         metavar="LOOPS",
         **IN_LOOPS,
     ),

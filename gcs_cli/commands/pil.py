@@ -8,7 +8,14 @@ from typing import Annotated
 
 import typer
 
-from flightstack.process.command_line import IN_LOOPS, VEHICLE, PanelCommand, expand_options, make_app
+from flightstack.process.command_line import (
+    IN_LOOPS,
+    IN_OUTPUT,
+    VEHICLE,
+    PanelCommand,
+    expand_options,
+    make_app,
+)
 from flightstack.process.options import Controller, Gains, InnerHz, OuterHz
 from gcs_cli.fly.fly_flags import FlyOptions, RunOptions, complete_options
 from gcs_cli.pil.pil_flags import JudgeOptions
@@ -35,6 +42,31 @@ def fly(
     from gcs_cli.pil.pil_commands import run_flights
 
     run_flights(complete_options(context, "pil", options, run), judge, target)
+
+
+@app.command("free-run", cls=PanelCommand)
+@partial(expand_options, without=("loops", "speed"))
+def free_run(
+    context: typer.Context,
+    options: FlyOptions,
+    run: RunOptions,
+    target: Annotated[
+        str, typer.Option(metavar="TARGET", help="host, or serial:DEVICE[:BAUD].", **IN_LOOPS)
+    ] = "host",
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="DIR", help="Directory.  [default: runs/<stamp>-<name>-pil]", **IN_OUTPUT
+        ),
+    ] = None,
+) -> None:
+    """Fly a mission with the loops run by the target's own timer.
+
+    The flight is in real time. Jitter, overruns and the age of states are measured.
+    """
+    from gcs_cli.pil.free_run import run_free
+
+    run_free(complete_options(context, "pil", options, run), run, target, out)
 
 
 @app.command()

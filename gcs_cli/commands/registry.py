@@ -160,6 +160,7 @@ class PilGroup(LazyGroup):
 
     lazy = {  # noqa: RUF012
         _PIL_FLY: LazyCommand(_PIL, "Fly a mission with each of the loops, and compare."),
+        "free-run": LazyCommand(_PIL, "Fly a mission with the loops run by the target's own timer."),
         "replay": LazyCommand(_PIL, "Feed a target with the inputs of a flight log."),
         "vectors": LazyCommand(_PIL, "Write test vectors for a replay, as CSV or MATLAB."),
         "generate": LazyCommand(_PIL, "Write the firmware with your own controller as C."),

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from flightstack.core.geodesy import GeoPoint
 from flightstack.core.port_numbers import system_id, vehicle_api_port, vehicle_ground_port
+from flightstack.firmware.choice import FREE, parse_loops
 from flightstack.params.behaviour import SPECS, Behaviour
 from flightstack.params.config import DEFAULT_HOME, StackConfig, parse_home
 from flightstack.params.gains_file import hidden_gains
@@ -88,6 +89,10 @@ def check_options(options: FlyOptions, home: GeoPoint) -> None:
         raise CliError(str(error), USAGE) from None
     if options.params is not None and not options.params.is_file():
         raise CliError(f"--params {options.params}: no such file", USAGE)
+    if runs_freely(options) and options.speed_factor != 1.0:
+        raise CliError(
+            f"--loops {options.loops}: a free-running target flies in real time: add --speed 1", USAGE
+        )
     check_stack(
         StackConfig(
             vehicle=options.vehicle,
@@ -154,10 +159,16 @@ def stack_arguments(options: FlyOptions, home: GeoPoint, folder: Path, ground_po
         f"--home={home_text(home)}",
         f"--exit-on-gcs-loss={GCS_LOSS_S:g}",
         f"--params={options.params or 'none'}",
+        *(["--clock=realtime"] if runs_freely(options) else []),
         "--state=none",  # a flight depends on its command line alone
         "--wait-for-start",
         *signing,
     ]
+
+
+def runs_freely(options: FlyOptions) -> bool:
+    """Return True if the loops run on a target by its own timer."""
+    return parse_loops(options.loops).ending == FREE
 
 
 def home_text(home: GeoPoint) -> str:

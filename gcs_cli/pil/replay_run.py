@@ -230,13 +230,7 @@ def judged(
         *(target_checks(record, len(outputs)) if record is not None else ()),
     ]
     result = assembled([*differences, *by_stage], checks, record, facts)
-    if not modelled:
-        result["meaning"] += " A law is written in C: it has no stage in Python to compare with."
-    if not replay.record.tells_targets:
-        result["meaning"] += (
-            " This log does not tell which attitude targets the outer loop made: all were given to the inner loop, "
-            "and the outer loop did not run."
-        )
+    result["meaning"] += _left_out(modelled, steps.tells_targets)
     shown = pair if differences else stages
     result["tiles"] = [
         {"name": f"largest difference {shown}", "value": largest_difference(differences or by_stage)},
@@ -252,6 +246,17 @@ def judged(
         profiles_of(record),
         costs_of(record),
     )
+
+
+def _left_out(modelled: bool, tells_targets: bool) -> str:
+    """Return sentences about comparisons that cannot be made."""
+    words = "" if modelled else " A law is written in C: it has no stage in Python to compare with."
+    if not tells_targets:
+        words += (
+            " This log does not tell which attitude targets the outer loop made: all were given to the inner loop, "
+            "and the outer loop did not run."
+        )
+    return words
 
 
 def _stage_checks(

@@ -105,15 +105,7 @@ def closed_loop(
     ]
     listed = [difference for pair in differences.values() for difference in pair]
     result = assembled(listed, checks, record, facts)
-    result["flights"] = {
-        stage: {
-            "outcome": flown.outcome,
-            "outcome_text": flown.outcome_text,
-            **_of_samples(flown.samples),
-            **flown.facts,
-        }
-        for stage, flown in flights.items()
-    }
+    result["flights"] = {stage: _of_flight(flown) for stage, flown in flights.items()}
     result["status_differences"] = {
         pair_name(a, b): status_differences(first, second)[0]
         for (a, first), (b, second) in combinations(there.items(), 2)
@@ -262,6 +254,11 @@ def _stack(record: TargetRecord | None) -> dict[str, Any] | None:
     if record is None or not record.status or not record.status["stack_size"]:
         return None
     return {"size": record.status["stack_size"], "high_water": record.status["stack_high_water"]}
+
+
+def _of_flight(flown: Flown) -> dict[str, Any]:
+    outcome = {"outcome": flown.outcome, "outcome_text": flown.outcome_text}
+    return {**outcome, **_of_samples(flown.samples), **flown.facts}
 
 
 def _of_samples(samples: FlightSamples | None) -> dict[str, Any]:

@@ -19,7 +19,7 @@ StatusArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 NO_COUNTERS = ("time_boot_ms", "stack_size", "stack_high_water", "state")
 """Fields of FS_PIL_STATUS that are not counters."""
 SAFE, RESTARTED = "safe state", "restarted by its watchdog"
-STATES = ("ready", "stepping", SAFE, RESTARTED)
+STATES = ("ready", "stepping", SAFE, RESTARTED, "free-running")
 """Names of FS_PIL_STATUS.state."""
 
 

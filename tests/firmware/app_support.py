@@ -117,7 +117,7 @@ class Target:
     def __init__(
         self,
         *,
-        ticks: Iterable[int] = (),
+        ticks: Iterable[int] | None = (),
         cost_unit: int = CYCLES,
         clock_hz: int = 200_000_000,
         was_watchdog: bool = False,
@@ -126,19 +126,20 @@ class Target:
         bauds: Sequence[int] = (),
         overhead: int = 0,
     ) -> None:
-        """``ticks``: what the clock shows at each call; without, it stands still. ``own_port``: the host's.
+        """``ticks``: what the clock shows at each call; without, it stands still; None: there is no clock.
 
-        ``bauds``: rates that the line can run at; without any, the port has no functions for rates. ``overhead``: cost
+        ``own_port``: the host's. ``bauds``: rates that the line can run at; without any, the port has no functions for
+        rates. ``overhead``: cost
         of reading the clock that the application finds at its start, before ``ticks``.
         """
         self.baud = START_BAUD
         self.is_sending = False
         """True while the port still sends, so that its rate cannot change."""
         self._library = library(real=real)
-        times = itertools.chain((overhead * at for at in range(CLOCK_READINGS)), ticks)
+        times = itertools.chain((overhead * at for at in range(CLOCK_READINGS)), ticks or ())
         self._hash = (ctypes.c_uint16 * 8)(*(0xFF00 + octet for octet in range(1, 9)))  # high bits: rubbish
         self._port = Port(
-            Clock(lambda: next(times, 0)), clock_hz, cost_unit, was_watchdog,
+            Clock() if ticks is None else Clock(lambda: next(times, 0)), clock_hz, cost_unit, was_watchdog,
             b"test board with a name of many letters", b"compiler of " + b"many words " * 5, self._hash,
             4096, Clock(lambda: 321), START_BAUD,
             *((BaudCall(lambda baud: baud in bauds), BaudCall(self._set_baud)) if bauds else ()),

@@ -97,6 +97,8 @@ def test_ticks_fly_the_bits_of_steps(target: Target) -> None:
         due = (given or OUTER_DUE) if tick % 5 == 0 else 0
         report = other.step(tick, flags | due, values, setpoint)
         assert drive.rotor_command == report.rotor_command
+        assert drive.reference == report.reference[:4]
+        assert drive.attitude_target == report.attitude_target
         assert (drive.state_time_us, drive.status) == (tick, report.status)
         assert (drive.age_us, drive.late_us) == (1_100, 0)
     other.close()
@@ -136,6 +138,8 @@ def test_the_newest_state_flies_and_its_age_is_told(target: Target) -> None:
     at(target, 0, state(7, RESET))
     at(target, 300, state(8))
     at(target, 500, state(9))
+    target.poll(10)
+    assert target.heard() == []  # figures come once a second
     (first,) = at(target, PERIOD_US)
     (second,) = at(target, 2 * PERIOD_US)
     assert (first.state_time_us, first.age_us) == (9, 1_500)

@@ -104,6 +104,13 @@ def test_costs_are_told_without_the_readings_of_the_clock() -> None:
     target.close()
 
 
+def test_without_a_clock_there_are_no_costs() -> None:
+    target = Target(ticks=None)
+    assert target.request("FS_PIL_IDENTITY").clock_overhead == 0
+    assert target.step(0, RESET | OUTER_DUE).cycles == [0, 0, 0, 0]
+    target.close()
+
+
 def test_a_cost_below_that_of_the_clock_is_zero() -> None:
     target = Target(ticks=[5 * at for at in range(6)], overhead=10)
     assert target.step(0, RESET | OUTER_DUE).cycles == [0, 0, 0, 0]

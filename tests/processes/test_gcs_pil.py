@@ -22,6 +22,7 @@ from gcs_cli.fly.fly_flags import FlyOptions
 from gcs_cli.pil import run as pil_run
 from gcs_cli.pil.flight_samples import read_samples
 from gcs_cli.pil.result import Flown
+from gcs_cli.pil.vectors import read_vectors
 from tests.support.commands import Ended, gcs
 from tests.support.plugin_site import install
 from tests.support.process import children_of
@@ -226,13 +227,16 @@ def test_a_board_that_is_unplugged_ends_the_run_with_a_sentence(
             ["replay", "none.ulg", "--junit", "out.txt"],
             "--junit out.txt: give the file a name that ends in .xml",
         ),
+        (["vectors", "x.txt"], "x.txt: give the file a name that ends in .csv or .mat"),
+        (["vectors", "none/x.csv"], "none/x.csv: cannot be written"),
+        (["vectors", "x.csv", "--controller", "mine"], "--controller: mine: there is no such"),
         (["doctor"], "give either --port DEVICE or --target"),
         (["doctor", "--port", "/dev/ttyNONE"], "no such device"),
     ],
 )
 def test_mistakes_are_answered_with_a_sentence(arguments: list[str], words: str, tmp_path: Path) -> None:
     paths = [str(MISSIONS / each) if each.endswith((".plan", ".ulg")) else each for each in arguments]
-    out = [] if "doctor" in arguments else ["--out", str(tmp_path / "out")]
+    out = [] if {"doctor", "vectors"} & set(arguments) else ["--out", str(tmp_path / "out")]
     done = pil(*paths, *out)
     assert done.returncode == USAGE, done.stdout + done.stderr
     assert words in done.stderr
@@ -266,6 +270,20 @@ def test_a_verdict_that_is_not_good_fails_when_it_is_asked_for(flown: Path, tmp_
     assert not any(name.startswith("stages–target") for name in failed if name)  # Python's log, sound loops
 
 
+def test_vectors_of_a_flight_are_written_and_replayed(flown: Path, tmp_path: Path) -> None:
+    file = tmp_path / "hop.csv"
+    done = pil("vectors", file, "--log", flown / "sil" / "flight.ulg", "--json")
+    assert done.returncode == DONE, done.stderr
+    said = json.loads(done.stdout)
+    assert (said["event"], said["file"]) == ("vectors", str(file))
+    assert pil("vectors", file).returncode == USAGE  # exists
+    done = pil("replay", file, "--target", "c", "--out", tmp_path / "out", "--fail-over")
+    assert done.returncode == DONE, done.stdout + done.stderr
+    result = result_of(tmp_path / "out")
+    assert largest(result, "log–target") == 0.0
+    assert len(read_vectors(file).record.time_us) == said["steps"]
+
+
 def test_limits_of_a_file_judge_a_replay(flown: Path, tmp_path: Path) -> None:
     limits = tmp_path / "limits.toml"
     limits.write_text("[stages.target_thrust]\nulp = 0.01\n")
@@ -273,3 +291,17 @@ def test_limits_of_a_file_judge_a_replay(flown: Path, tmp_path: Path) -> None:
     done = pil("replay", log, "--target", "c", "--out", out, "--limits", limits, "--fail-over")
     assert done.returncode == FAILED, done.stdout + done.stderr
     assert "the verdict is not good: stages–target attitude target\n" in done.stderr
+
+
+def test_a_free_running_target_flies_in_real_time_and_reports_its_timing(tmp_path: Path) -> None:
+    """How far it comes is left to the machine: a busy one is late. What is reported is complete in any case."""
+    plan, out = MISSIONS / "hop.plan", tmp_path / "out"
+    done = pil("free-run", plan, "--target", "host", "--out", out, "--instance", INSTANCE, "--json")
+    assert done.returncode in (DONE, FAILED, NO_ANSWER), done.stdout + done.stderr
+    told = json.loads(done.stdout)["free_running"]
+    assert told["period_us"] == 2_000
+    assert told["ticks"] > 400
+    assert told["states"] > 0
+    assert told["commands"] > 0
+    assert 0.0 < told["end_to_end_mean_us"] <= told["end_to_end_max_us"] < 1e6
+    assert told["late_mean_us"] <= told["late_max_us"]

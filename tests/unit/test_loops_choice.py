@@ -23,6 +23,7 @@ from flightstack.firmware.choice import LoopsChoice, parse_loops
             True,
         ),
         ("host,short", LoopsChoice("host", ending="short"), True),
+        ("serial:/dev/ttyUSB1:921600,free", LoopsChoice("serial", "/dev/ttyUSB1", 921_600, "free"), True),
         ("emulated,short", LoopsChoice("emulated", ending="short"), True),
         ("serial:/dev/ttyUSB1:921600,short", LoopsChoice("serial", "/dev/ttyUSB1", 921_600, "short"), True),
         ("serial:a,b,short", LoopsChoice("serial", "a,b", 115_200, "short"), True),

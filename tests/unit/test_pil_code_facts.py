@@ -14,7 +14,7 @@ from gcs_cli.pil.profile import EMULATED_CLOCK_HZ, cpu_load, stage_profiles
 from gcs_cli.pil.report import render_report
 from gcs_cli.pil.result import assembled, profiles_of
 from tests.support.parsed_page import parsed
-from tests.unit.test_pil_report_verdict import FACTS, record
+from tests.support.pil_records import FACTS, record
 
 COSTS = np.array([[300.0, 500.0, 400.0, 1200.0], [0.0, 500.0, 400.0, 1000.0]])
 
