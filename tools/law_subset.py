@@ -87,7 +87,8 @@ void my_add_noise(my_filter *filter, const fs_real variance[24], fs_real dt_s)
   the same bits everywhere.
 
 `tests/parity/generated_filter.py` has a Kalman filter of attitude and gyro bias, and the propagation and
-fusion of 24 states.
+fusion of 24 states. `test_generated_estimator.py` translates prediction, fusion and alignment of
+`flightstack/estimation`, with the bits of Python.
 
 ## Numbers
 

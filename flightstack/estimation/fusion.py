@@ -143,11 +143,14 @@ def fuse_field(f: Filter, measured: Vector3, params: EstimatorParams) -> None:
         earth, body = n.earth_field_ned_gauss, n.body_field_frd_gauss
         clear(f.h)
         if axis == 0:
-            innovation = measured.x - field_x_jacobian(n.attitude, earth, body, f.h)
+            expected = field_x_jacobian(n.attitude, earth, body, f.h)
+            innovation = measured.x - expected
         elif axis == 1:
-            innovation = measured.y - field_y_jacobian(n.attitude, earth, body, f.h)
+            expected = field_y_jacobian(n.attitude, earth, body, f.h)
+            innovation = measured.y - expected
         else:
-            innovation = measured.z - field_z_jacobian(n.attitude, earth, body, f.h)
+            expected = field_z_jacobian(n.attitude, earth, body, f.h)
+            innovation = measured.z - expected
         fuse(f, MAG + axis, innovation, noise, holds)
 
 

@@ -16,6 +16,7 @@ from flightstack.core.errors import ConfigError, TargetError
 from flightstack.firmware.c_loops import CLoops, LoopsSetup
 from flightstack.firmware.choice import PYTHON, SERIAL, LoopsChoice
 from flightstack.firmware.law_tree import controller_named, logged_params, own_params
+from flightstack.firmware.numbers import FIRST_NUMBERS
 from flightstack.firmware.stages import has_model
 from flightstack.firmware.targets import finish_loops, make_loops
 from flightstack.flight_log.flight_log import vehicle_fields
@@ -162,7 +163,7 @@ def fed(replay: Replay, target: str, folder: Path, console: Console) -> tuple[Fl
         assert isinstance(loops, CLoops)
         with ExitStack() as last:
             last.callback(finish_loops, loops, folder / LOG_NAME)
-            for name, value in replay.numbers.items():
+            for name, value in (*FIRST_NUMBERS.items(), *replay.numbers.items()):
                 loops.executor.set(name, value)
             with step_bar(f"replay on {target}", console) as bar:
                 outputs = replayed(replay.record, loops.executor, names.__contains__, bar.show)
@@ -235,7 +236,7 @@ def judged(
         {"name": f"largest difference {shown}", "value": largest_difference(differences or by_stage)},
         *target_tiles(record),
     ]
-    first = flight if differences else expected
+    first = flight if differences or expected is None else expected
     charts = [
         DeviationChart(BY_NAME[name], {shown: deviation(BY_NAME[name], first, made)}) for name in _SHOWN
     ]

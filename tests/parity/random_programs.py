@@ -73,6 +73,12 @@ def _clear(box: Box, start: int, count: int) -> int:
 
 
 @compiled
+def _shrink(box: Box, x: float) -> bool:
+    box.values[0] *= 0.5
+    return box.values[0] > x
+
+
+@compiled
 def _sum(grid: Annotated[FloatArray, 2, 3]) -> float:
     return grid[0, 0] + grid[1, 2]
 '''
@@ -185,7 +191,10 @@ def statements(draw: st.DrawFn, depth: int = 0, in_loop: bool = False) -> list[s
                 block.append(
                     draw(st.sampled_from(["return pair, a + x", *(["break", "continue"] if in_loop else [])]))
                 )
-            lines += [f"if {draw(CONDITIONS)}:", *(f"    {line}" for line in block)]
+            test = draw(
+                st.one_of(CONDITIONS, CONDITIONS, st.sampled_from(["_shrink(box, a)", "not _shrink(box, y)"]))
+            )
+            lines += [f"if {test}:", *(f"    {line}" for line in block)]
             if draw(st.booleans()):
                 lines += ["else:", *(f"    {line}" for line in draw(statements(depth + 1, in_loop)))]
         else:

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import importlib
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from flightstack.control.control_law import ControlLaw, CStep
+from flightstack.control.controller import controller_of
 from flightstack.core.errors import ConfigError
 from flightstack.firmware.build import host_library
 from flightstack.firmware.c_loops import HostLoops, LoopsSetup
@@ -19,6 +23,7 @@ from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
 from flightstack.process.assembly import check
 from flightstack.testing import World
+from gcs_cli.pil.replay_run import fed, judged, prepared
 from tests.support.plugin_site import ROOT
 
 
@@ -95,3 +100,25 @@ def test_a_file_of_the_firmwares_name_is_refused(law: ControlLaw) -> None:
         ConfigError, match=r"fs_loops\.h needs another name: those with fs_ belong to the firmware"
     ):
         law_tree(law._replace(step=law.step._replace(header=core / "fs_loops.h")))
+
+
+def test_a_flight_of_a_law_in_c_is_replayed(
+    law: ControlLaw, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("flightstack.firmware.law_tree.load_controller", lambda _: controller_of(law))
+    world = World(loops="c", controller="rate-pd")
+    world.arm()
+    world.takeoff(1.0)
+    world.run_for(4.0)
+    world.disarm(force=True)
+    path = tmp_path / "flight.ulg"
+    path.write_bytes(world.engine.logs[-1].content)
+    replay = prepared(path, None)
+    outputs, _ = fed(replay, "c", tmp_path, Console(quiet=True))
+    facts: dict[str, Any] = {"title": "", "about": "", "meaning": "", "conditions": {}}
+    outcome = judged(replay, outputs, None, True, facts)
+    assert outcome.passed
+    assert outcome.result["differences"]
+    assert all(row["largest"] == 0.0 for row in outcome.result["differences"])
+    assert outcome.result["meaning"].endswith("it has no stage in Python to compare with.")
+    assert not judged(replay, outputs * 1.01, None, True, facts).passed

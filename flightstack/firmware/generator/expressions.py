@@ -94,6 +94,21 @@ class Expressions:
             raise self.function.refusal(node, "truth of a number")
         return value
 
+    def condition(self, node: ast.expr) -> Value:
+        """Return the test of an ``if``; a call that is the whole test may write to arrays."""
+        if (
+            isinstance(node, ast.UnaryOp)
+            and isinstance(node.op, ast.Not)
+            and isinstance(node.operand, ast.Call)
+        ):
+            return Value(BOOL, f"!{self.condition(node.operand).within(UNARY)}", UNARY)
+        if not isinstance(node, ast.Call):
+            return self.truth(node)
+        value = self.calls.call(node, alone=True)
+        if value.type is not BOOL:
+            raise self.function.refusal(node, "truth of a number")
+        return value
+
     def constant(self, node: ast.expr) -> Any:
         """Return the Python value of a constant of the module or the source, or ``MISSING``."""
         if isinstance(node, ast.Constant):

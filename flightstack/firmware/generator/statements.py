@@ -117,7 +117,7 @@ class Statements:
 
     def _branch(self, node: ast.If) -> bool:
         writer = self.writer
-        test = self.expressions.truth(node.test)
+        test = self.expressions.condition(node.test)
         note = self.function.comments.get(node.lineno)
         since = len(writer.lines)
         writer.line(f"if ({test.text}) {{")

@@ -67,7 +67,7 @@ ADVICE: dict[str, str] = {
     "arguments": "pass every argument of the function once",
     "method call": "use a function or an expression",
     "attribute": "use a field of a NamedTuple, or `.size` of an array",
-    "call that writes to an array": "give the call a statement of its own",
+    "call that writes to an array": "give the call a statement of its own, or make it the whole test of an `if`",
     "result": "return a value on every path",
     "statement": "use assignments, `if`, `for … in range(…)`, and `return`",
     "expression": "use arithmetic, comparisons, and calls of @compiled functions",
