@@ -18,6 +18,7 @@ from gcs_cli.config_file import (
     Config,
     load_config,
 )
+from gcs_cli.errors import USAGE, CliError
 from gcs_cli.link.endpoint import (
     DEFAULT_CONNECTION,
     FORMS,
@@ -190,3 +191,13 @@ def output_of(context: typer.Context, given: LinkOptions | bool) -> Output:
     """Return the output in the form that ``given``, or an option before the command, asks for."""
     as_json = given if isinstance(given, bool) else given.as_json
     return Output(as_json or settings_of(context).link.as_json)
+
+
+def check_output_file(flag: str, path: Path | None, suffixes: tuple[str, ...]) -> None:
+    """Raise CliError (usage) for a file of another kind, or in a directory that does not exist."""
+    if path is None:
+        return
+    if path.suffix.lower() not in suffixes:
+        raise CliError(f"{flag} {path}: give the file a name that ends in {suffixes[0]}", USAGE)
+    if not path.parent.is_dir():
+        raise CliError(f"{flag} {path}: there is no directory {path.parent}", USAGE)

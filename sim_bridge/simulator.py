@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from flightstack.core.geodesy import GeoPoint
 from flightstack.mavlink.frames import HEADER_V2
 from flightstack.params.vehicle import Vehicle
 from flightstack.simulator_link.battery_frame import encode_battery
@@ -27,6 +28,8 @@ from sim_bridge.plant.fault_table import ROWS, STATE_KINDS, Fault, Kind
 from sim_bridge.plant.layout import CONTACT, DIVERGED, OUTPUT
 from sim_bridge.plant.plant import Plant, PlantOptions
 from sim_bridge.plants import make_plant
+from sim_bridge.sensors.faults import channels_of
+from sim_bridge.sensors.suite import Sender, SensorSuite
 from sim_bridge.sent_state import SentState
 
 SIMULATOR_COMPONENT = 200
@@ -69,6 +72,8 @@ class Simulator:
         self._change_us = _NEVER_US  # of the next work of ``apply`` for faults
         self._fault_us = _NEVER_US  # of the next begin or end of a fault
         self._sent: SentState | None = None  # instead of the true state
+        self.sensors: SensorSuite | None = None
+        """The sensors, from ``start_sensors`` on."""
         self.drops_state = False
         self._system_id = system_id
         self.set_interval_us(interval_us)
@@ -91,12 +96,34 @@ class Simulator:
         self._interval_us = interval_us
         self._steps = max(1, math.ceil(interval_us / self._physics_dt_us - 1e-9))
         self.plant.set_step(interval_us * 1e-6 / self._steps)
+        if self.sensors is not None:
+            self.sensors.set_interval_us(interval_us)
+
+    def start_sensors(self, home: GeoPoint) -> bool:
+        """Measure with the sensors of the vehicle from now on; return False if it has none. ``home`` is the origin."""
+        if self.sensors is None and self.vehicle.sensors.numbers:
+            sender = Sender(self._system_id, SIMULATOR_COMPONENT)
+            seed = self._flight.options.seed
+            self.sensors = SensorSuite(self.vehicle, home, seed, self._frame, self.plant, sender)
+            self.sensors.set_interval_us(self._interval_us)
+            self.sensors.set_faults(self._schedule.active(self.time_us))
+            self.sensors.measure(self.time_us)
+        return self.sensors is not None
+
+    def stop_sensors(self) -> None:
+        """Measure no longer."""
+        self.sensors = None
 
     def outgoing(self) -> bytes | memoryview:
         """Return the bytes to send for the present state, valid until the next call of ``apply``.
 
-        FS_PLANT_STATE, preceded by BATTERY_STATUS ten times a second. ``state:drop`` drops FS_PLANT_STATE.
+        FS_PLANT_STATE, preceded by BATTERY_STATUS ten times a second and followed by the messages of the sensors.
+        ``state:drop`` drops FS_PLANT_STATE.
         """
+        truth = self._outgoing_truth()
+        return truth if self.sensors is None else bytes(truth) + self.sensors.frames(self.stamp_us)
+
+    def _outgoing_truth(self) -> bytes | memoryview:
         if self.time_us < self._battery_due_us and not self.drops_state:
             return self.state_frame()
         battery = self.battery_frame()
@@ -147,8 +174,24 @@ class Simulator:
         """
         check_faults(faults, self._flight._replace(faults=self.faults))
         for fault in faults:
-            late = ROWS[fault.kind].is_event and fault.begin_us < self.time_us
-            self._schedule.faults.append(fault._replace(begin_us=self.time_us) if late else fault)
+            counts = ROWS[fault.kind].is_event or fault.kind is Kind.SENSOR_DRIFT  # from its begin
+            is_late = counts and fault.begin_us < self.time_us
+            self._schedule.faults.append(fault._replace(begin_us=self.time_us) if is_late else fault)
+        self._update_faults()
+
+    def check(self, fault: Fault) -> None:
+        """Raise UsageProblemError for a fault that cannot act."""
+        check_faults((fault,), self._flight._replace(faults=self.faults))
+
+    def clear_sensor_faults(self, sensor: str) -> None:
+        """Remove the active faults of a sensor, as "mag" or "gyro2"; "gyro" is that of all inertial sensors."""
+        ends = set(channels_of(sensor, self.vehicle.sensors.imu_count))
+        self._schedule.faults = [
+            fault
+            for fault in self._schedule.faults
+            if fault.begin_us > self.time_us
+            or not ends.issuperset(channels_of(fault.sensor, self.vehicle.sensors.imu_count) or [("", 0)])
+        ]
         self._update_faults()
 
     def clear_faults(self, rotor: int | None = None, part: str | None = None) -> None:
@@ -174,6 +217,8 @@ class Simulator:
         events = schedule.take_due_events(now_us)
         active = schedule.active(now_us)
         self.plant.set_faults(plant_faults(active))
+        if self.sensors is not None:
+            self.sensors.set_faults(active)
         for event in events:
             if event.kind is Kind.BATTERY_LEVEL:
                 self.plant.set_charge(event.value)
@@ -211,6 +256,8 @@ class Simulator:
         self._flags = _FLAGS[result]
         if self.time_us >= self._change_us:
             self._follow_faults()
+        if self.sensors is not None:
+            self.sensors.measure(self.time_us)
 
     def _follow_faults(self) -> None:
         """Begin and end faults that are due, and follow the true state with a late one."""

@@ -1,7 +1,7 @@
 """Write flightstack/mavlink/dialect_generated.py from flightstack.xml, read with pymavlink's own parser.
 
-Only the layouts of our messages are generated; those of common.xml come with pymavlink. ``--check`` fails when
-the file is stale.
+Only our enumeration values and the layouts of our messages are generated; those of common.xml come with pymavlink.
+``--check`` fails when the file is stale.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ HEADER = '''"""Generated from flightstack.xml by tools/generate_dialect.py: do n
 
 from flightstack.mavlink.layout import Field, Layout
 
-LAYOUTS = (
 '''
 FORMATS = {
     "uint64_t": "Q",
@@ -65,7 +64,10 @@ def layout_source(message: Any) -> str:
 def generated() -> str:
     """Return the text of the generated module."""
     xml = mavparse.MAVXML(str(FOLDER / "flightstack.xml"), mavparse.PROTOCOL_2_0)
-    return HEADER + "\n".join(layout_source(message) for message in xml.message) + "\n)\n"
+    entries = [entry for enum in xml.enum for entry in enum.entry if not entry.end_marker]
+    values = "".join(f'    "{entry.name}": {entry.value},\n' for entry in entries)
+    layouts = "\n".join(layout_source(message) for message in xml.message)
+    return f"{HEADER}ENTRIES = {{\n{values}}}\n\nLAYOUTS = (\n{layouts}\n)\n"
 
 
 if __name__ == "__main__":

@@ -11,10 +11,12 @@ from flightstack.core.contract import LoopFlags, LoopStatus
 from flightstack.core.enums import NAVIGATION_STATE
 from flightstack.flight_log.topics import EVENT_TOPICS, OUTER_TOPICS, Field, Topic, inner_topics
 from flightstack.params.behaviour import Behaviour
-from sim_bridge.plant.fault_table import TABLE, Row
+from sim_bridge.plant.fault_table import SENSORS, TABLE, Row
 from tools.generated import ROOT, write_or_check
 from tools.law_subset import subset_page
+from tools.link_tables import link_page
 from tools.scenario_page import scenarios_page, schema_text
+from tools.sensor_page import sensor_page
 from tools.watch_keys import keys_page
 
 FOLDER = ROOT / "docs" / "reference"
@@ -116,6 +118,17 @@ log holds the parameters with their changes in flight, the status texts, and inf
 """
 
 
+SENSOR_PARTS = {
+    "imu": "gyro and accelerometer: off, freeze, late and loss only",
+    "gyro": "X,Y,Z",
+    "accel": "X,Y,Z",
+    "mag": "X,Y,Z",
+    "baro": "pressure",
+    "gnss": "position N,E,D",
+    "range": "distance",
+    "flow": "about X,Y",
+}
+
 FAULTS_HEAD = """\
 ---
 hide: [toc]
@@ -134,7 +147,8 @@ rotor:2:weak=0.7@10-20
 rotor 2 efficiency 0.7 @10-20
 ```
 
-N is the number of a rotor, from 1. Vectors are three numbers separated by commas: X,Y,Z in body axes FRD, N,E,D north,
+N is the number of a rotor, from 1; SENSOR and VALUE are [below](#sensors).
+Vectors are three numbers separated by commas: X,Y,Z in body axes FRD, N,E,D north,
 east, down. A fault that cannot act is refused.
 
 | notation | in words | values | effect | needs |
@@ -166,6 +180,15 @@ height.
 
 *Battery*: voltage and current change, and so does the charge with time; the rotors keep their speeds until it is
 empty.
+
+<a id="sensors"></a>*Sensors*: VALUE is a number for each component of the sensor, in its unit; so is SPREAD.
+
+| SENSOR | components | unit |
+|---|---|---|
+{sensors}
+`gyro2`, `accel2` and `imu2` are those of the second inertial sensor, a name without a number those of all. A fault of a
+sensor acts on what the simulator sends as HIL_SENSOR, HIL_GPS, DISTANCE_SENSOR and HIL_OPTICAL_FLOW
+([Sensors](sensors.md)), and not on a vehicle that flies on the true state.
 
 *Clock*: in lockstep a vehicle notices a stalled clock after 1 s of the machine's clock, not of simulated time
 ([Clocks of other simulators](simulator.md#clocks-of-other-simulators)).
@@ -260,7 +283,12 @@ def fault_row(row: Row) -> str:
 def faults_page() -> str:
     """Return the page of the faults."""
     note = NOTE.format(source="sim_bridge/plant/fault_table.py")
-    return FAULTS_HEAD.format(note=note) + "".join(map(fault_row, TABLE)) + FAULTS_TAIL
+    sensors = "".join(
+        f"| `{name}` | {SENSOR_PARTS[name]} | {unit.unit} |\n" for name, unit in SENSORS.items()
+    )
+    return (
+        FAULTS_HEAD.format(note=note) + "".join(map(fault_row, TABLE)) + FAULTS_TAIL.format(sensors=sensors)
+    )
 
 
 if __name__ == "__main__":
@@ -268,9 +296,11 @@ if __name__ == "__main__":
         "failsafes.md": failsafes_page(),
         "log-topics.md": topics_page(),
         "faults.md": faults_page(),
+        "sensors.md": sensor_page(NOTE.format(source="flightstack/params/sensors.py")),
         "scenarios.md": scenarios_page(NOTE.format(source="flightstack/testing")),
         "scenario.schema.json": schema_text(),
         "generated-c.md": subset_page(NOTE.format(source="flightstack/firmware/generator")),
+        "pil-link.md": link_page(NOTE.format(source="flightstack/firmware/line_model.py")),
         "watch-keys.md": keys_page(NOTE.format(source="gcs_cli/tui")),
     }
     sys.exit(write_or_check({FOLDER / name: text for name, text in pages.items()}))

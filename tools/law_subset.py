@@ -29,7 +29,7 @@ Functions marked `@compiled`, with annotations. Types come from annotations and 
 | Python | C |
 |---|---|
 | `float`, `int`, `bool` | `fs_real` (float on a target), `int32_t`, `bool` |
-| NamedTuple | `struct`, by `const` pointer; prefix `fs_`, or the name of your package |
+| NamedTuple | `struct`, by pointer; prefix `fs_`, or the name of your package |
 | `Annotated[FloatArray, 3, 4]`; `np.zeros(3)` | array of that size; local array |
 | array or nested tuple of floats of a module | `static const` table |
 | `Annotated[FloatArray, "rotors"]` | array of `FS_MAX_ROTORS` with the number of rotors beside it |
@@ -44,6 +44,52 @@ Functions marked `@compiled`, with annotations. Types come from annotations and 
 | functions of `flightstack.core.portable_math` and `geometry` | generated along |
 | `_private` function | `static` |
 | docstring, comments | comments, in ASCII; each function names its line of Python |
+
+Memory and parameters of a law hold floats. Arrays stand in other NamedTuples, such as the state of an estimator.
+
+## Arrays
+
+An estimator keeps vectors and matrices in NamedTuples of arrays with constant shapes, and writes them in place:
+
+```python
+STATES = 24
+
+
+class Filter(NamedTuple):
+    x: Annotated[FloatArray, STATES]
+    covariance: Annotated[FloatArray, STATES, STATES]
+
+
+@compiled
+def add_noise(filter: Filter, variance: Annotated[FloatArray, STATES], dt_s: float) -> None:
+    p = filter.covariance
+    for i in range(STATES):
+        p[i, i] += variance[i] * dt_s
+```
+
+```c
+void my_add_noise(my_filter *filter, const fs_real variance[24], fs_real dt_s)
+{
+    for (int32_t i = 0; i < 24; i++) {
+        filter->covariance[i][i] += variance[i] * dt_s;
+    }
+}
+```
+
+* Shapes are numbers or constants of the module, in the annotation. Arrays are `float64` in Python; compiled code may
+  pass those of a record, `Filter(record["x"], record["covariance"])`.
+* Loops run over constants, sizes and variables of outer loops, such as `range(row + 1)` for a triangle, and over integer
+  parameters for which every caller gives such a number, `range(at, at + count)`.
+* Integers stand in `Annotated[np.ndarray[tuple[int], np.dtype[np.int64]], N]`; C has 32 bits of each.
+* A parameter is `const` in C unless the function, or one that it calls, writes to its arrays.
+* `p = filter.covariance` and `row = p[i]` are names of the same array, `np.zeros((3, 3))` and `np.empty(3)` new ones.
+* Slices, whole-array arithmetic, and NamedTuples made of arrays are refused: sums have a written order, and so
+  the same bits everywhere.
+
+`tests/parity/generated_filter.py` has a Kalman filter of attitude and gyro bias, and the propagation and
+fusion of 24 states.
+
+## Numbers
 
 Division by zero gives infinity or NaN, as in compiled Python. `math.floor` of NaN is NaN, and −2⁶³ in compiled
 Python. `int` of a float saturates at 2³¹ in C. The sign of a NaN, which `copysign` reads, depends on the processor.

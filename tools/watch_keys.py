@@ -10,7 +10,7 @@ from textual.keys import format_key
 
 from flightstack.mavlink.dialect import mavlink
 from gcs_cli.tui.app import WatchApp
-from gcs_cli.tui.orders import ORDERS, Field
+from gcs_cli.tui.orders.orders import ORDERS, Field
 from gcs_cli.tui.screens import SCREENS
 from gcs_cli.vehicle.view_types import Identity, VehicleView
 

@@ -4,9 +4,31 @@
 #include "fs_constants.h"
 #include "fs_params.h"
 
+#define CALIBRATIONS 16U
+
+/* Least difference of two readings, one right after the other. */
+static uint32_t overhead_of(fs_clock clock)
+{
+    uint32_t least = 0xFFFFFFFFUL, first, between;
+    uint16_t i;
+
+    if (clock == NULL) {
+        return 0UL;
+    }
+    for (i = 0U; i < CALIBRATIONS; i++) {
+        first = clock();
+        between = clock() - first;
+        if (between < least) {
+            least = between;
+        }
+    }
+    return least;
+}
+
 void fs_app_init(fs_app *app, const fs_port *port)
 {
     app->port = port;
+    app->clock_overhead = overhead_of(port->clock);
     fs_parser_init(&app->parser);
     fs_outbox_init(&app->outbox);
     app->now_ms = 0UL;
@@ -28,6 +50,8 @@ void fs_app_init(fs_app *app, const fs_port *port)
     app->alarm = NULL;
     app->alarm_severity = 0U;
     app->next_listed = fs_param_count();
+    fs_app_baud_init(app);
+    fs_app_free_init(app);
     fs_app_forget_flight(app);
     app->state = FS_APP_READY;
     if (port->was_watchdog != 0U) {
@@ -46,9 +70,16 @@ uint16_t fs_app_is_target(fs_octet system, fs_octet component)
 
 static void handle(fs_app *app)
 {
+    fs_app_baud_heard(app);
     switch (app->frame.id) {
     case FS_PIL_STEP_ID:
         fs_app_on_step(app);
+        break;
+    case FS_PIL_TICK_ID:
+        fs_app_on_tick(app);
+        break;
+    case FS_PIL_STATE_ID:
+        fs_app_on_state(app);
         break;
     case FS_PARAM_REQUEST_LIST_ID:
         fs_app_on_param_list(app);
@@ -131,11 +162,13 @@ static void tell_news(fs_app *app)
 void fs_app_poll(fs_app *app, uint32_t now_ms)
 {
     app->now_ms = now_ms;
+    fs_app_baud_poll(app);
     listen_for_silence(app);
     if ((app->state == FS_APP_STEPPING) && ((now_ms - app->last_step_ms) >= FS_APP_STEP_TIMEOUT_MS)) {
         app->state = FS_APP_READY; /* nothing is forgotten: the host may go on */
     }
     tell_news(app);
+    fs_app_free_tell(app);
     app->is_polled = 1U;
 }
 
@@ -161,6 +194,7 @@ uint32_t fs_app_wait_ms(const fs_app *app)
     if (app->state == FS_APP_STEPPING) {
         wait_at_most(app, app->last_step_ms, FS_APP_STEP_TIMEOUT_MS, &wait_ms);
     }
+    wait_at_most(app, app->now_ms, fs_app_baud_wait_ms(app), &wait_ms);
     if (app->alarm != NULL) { /* the outbox may have room soon */
         wait_at_most(app, app->now_ms, FS_APP_SILENCE_MS, &wait_ms);
     }

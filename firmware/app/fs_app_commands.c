@@ -27,6 +27,10 @@ static uint16_t send_identity(fs_app *app)
     fs_text_put(message.board, BOARD_SIZE, app->port->board);
     fs_text_put(message.compiler, COMPILER_SIZE, app->port->compiler);
     message.compiler[COMPILER_SIZE - 1U] = 0U; /* a cut version must not look whole to who wants a NUL */
+    message.protocol = FS_APP_PROTOCOL;
+    message.window = FS_APP_WINDOW;
+    message.baud = app->line.baud;
+    message.clock_overhead = app->clock_overhead;
     length = fs_pil_identity_encode(&message, app->payload);
     return fs_outbox_put(&app->outbox, FS_PIL_IDENTITY_ID, app->payload, length, FS_OUTBOX_ANSWER);
 }
@@ -94,7 +98,7 @@ static uint16_t reboot(fs_app *app, float what)
 
     if (what != REBOOT) {
         result = FS_MAV_RESULT_DENIED; /* there is nothing else to reboot, and nothing to shut down */
-    } else if (app->state == FS_APP_STEPPING) {
+    } else if ((app->state == FS_APP_STEPPING) || (app->free.is_on != 0U)) {
         result = FS_MAV_RESULT_TEMPORARILY_REJECTED;
     } else {
         fs_app_forget_flight(app);
@@ -131,6 +135,10 @@ void fs_app_on_command(fs_app *app)
         result = request_message(app, message.param1);
     } else if (message.command == FS_MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN) {
         result = reboot(app, message.param1);
+    } else if (message.command == FS_MAV_CMD_FS_SET_BAUD_RATE) {
+        result = fs_app_set_baud(app, message.param1);
+    } else if (message.command == FS_MAV_CMD_FS_FREE_RUN) {
+        result = fs_app_free_command(app, message.param1, message.param2, message.param3);
     } else {
         /* no other command */
     }

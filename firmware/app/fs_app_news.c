@@ -9,7 +9,7 @@ static uint16_t system_status(uint16_t state)
 {
     uint16_t status = FS_MAV_STATE_STANDBY;
 
-    if (state == FS_APP_STEPPING) {
+    if ((state == FS_APP_STEPPING) || (state == FS_APP_FREE)) {
         status = FS_MAV_STATE_ACTIVE;
     } else if (state == FS_APP_SAFE) {
         status = FS_MAV_STATE_EMERGENCY;

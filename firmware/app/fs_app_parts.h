@@ -27,14 +27,32 @@ void fs_app_tell_alarm(fs_app *app); /* if there is one, and room */
 
 /* fs_app_pil.c: steps of the loops */
 void fs_app_on_step(fs_app *app);
+void fs_app_on_tick(fs_app *app);
 void fs_app_on_new_numbers(fs_app *app);
 void fs_app_forget_flight(fs_app *app); /* step 0 or one with RESET is expected next; the state stays */
+
+uint16_t fs_app_is_overrun(const fs_app *app, const fs_loop_cost *cost);
+void fs_app_take_overhead_out(const fs_app *app, fs_loop_cost *cost); /* the readings of the clock */
+
+/* fs_app_free.c */
+void fs_app_free_init(fs_app *app);
+uint16_t fs_app_free_command(fs_app *app, float what, float every, float timeout_ms);
+void fs_app_free_stop(fs_app *app);
+void fs_app_on_state(fs_app *app);
+void fs_app_free_tell(fs_app *app);
 
 /* fs_app_params.c */
 void fs_app_on_param_list(fs_app *app);
 void fs_app_on_param_read(fs_app *app);
 void fs_app_on_param_set(fs_app *app);
 void fs_app_go_on_listing(fs_app *app); /* put the next parameter of a list under way */
+
+/* fs_app_baud.c */
+void fs_app_baud_init(fs_app *app);
+uint16_t fs_app_set_baud(fs_app *app, float baud); /* returns the result to acknowledge */
+void fs_app_baud_heard(fs_app *app);               /* a frame arrived */
+void fs_app_baud_poll(fs_app *app);                /* before silence is noted */
+uint32_t fs_app_baud_wait_ms(const fs_app *app);
 
 /* fs_app_commands.c */
 void fs_app_on_command(fs_app *app);

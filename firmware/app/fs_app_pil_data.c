@@ -3,7 +3,10 @@
 #define STATE_SIZE 13U
 #define SETPOINT_SIZE 11U
 #define TARGET_SIZE 5U
-#define KNOWN_FLAGS (FS_OUTER_DUE | FS_SET_TARGET | FS_RESET)
+#define REST_AT 7U /* place in FS_PIL_TICK.values of what follows attitude and rates */
+#define SETPOINT_AT 13U
+#define REFERENCE_SIZE 4U
+#define KNOWN_FLAGS ((uint32_t)(FS_OUTER_DUE | FS_SET_TARGET | FS_RESET))
 #define EXPONENT 0x7F800000UL /* all ones: infinite or not a number */
 
 /* By their bits, because a C28x computes with NaN as with infinity. */
@@ -40,8 +43,9 @@ uint16_t fs_pil_is_same(const fs_pil_step *one, const fs_pil_step *other)
                : 0U;
 }
 
-const char *fs_pil_fault_of(const fs_pil_step *step)
+const char *fs_pil_fault_of(const fs_pil_step *step, uint16_t is_short)
 {
+    const uint32_t known = (is_short != 0U) ? (KNOWN_FLAGS | FS_PIL_WANT_REFERENCE) : KNOWN_FLAGS;
     const char *fault = NULL;
     uint16_t used = 0U; /* numbers of the setpoint */
 
@@ -52,7 +56,7 @@ const char *fs_pil_fault_of(const fs_pil_step *step)
     } else {
         /* no setpoint */
     }
-    if (((step->flags & ~(uint32_t)KNOWN_FLAGS) != 0UL) ||
+    if (((step->flags & ~known) != 0UL) ||
         ((step->flags & (FS_OUTER_DUE | FS_SET_TARGET)) == (FS_OUTER_DUE | FS_SET_TARGET))) {
         fault = "Step with unknown flags: rotors stopped";
     } else if (are_finite(step->state, STATE_SIZE) == 0U) {
@@ -141,5 +145,57 @@ void fs_pil_to_report(const fs_loop_output *output, const fs_loop_cost *cost, fs
     put_wrench(report->wrench_achieved, &output->wrench_achieved);
     for (i = 0U; i < FS_MAX_ROTORS; i++) {
         report->rotor_command[i] = (float)output->rotor_command_rad_s[i];
+    }
+}
+
+static void copy(float *to, const float *from, uint16_t count)
+{
+    uint16_t i;
+
+    for (i = 0U; i < count; i++) {
+        to[i] = from[i];
+    }
+}
+
+void fs_pil_from_tick(const fs_pil_tick *tick, fs_pil_step *step)
+{
+    static const fs_pil_step blank = {0};
+
+    *step = blank;
+    step->step = tick->step;
+    step->flags = tick->flags;
+    copy(&step->state[6], tick->values, REST_AT);
+    if ((tick->flags & FS_SET_TARGET) != 0UL) {
+        copy(step->setpoint, &tick->values[REST_AT], TARGET_SIZE);
+    } else {
+        copy(step->state, &tick->values[REST_AT], SETPOINT_AT - REST_AT);
+        copy(step->setpoint, &tick->values[SETPOINT_AT], SETPOINT_SIZE);
+    }
+}
+
+void fs_pil_from_state(const fs_pil_state *state, fs_pil_step *step)
+{
+    step->step = state->time_us;
+    step->flags = state->flags | (((state->flags & FS_SET_TARGET) != 0UL) ? 0U : FS_OUTER_DUE);
+    copy(step->state, state->state, STATE_SIZE);
+    copy(step->setpoint, state->setpoint, SETPOINT_SIZE);
+}
+
+void fs_pil_to_output(const fs_pil_report *report, uint32_t flags, uint16_t rotors, fs_pil_output *output)
+{
+    static const fs_pil_output blank = {0};
+    uint16_t at = rotors;
+
+    *output = blank;
+    output->step = report->step;
+    output->status = report->status;
+    output->cycles = report->cycles[3];
+    copy(output->values, report->rotor_command, rotors);
+    if ((flags & FS_OUTER_DUE) != 0UL) {
+        copy(&output->values[at], report->attitude_target, TARGET_SIZE);
+        at = (uint16_t)(at + TARGET_SIZE);
+    }
+    if ((flags & FS_PIL_WANT_REFERENCE) != 0UL) {
+        copy(&output->values[at], report->reference, REFERENCE_SIZE);
     }
 }

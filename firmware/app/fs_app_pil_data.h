@@ -1,4 +1,4 @@
-/* FS_PIL_STEP and FS_PIL_REPORT, and what the loops take and give. */
+/* FS_PIL_STEP and FS_PIL_REPORT, their short forms FS_PIL_TICK and FS_PIL_OUTPUT, and what the loops take and give. */
 #ifndef FS_APP_PIL_DATA_H
 #define FS_APP_PIL_DATA_H
 
@@ -12,7 +12,20 @@ uint16_t fs_pil_is_same(const fs_pil_step *one, const fs_pil_step *other);
  * Return what is wrong with a step, to be told: a number that its flags make an input is not finite, or the flags are
  * none that this target knows, or ask for two meanings of the setpoint at once. NULL when it is sound.
  */
-const char *fs_pil_fault_of(const fs_pil_step *step);
+const char *fs_pil_fault_of(const fs_pil_step *step, uint16_t is_short);
+
+#define FS_PIL_WANT_REFERENCE 8UL /* FS_PIL_TICK.flags, beside those of the loops */
+
+/* Write the step that a short one stands for; what it leaves out is zero, and not read. */
+void fs_pil_from_tick(const fs_pil_tick *tick, fs_pil_step *step);
+
+#define FS_PIL_REST 16UL /* FS_PIL_STATE.flags, beside those of the loops */
+
+/* Write the step that a state stands for in an outer tick; its number is the host's time. */
+void fs_pil_from_state(const fs_pil_state *state, fs_pil_step *step);
+
+/* Write the short form of a report; `flags` are the step's. */
+void fs_pil_to_output(const fs_pil_report *report, uint32_t flags, uint16_t rotors, fs_pil_output *output);
 
 /* The setpoint's numbers are a setpoint or an attitude target: both are written, the flags tell the loops which to read. */
 void fs_pil_to_input(const fs_pil_step *step, fs_loop_input *input);

@@ -9,13 +9,13 @@
 
 #include "fs_frame.h"
 
-#define FS_OUTBOX_SIZE 1024U /* octets: 89 ms at 115200 baud */
+#define FS_OUTBOX_SIZE 2048U /* octets: 178 ms at 115200 baud */
 
-/* Reserves, in octets that must stay free. A report's frame has 160. */
+/* Reserves, in octets that must stay free. A report's frame has 160: those of a window of 8 have 1280. */
 #define FS_OUTBOX_ALARM 0U   /* why the rotors are stopped: whoever listens has to know */
 #define FS_OUTBOX_REPORT 0U  /* reports of steps: what a host waits for in each step */
-#define FS_OUTBOX_ANSWER 320U /* answers to requests, which are asked again when they are lost */
-#define FS_OUTBOX_NEWS 640U  /* heartbeat, status, texts: nobody waits for one of them */
+#define FS_OUTBOX_ANSWER 1344U /* answers to requests, which are asked again when they are lost */
+#define FS_OUTBOX_NEWS 1664U  /* heartbeat, status, texts: nobody waits for one of them */
 
 typedef struct {
     fs_octet octets[FS_OUTBOX_SIZE];

@@ -36,15 +36,18 @@ typedef uint32_t (*fs_clock)(void); /* cost counter of the port, counting up mod
 
 /*
  * What a step cost, in the clock's unit: differences modulo 2^32. The inner loop's part is reference filter and
- * attitude controller, without the mixer. All zero without a clock.
+ * attitude controller, without the mixer. All zero without a clock. Each includes the time of a clock reading, the whole
+ * step one less than there were readings.
  */
 typedef struct {
     uint32_t outer, inner, mixer, whole;
+    uint16_t readings;
 } fs_loop_cost;
 
 /* What follows from the setup. */
 typedef struct {
-    uint16_t controller, rotors;
+    uint16_t guidance, position, controller, mixing; /* indices of the laws */
+    uint16_t rotors;
     fs_real inner_dt_s, outer_dt_s;
     fs_real fraction_step; /* share of an outer period that an inner tick is */
 } fs_loop_rates;
@@ -52,16 +55,20 @@ typedef struct {
 typedef struct fs_loops {
     /* numbers: read and written through fs_params.h */
     fs_setup setup;
-    fs_position_params position;
+    fs_guidance_law_params guidance;
+    fs_position_law_params position;
     fs_reference_params reference;
     fs_controller_params controller;
+    fs_mixer_law_params mixing;
     fs_mixer mixer;
     fs_resolution resolution; /* of the mixer's sums */
     fs_loop_rates rates;
     /* memories */
-    fs_position_memory position_memory;
+    fs_guidance_law_memory guidance_memory;
+    fs_position_law_memory position_memory;
     fs_reference_memory reference_memory;
     fs_controller_memory controller_memory;
+    fs_mixer_law_memory mixing_memory;
     fs_attitude_target last_target; /* of the outer loop's tick before */
     fs_attitude_target target;
     uint16_t is_target_sound; /* 1: it is finite */
@@ -72,6 +79,9 @@ typedef struct fs_loops {
 
 /* Numbers of the default vehicle and gains; the memories as reset at the origin, level. */
 void fs_loops_init(fs_loops *loops);
+
+/* Set the memories of all laws to their initial values. */
+void fs_loops_reset_laws(fs_loops *loops);
 
 /* Forget the past: integrators zero, the reference at the present attitude, at rest. */
 void fs_loops_reset(fs_loops *loops, const fs_vehicle_state *state);

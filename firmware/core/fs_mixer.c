@@ -7,13 +7,24 @@
 
 #include "fs_math.h"
 
+/* mixer.py:275 */
+fs_real fs_relative_rotor_speed(const fs_real rotor_speed_rad_s[FS_MAX_ROTORS], const fs_real spin[FS_MAX_ROTORS],
+                                int32_t rotors)
+{
+    fs_real total = FS_LIT(0.0);
+    for (int32_t i = 0; i < rotors; i++) {
+        total -= spin[i] * rotor_speed_rad_s[i];
+    }
+    return total;
+}
+
 /*
  * Scale the roll-pitch part so that some thrust brings it within the limits; return the scale in [0, 1].
  *
  * Rotor i allows thrusts from (low - b)/a to (high - b)/a, where b is its roll-pitch part and a its Omega^2 per
  * newton. A common thrust exists if no rotor's minimum exceeds another's maximum; a > 0 for any vehicle that hovers.
  *
- * mixer.py:165
+ * mixer.py:166
  */
 static fs_real fit_roll_pitch(fs_real speed_squared[FS_MAX_ROTORS], const fs_mixer *mixer)
 {
@@ -38,7 +49,7 @@ static fs_real fit_roll_pitch(fs_real speed_squared[FS_MAX_ROTORS], const fs_mix
 
 /*
  * Return the thrust nearest to thrust_n that keeps every rotor, with its roll-pitch part, within its limits.
- * mixer.py:186
+ * mixer.py:187
  */
 static fs_real fit_thrust(const fs_real base[FS_MAX_ROTORS], fs_real thrust_n, const fs_mixer *mixer)
 {
@@ -56,7 +67,7 @@ static fs_real fit_thrust(const fs_real base[FS_MAX_ROTORS], fs_real thrust_n, c
     return new_thrust_n;
 }
 
-/* Return the largest k in [0, 1] for which low <= base + k*direction <= high holds for every rotor. mixer.py:153 */
+/* Return the largest k in [0, 1] for which low <= base + k*direction <= high holds for every rotor. mixer.py:154 */
 static fs_real largest_scale(const fs_real base[FS_MAX_ROTORS], const fs_real direction[FS_MAX_ROTORS],
                              const fs_real low[FS_MAX_ROTORS], const fs_real high[FS_MAX_ROTORS], int32_t rotors)
 {
@@ -71,14 +82,14 @@ static fs_real largest_scale(const fs_real base[FS_MAX_ROTORS], const fs_real di
     return scale;
 }
 
-/* mixer.py:147 */
+/* mixer.py:148 */
 static fs_real signed_root(fs_real square)
 {
     const fs_real root = fs_sqrt(fs_abs(square));
     return square >= FS_LIT(0.0) ? root : -root;
 }
 
-/* Mix for rotors that differ, or if effectiveness does not invert allocation. mixer.py:198 */
+/* Mix for rotors that differ, or if effectiveness does not invert allocation. mixer.py:199 */
 static fs_wrench fit(const fs_wrench *wrench, const fs_mixer *mixer, fs_real rotor_speed_rad_s[FS_MAX_ROTORS],
                      fs_real work[3][FS_MAX_ROTORS])
 {
@@ -119,7 +130,7 @@ static fs_wrench fit(const fs_wrench *wrench, const fs_mixer *mixer, fs_real rot
  *
  * Return two flags: no rotor is near a limit; a rotor is at or beyond a limit even without yaw.
  *
- * mixer.py:92
+ * mixer.py:93
  */
 static void allocate(const fs_wrench *wrench, const fs_mixer *mixer, fs_real work[3][FS_MAX_ROTORS],
                      bool *is_free_out, bool *is_thrust_limited_out)
@@ -151,7 +162,7 @@ static void allocate(const fs_wrench *wrench, const fs_mixer *mixer, fs_real wor
  *
  * The rotors with the largest and the smallest part of roll and pitch determine both.
  *
- * mixer.py:112
+ * mixer.py:113
  */
 static void limit_even(fs_real thrust_n, const fs_mixer *mixer, fs_real work[3][FS_MAX_ROTORS], fs_real *scale_out,
                        fs_real *thrust_n_out)
@@ -182,11 +193,11 @@ static void limit_even(fs_real thrust_n, const fs_mixer *mixer, fs_real work[3][
     *thrust_n_out = new_thrust_n;
 }
 
-/* Return the share of yaw, in [0, 1], that fits within the limits. mixer.py:134 */
-static fs_real largest_yaw_scale(const fs_mixer *mixer, fs_real work[3][FS_MAX_ROTORS])
+/* Return the share of yaw, in [0, 1], that fits within the limits. mixer.py:135 */
+static fs_real largest_yaw_scale(const fs_mixer *mixer, const fs_real work[3][FS_MAX_ROTORS])
 {
-    fs_real *turn = work[1];
-    fs_real *lift = work[2];
+    const fs_real *turn = work[1];
+    const fs_real *lift = work[2];
     fs_real scale = FS_LIT(1.0);
     for (int32_t i = 0; i < mixer->rotors; i++) {
         const fs_real room = turn[i] > FS_LIT(0.0) ? mixer->high[i] - lift[i] : lift[i] - mixer->low[i];
@@ -198,7 +209,7 @@ static fs_real largest_yaw_scale(const fs_mixer *mixer, fs_real work[3][FS_MAX_R
     return scale;
 }
 
-/* mixer.py:223 */
+/* mixer.py:224 */
 fs_wrench fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, fs_real rotor_speed_rad_s[FS_MAX_ROTORS],
                  fs_real work[3][FS_MAX_ROTORS])
 {
@@ -218,7 +229,7 @@ fs_wrench fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, fs_real rotor_s
             }
             limit_even(thrust_n, mixer, work, &tilt_scale, &thrust_n);
         }
-        yaw_scale = largest_yaw_scale(mixer, work);
+        yaw_scale = largest_yaw_scale(mixer, (const fs_real(*)[FS_MAX_ROTORS])work);
     }
     for (int32_t i = 0; i < mixer->rotors; i++) {
         rotor_speed_rad_s[i] = signed_root(work[2][i] + yaw_scale * work[1][i]);
@@ -239,13 +250,14 @@ fs_wrench fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, fs_real rotor_s
     };
 }
 
-/* mixer.py:254 */
-fs_real fs_relative_rotor_speed(const fs_real rotor_speed_rad_s[FS_MAX_ROTORS], const fs_real spin[FS_MAX_ROTORS],
-                                int32_t rotors)
+/* mixer.py:255 */
+void fs_allocation_step(const fs_no_memory *memory, const fs_wrench *wrench, const fs_mixer *rotors_,
+                        const fs_no_params *params, fs_real dt_s, fs_real rotor_speed_rad_s[FS_MAX_ROTORS],
+                        fs_real work[3][FS_MAX_ROTORS], fs_no_memory *memory_out, fs_wrench *achieved_out)
 {
-    fs_real total = FS_LIT(0.0);
-    for (int32_t i = 0; i < rotors; i++) {
-        total -= spin[i] * rotor_speed_rad_s[i];
-    }
-    return total;
+    (void)params;
+    (void)dt_s;
+    const fs_wrench achieved = fs_mix(wrench, rotors_, rotor_speed_rad_s, work);
+    *memory_out = *memory;
+    *achieved_out = achieved;
 }

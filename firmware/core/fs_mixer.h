@@ -6,6 +6,7 @@
 #ifndef FS_MIXER_H
 #define FS_MIXER_H
 
+#include "fs_numbers.h"
 #include "fs_types.h"
 
 /* Rotor geometry and limits of n rotors. */
@@ -22,6 +23,10 @@ typedef struct {
     fs_real is_even;
 } fs_mixer;
 
+/* Return Omega_r of the paper: counter-clockwise minus clockwise rotor speeds [rad/s]. mixer.py:275 */
+fs_real fs_relative_rotor_speed(const fs_real rotor_speed_rad_s[FS_MAX_ROTORS], const fs_real spin[FS_MAX_ROTORS],
+                                int32_t rotors);
+
 /*
  * Write the rotor speeds nearest to wrench; return the wrench that they achieve.
  *
@@ -31,13 +36,14 @@ typedef struct {
  *
  * If effectiveness inverts allocation, the achieved wrench follows from the scales without a multiplication.
  *
- * mixer.py:223
+ * mixer.py:224
  */
 fs_wrench fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, fs_real rotor_speed_rad_s[FS_MAX_ROTORS],
                  fs_real work[3][FS_MAX_ROTORS]);
 
-/* Return Omega_r of the paper: counter-clockwise minus clockwise rotor speeds [rad/s]. mixer.py:254 */
-fs_real fs_relative_rotor_speed(const fs_real rotor_speed_rad_s[FS_MAX_ROTORS], const fs_real spin[FS_MAX_ROTORS],
-                                int32_t rotors);
+/* Mix without memory; see mix. mixer.py:255 */
+void fs_allocation_step(const fs_no_memory *memory, const fs_wrench *wrench, const fs_mixer *rotors_,
+                        const fs_no_params *params, fs_real dt_s, fs_real rotor_speed_rad_s[FS_MAX_ROTORS],
+                        fs_real work[3][FS_MAX_ROTORS], fs_no_memory *memory_out, fs_wrench *achieved_out);
 
 #endif

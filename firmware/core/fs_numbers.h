@@ -6,9 +6,47 @@
 
 #define FS_PARAM_COUNT 131U
 
+#define FS_GUIDANCE_LAW_DIRECT 0U
+#define FS_GUIDANCE_LAWS 1U
+
+#define FS_POSITION_LAW_PID 0U
+#define FS_POSITION_LAWS 1U
+
 #define FS_CONTROLLER_PID 0U
 #define FS_CONTROLLER_BACKSTEPPING 1U
 #define FS_CONTROLLERS 2U
+
+#define FS_MIXER_LAW_ALLOCATION 0U
+#define FS_MIXER_LAWS 1U
+
+/* State of the filter: attitude and body rates of the reference. */
+typedef struct {
+    fs_real w;
+    fs_real x;
+    fs_real y;
+    fs_real z;
+    fs_real p_rad_s;
+    fs_real q_rad_s;
+    fs_real r_rad_s;
+} fs_reference_memory;
+
+/* Second-order filter: natural frequency (0: no filter), damping ratio and limits. */
+typedef struct {
+    fs_real bandwidth_rad_s;
+    fs_real damping;
+    fs_real max_rate_rad_s;
+    fs_real max_acceleration_rad_s2;
+} fs_reference_params;
+
+/* Placeholder: a law without state; a memory type needs at least one field. */
+typedef struct {
+    fs_real unused;
+} fs_no_memory;
+
+/* Placeholder: a law without parameters; a type of parameters needs at least one field. */
+typedef struct {
+    fs_real unused;
+} fs_no_params;
 
 /* Integral of the position error, as acceleration [m/s^2], NED. */
 typedef struct {
@@ -32,25 +70,6 @@ typedef struct {
     fs_real max_tilt_rad;
     fs_real max_integral_m_s2;
 } fs_position_params;
-
-/* State of the filter: attitude and body rates of the reference. */
-typedef struct {
-    fs_real w;
-    fs_real x;
-    fs_real y;
-    fs_real z;
-    fs_real p_rad_s;
-    fs_real q_rad_s;
-    fs_real r_rad_s;
-} fs_reference_memory;
-
-/* Second-order filter: natural frequency (0: no filter), damping ratio and limits. */
-typedef struct {
-    fs_real bandwidth_rad_s;
-    fs_real damping;
-    fs_real max_rate_rad_s;
-    fs_real max_acceleration_rad_s2;
-} fs_reference_params;
 
 /* Integral of the attitude error [rad s]. */
 typedef struct {
@@ -98,21 +117,54 @@ typedef struct {
     fs_real rotor_inertia_kg_m2;
 } fs_backstepping_params;
 
-/* Params of every attitude law. */
+/* Params of every law of guidance. */
+typedef struct {
+    fs_no_params direct;
+} fs_guidance_law_params;
+
+/* Memory of every law of guidance. */
+typedef struct {
+    fs_no_memory direct;
+} fs_guidance_law_memory;
+
+/* Params of every law of position. */
+typedef struct {
+    fs_position_params pid;
+} fs_position_law_params;
+
+/* Memory of every law of position. */
+typedef struct {
+    fs_position_memory pid;
+} fs_position_law_memory;
+
+/* Params of every law of attitude. */
 typedef struct {
     fs_pid_params pid;
     fs_backstepping_params backstepping;
 } fs_controller_params;
 
-/* Memory of every attitude law. */
+/* Memory of every law of attitude. */
 typedef struct {
     fs_pid_memory pid;
     fs_backstepping_memory backstepping;
 } fs_controller_memory;
 
+/* Params of every law of mixer. */
+typedef struct {
+    fs_no_params allocation;
+} fs_mixer_law_params;
+
+/* Memory of every law of mixer. */
+typedef struct {
+    fs_no_memory allocation;
+} fs_mixer_law_memory;
+
 /* What several structures are made of, as it was set. */
 typedef struct {
-    fs_real controller; /* index of the attitude law: one of FS_CONTROLLER_* */
+    fs_real guidance; /* indices of the laws */
+    fs_real position;
+    fs_real controller; /* of the attitude law: one of FS_CONTROLLER_* */
+    fs_real mixing;
     fs_real rotors; /* 4 to FS_MAX_ROTORS */
     fs_real inner_hz; /* rate of the inner loop */
     fs_real outer_divisor; /* the outer loop runs in every so many inner ticks */

@@ -56,22 +56,36 @@ static fs_real carried_over(fs_real integral, fs_real old_gain, fs_real new_gain
     return fs_is_finite(carried) ? carried : FS_LIT(0.0);
 }
 
+/* Take over the indices of the laws: a law must not begin with another flight's integrals. */
+static void select_laws(fs_loops *loops)
+{
+    const fs_setup *setup = &loops->setup;
+    fs_loop_rates *rates = &loops->rates;
+    const uint16_t guidance = (uint16_t)setup->guidance, position = (uint16_t)setup->position;
+    const uint16_t controller = (uint16_t)setup->controller, mixing = (uint16_t)setup->mixing;
+
+    if (((guidance ^ rates->guidance) | (position ^ rates->position) | (controller ^ rates->controller) |
+         (mixing ^ rates->mixing)) != 0U) {
+        fs_loops_reset_laws(loops);
+    }
+    rates->guidance = guidance;
+    rates->position = position;
+    rates->controller = controller;
+    rates->mixing = mixing;
+}
+
 /* Make what follows from the setup. */
 static void derive(fs_loops *loops)
 {
     const fs_setup *setup = &loops->setup;
     const fs_real outer_hz = setup->inner_hz / setup->outer_divisor;
-    const uint16_t controller = (uint16_t)setup->controller;
 
-    if (controller != loops->rates.controller) { /* a law must not begin with another flight's integrals */
-        fs_controllers_reset(&loops->controller_memory);
-    }
-    loops->rates.controller = controller;
+    select_laws(loops);
     loops->rates.rotors = (uint16_t)setup->rotors;
     loops->rates.inner_dt_s = FS_LIT(1.0) / setup->inner_hz;
     loops->rates.outer_dt_s = FS_LIT(1.0) / outer_hz;
     loops->rates.fraction_step = outer_hz / setup->inner_hz;
-    loops->position.max_tilt_rad = setup->max_tilt_deg * RADIANS_PER_DEGREE;
+    fs_position_laws_tilt(&loops->position, setup->max_tilt_deg * RADIANS_PER_DEGREE);
     fs_mixer_derive(&loops->mixer, loops->rates.rotors, &loops->resolution);
     loops->controller.pid.ix_kg_m2 = setup->ix_kg_m2;
     loops->controller.pid.iy_kg_m2 = setup->iy_kg_m2;
@@ -85,6 +99,7 @@ uint16_t fs_param_set(fs_loops *loops, uint16_t index, fs_real value)
 {
     fs_real *place = fs_param_place(loops, index), *integral = fs_param_integral(loops, index);
     const fs_param_spec *spec;
+    fs_real before;
 
     if (place == NULL) {
         return FS_PARAM_REFUSED;
@@ -96,10 +111,15 @@ uint16_t fs_param_set(fs_loops *loops, uint16_t index, fs_real value)
     if (spec->is_whole && value != (fs_real)(uint16_t)value) {
         return FS_PARAM_REFUSED;
     }
-    if (integral != NULL && (value < *place || value > *place)) { /* x * gain / gain may differ from x */
-        *integral = carried_over(*integral, *place, value);
-    }
+    before = *place;
     *place = value; /* also 0 in place of -0, which are equal: what is read back shall be what was set */
+    if (!fs_param_is_consistent(loops)) {
+        *place = before;
+        return FS_PARAM_REFUSED;
+    }
+    if (integral != NULL && (value < before || value > before)) { /* x * gain / gain may differ from x */
+        *integral = carried_over(*integral, before, value);
+    }
     derive(loops);
     return FS_PARAM_DONE;
 }

@@ -66,6 +66,26 @@ uint16_t fs_message_kind_of(uint32_t id, fs_message_kind *kind)
         kind->length = FS_PIL_IDENTITY_LENGTH;
         kind->crc_extra = 240U;
         break;
+    case FS_PIL_TICK_ID:
+        kind->length = FS_PIL_TICK_LENGTH;
+        kind->crc_extra = 185U;
+        break;
+    case FS_PIL_OUTPUT_ID:
+        kind->length = FS_PIL_OUTPUT_LENGTH;
+        kind->crc_extra = 152U;
+        break;
+    case FS_PIL_STATE_ID:
+        kind->length = FS_PIL_STATE_LENGTH;
+        kind->crc_extra = 83U;
+        break;
+    case FS_PIL_DRIVE_ID:
+        kind->length = FS_PIL_DRIVE_LENGTH;
+        kind->crc_extra = 159U;
+        break;
+    case FS_PIL_TIMING_ID:
+        kind->length = FS_PIL_TIMING_LENGTH;
+        kind->crc_extra = 5U;
+        break;
     default:
         known = 0U;
         break;
@@ -390,6 +410,10 @@ uint16_t fs_pil_identity_encode(const fs_pil_identity *m, fs_octet *payload)
     fs_put_octet(&payload[14], m->char_bits);
     fs_put_octets(&payload[15], m->board, 24U);
     fs_put_octets(&payload[39], m->compiler, 48U);
+    fs_put_octet(&payload[87], m->protocol);
+    fs_put_octet(&payload[88], m->window);
+    fs_put_u32(&payload[89], m->baud);
+    fs_put_u32(&payload[93], m->clock_overhead);
     return fs_trimmed(payload, FS_PIL_IDENTITY_LENGTH);
 }
 
@@ -402,4 +426,111 @@ void fs_pil_identity_decode(const fs_octet *payload, uint16_t length, fs_pil_ide
     m->char_bits = fs_get_octet(payload, length, 14U);
     fs_get_octets(payload, length, 15U, m->board, 24U);
     fs_get_octets(payload, length, 39U, m->compiler, 48U);
+    m->protocol = fs_get_octet(payload, length, 87U);
+    m->window = fs_get_octet(payload, length, 88U);
+    m->baud = fs_get_u32(payload, length, 89U);
+    m->clock_overhead = fs_get_u32(payload, length, 93U);
+}
+
+uint16_t fs_pil_tick_encode(const fs_pil_tick *m, fs_octet *payload)
+{
+    fs_put_u32(&payload[0], m->step);
+    fs_put_u32(&payload[4], m->flags);
+    fs_put_floats(&payload[8], m->values, 24U);
+    return fs_trimmed(payload, FS_PIL_TICK_LENGTH);
+}
+
+void fs_pil_tick_decode(const fs_octet *payload, uint16_t length, fs_pil_tick *m)
+{
+    m->step = fs_get_u32(payload, length, 0U);
+    m->flags = fs_get_u32(payload, length, 4U);
+    fs_get_floats(payload, length, 8U, m->values, 24U);
+}
+
+uint16_t fs_pil_output_encode(const fs_pil_output *m, fs_octet *payload)
+{
+    fs_put_u32(&payload[0], m->step);
+    fs_put_u32(&payload[4], m->status);
+    fs_put_u32(&payload[8], m->cycles);
+    fs_put_floats(&payload[12], m->values, 17U);
+    return fs_trimmed(payload, FS_PIL_OUTPUT_LENGTH);
+}
+
+void fs_pil_output_decode(const fs_octet *payload, uint16_t length, fs_pil_output *m)
+{
+    m->step = fs_get_u32(payload, length, 0U);
+    m->status = fs_get_u32(payload, length, 4U);
+    m->cycles = fs_get_u32(payload, length, 8U);
+    fs_get_floats(payload, length, 12U, m->values, 17U);
+}
+
+uint16_t fs_pil_state_encode(const fs_pil_state *m, fs_octet *payload)
+{
+    fs_put_u32(&payload[0], m->time_us);
+    fs_put_u32(&payload[4], m->flags);
+    fs_put_floats(&payload[8], m->state, 13U);
+    fs_put_floats(&payload[60], m->setpoint, 11U);
+    return fs_trimmed(payload, FS_PIL_STATE_LENGTH);
+}
+
+void fs_pil_state_decode(const fs_octet *payload, uint16_t length, fs_pil_state *m)
+{
+    m->time_us = fs_get_u32(payload, length, 0U);
+    m->flags = fs_get_u32(payload, length, 4U);
+    fs_get_floats(payload, length, 8U, m->state, 13U);
+    fs_get_floats(payload, length, 60U, m->setpoint, 11U);
+}
+
+uint16_t fs_pil_drive_encode(const fs_pil_drive *m, fs_octet *payload)
+{
+    fs_put_u32(&payload[0], m->state_time_us);
+    fs_put_u32(&payload[4], m->status);
+    fs_put_u32(&payload[8], m->age_us);
+    fs_put_u32(&payload[12], m->late_us);
+    fs_put_floats(&payload[16], m->rotor_command, 8U);
+    return fs_trimmed(payload, FS_PIL_DRIVE_LENGTH);
+}
+
+void fs_pil_drive_decode(const fs_octet *payload, uint16_t length, fs_pil_drive *m)
+{
+    m->state_time_us = fs_get_u32(payload, length, 0U);
+    m->status = fs_get_u32(payload, length, 4U);
+    m->age_us = fs_get_u32(payload, length, 8U);
+    m->late_us = fs_get_u32(payload, length, 12U);
+    fs_get_floats(payload, length, 16U, m->rotor_command, 8U);
+}
+
+uint16_t fs_pil_timing_encode(const fs_pil_timing *m, fs_octet *payload)
+{
+    fs_put_u32(&payload[0], m->ticks);
+    fs_put_u32(&payload[4], m->missed);
+    fs_put_u32(&payload[8], m->overruns);
+    fs_put_u32(&payload[12], m->states);
+    fs_put_u32(&payload[16], m->skipped);
+    fs_put_u32(&payload[20], m->held);
+    fs_put_u32(&payload[24], m->timeouts);
+    fs_put_u32(&payload[28], m->period_us);
+    fs_put_u32(&payload[32], m->late_max_us);
+    fs_put_u32(&payload[36], m->age_max_us);
+    fs_put_u32(&payload[40], m->cost_max);
+    fs_put_float(&payload[44], m->late_mean_us);
+    fs_put_float(&payload[48], m->age_mean_us);
+    return fs_trimmed(payload, FS_PIL_TIMING_LENGTH);
+}
+
+void fs_pil_timing_decode(const fs_octet *payload, uint16_t length, fs_pil_timing *m)
+{
+    m->ticks = fs_get_u32(payload, length, 0U);
+    m->missed = fs_get_u32(payload, length, 4U);
+    m->overruns = fs_get_u32(payload, length, 8U);
+    m->states = fs_get_u32(payload, length, 12U);
+    m->skipped = fs_get_u32(payload, length, 16U);
+    m->held = fs_get_u32(payload, length, 20U);
+    m->timeouts = fs_get_u32(payload, length, 24U);
+    m->period_us = fs_get_u32(payload, length, 28U);
+    m->late_max_us = fs_get_u32(payload, length, 32U);
+    m->age_max_us = fs_get_u32(payload, length, 36U);
+    m->cost_max = fs_get_u32(payload, length, 40U);
+    m->late_mean_us = fs_get_float(payload, length, 44U);
+    m->age_mean_us = fs_get_float(payload, length, 48U);
 }

@@ -227,7 +227,7 @@ void fs_pil_status_decode(const fs_octet *payload, uint16_t length, fs_pil_statu
 
 /* FS_PIL_IDENTITY */
 #define FS_PIL_IDENTITY_ID 53013U
-#define FS_PIL_IDENTITY_LENGTH 87U
+#define FS_PIL_IDENTITY_LENGTH 97U
 typedef struct {
     uint32_t clock_hz; /* Hz */
     fs_octet source_hash[8];
@@ -236,8 +236,81 @@ typedef struct {
     fs_octet char_bits;
     fs_octet board[24];
     fs_octet compiler[48];
+    fs_octet protocol;
+    fs_octet window;
+    uint32_t baud; /* Bd */
+    uint32_t clock_overhead;
 } fs_pil_identity;
 uint16_t fs_pil_identity_encode(const fs_pil_identity *m, fs_octet *payload);
 void fs_pil_identity_decode(const fs_octet *payload, uint16_t length, fs_pil_identity *m);
+
+/* FS_PIL_TICK */
+#define FS_PIL_TICK_ID 53014U
+#define FS_PIL_TICK_LENGTH 104U
+typedef struct {
+    uint32_t step;
+    uint32_t flags;
+    float values[24];
+} fs_pil_tick;
+uint16_t fs_pil_tick_encode(const fs_pil_tick *m, fs_octet *payload);
+void fs_pil_tick_decode(const fs_octet *payload, uint16_t length, fs_pil_tick *m);
+
+/* FS_PIL_OUTPUT */
+#define FS_PIL_OUTPUT_ID 53015U
+#define FS_PIL_OUTPUT_LENGTH 80U
+typedef struct {
+    uint32_t step;
+    uint32_t status;
+    uint32_t cycles;
+    float values[17];
+} fs_pil_output;
+uint16_t fs_pil_output_encode(const fs_pil_output *m, fs_octet *payload);
+void fs_pil_output_decode(const fs_octet *payload, uint16_t length, fs_pil_output *m);
+
+/* FS_PIL_STATE */
+#define FS_PIL_STATE_ID 53016U
+#define FS_PIL_STATE_LENGTH 104U
+typedef struct {
+    uint32_t time_us; /* us */
+    uint32_t flags;
+    float state[13];
+    float setpoint[11];
+} fs_pil_state;
+uint16_t fs_pil_state_encode(const fs_pil_state *m, fs_octet *payload);
+void fs_pil_state_decode(const fs_octet *payload, uint16_t length, fs_pil_state *m);
+
+/* FS_PIL_DRIVE */
+#define FS_PIL_DRIVE_ID 53017U
+#define FS_PIL_DRIVE_LENGTH 48U
+typedef struct {
+    uint32_t state_time_us; /* us */
+    uint32_t status;
+    uint32_t age_us; /* us */
+    uint32_t late_us; /* us */
+    float rotor_command[8];
+} fs_pil_drive;
+uint16_t fs_pil_drive_encode(const fs_pil_drive *m, fs_octet *payload);
+void fs_pil_drive_decode(const fs_octet *payload, uint16_t length, fs_pil_drive *m);
+
+/* FS_PIL_TIMING */
+#define FS_PIL_TIMING_ID 53018U
+#define FS_PIL_TIMING_LENGTH 52U
+typedef struct {
+    uint32_t ticks;
+    uint32_t missed;
+    uint32_t overruns;
+    uint32_t states;
+    uint32_t skipped;
+    uint32_t held;
+    uint32_t timeouts;
+    uint32_t period_us; /* us */
+    uint32_t late_max_us; /* us */
+    uint32_t age_max_us; /* us */
+    uint32_t cost_max;
+    float late_mean_us; /* us */
+    float age_mean_us; /* us */
+} fs_pil_timing;
+uint16_t fs_pil_timing_encode(const fs_pil_timing *m, fs_octet *payload);
+void fs_pil_timing_decode(const fs_octet *payload, uint16_t length, fs_pil_timing *m);
 
 #endif

@@ -46,6 +46,11 @@ MESSAGES = (
     "FS_PIL_REPORT",
     "FS_PIL_STATUS",
     "FS_PIL_IDENTITY",
+    "FS_PIL_TICK",
+    "FS_PIL_OUTPUT",
+    "FS_PIL_STATE",
+    "FS_PIL_DRIVE",
+    "FS_PIL_TIMING",
 )
 """What a target speaks. The parser passes over every other message."""
 
@@ -78,6 +83,8 @@ SINGLE_ENTRIES = (
     "MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST",
     "MAV_CMD_REQUEST_MESSAGE",
     "MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN",
+    "MAV_CMD_FS_SET_BAUD_RATE",
+    "MAV_CMD_FS_FREE_RUN",
 )
 """Values wanted out of large enumerations."""
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from flightstack.control.controller import BUILT_IN
 from flightstack.firmware.generator.core_files import core_files
-from flightstack.firmware.numbers import CONTROLLERS
 from tools.generated import ROOT, write_or_check
 
 CORE = ROOT / "firmware" / "core"
@@ -17,7 +17,7 @@ CORE = ROOT / "firmware" / "core"
 
 def files() -> dict[Path, str]:
     """Return the text of every generated file."""
-    return {CORE / name: text for name, text in core_files(CONTROLLERS).items()}
+    return {CORE / name: text for name, text in core_files(BUILT_IN).items()}
 
 
 if __name__ == "__main__":

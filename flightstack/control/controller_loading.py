@@ -1,4 +1,4 @@
-"""Load installed attitude controllers, and report in one sentence why one cannot be used."""
+"""Load installed controllers, and report in one sentence why one cannot be used."""
 
 from __future__ import annotations
 
@@ -7,7 +7,16 @@ from importlib.metadata import EntryPoint, entry_points
 
 import numpy as np
 
-from flightstack.control.attitude_controller import AttitudeController
+from flightstack.control.control_law import ControlLaw, CStep
+from flightstack.control.controller import (
+    BUILT_IN,
+    POSITION,
+    TILT_FIELD,
+    Controller,
+    controller_of,
+    is_built_in,
+)
+from flightstack.control.position_pid import POSITION_PID
 from flightstack.core.contract import FloatArray
 from flightstack.core.errors import ConfigError
 from flightstack.params.toml_file import Table
@@ -20,7 +29,7 @@ _LONGEST_REASON = 160
 
 
 def controller_names() -> list[str]:
-    """Return the names of the installed attitude controllers."""
+    """Return the names of the installed controllers."""
     return sorted({point.name for point in entry_points(group=ENTRY_POINT_GROUP)})
 
 
@@ -29,8 +38,8 @@ def controller_error(name: str, problem: str) -> ConfigError:
     return ConfigError("--controller", name, f"{problem}; installed are {', '.join(controller_names())}")
 
 
-def load_controller(name: str) -> AttitudeController:
-    """Return the installed attitude controller ``name``; raise ConfigError if it is missing or broken."""
+def load_controller(name: str) -> Controller:
+    """Return the installed controller ``name``; raise ConfigError if it is missing or broken."""
     points = list(entry_points(group=ENTRY_POINT_GROUP, name=name))
     if not points:
         raise controller_error(name, "there is no such attitude controller")
@@ -44,35 +53,49 @@ def load_controller(name: str) -> AttitudeController:
     problem = form_problem(name, controller)
     if problem is not None:
         raise controller_error(name, f"{points[0].value} {problem}")
-    assert isinstance(controller, AttitudeController)
-    return controller
+    return controller_of(controller)
 
 
 def _owner(point: EntryPoint) -> str:
     return point.value if point.dist is None else point.dist.name
 
 
-def form_problem(name: str, controller: object) -> str | None:
-    """Return why ``controller`` cannot be used as the controller ``name``, as the end of a sentence, or None."""
-    if not isinstance(controller, AttitudeController):
-        return "is not an AttitudeController"
-    if controller.name != name:
-        return f"calls itself {controller.name!r}, and must bear the name of its entry point"
-    fields, initial = len(getattr(controller.memory_type, "_fields", ())), len(controller.initial_memory)
+def form_problem(name: str, given: object) -> str | None:
+    """Return why ``given`` cannot be used as the controller ``name``, as the end of a sentence, or None."""
+    if not isinstance(given, Controller | ControlLaw):
+        return "is neither a Controller nor an AttitudeController"
+    if given.name != name:
+        return f"calls itself {given.name!r}, and must bear the name of its entry point"
+    controller = controller_of(given)
+    for role, law in controller.laws.items():
+        problem = _law_problem(role, law)
+        if problem is not None:
+            return problem if isinstance(given, ControlLaw) else f"has a law of {role} that {problem}"
+    names = [tunable.name for role, law in controller.laws.items() for tunable in law_tunables(role, law)]
+    double = next((item for item in names if names.count(item) > 1), None)
+    return None if double is None else f"declares the parameter {double} in two laws"
+
+
+def _law_problem(role: str, law: object) -> str | None:
+    if not isinstance(law, ControlLaw):
+        return "is not a ControlLaw"
+    if is_built_in(role, law) and law.step not in [known.step for known in BUILT_IN[role]]:
+        return f"needs another name than {law.name!r}, which is that of a built-in law"
+    fields, initial = len(fields_of(law.memory_type)), len(law.initial_memory)
     if fields != initial or not fields:
         return f"has {initial} initial values for the {fields} fields of its memory (one at least)"
-    if not getattr(controller.params_type, "_fields", ()):
+    if not fields_of(law.params_type):
         return "has no parameters: params_type must be a NamedTuple of one float at least"
-    return _tunables_problem(controller)
+    return _tunables_problem(law)
 
 
-def _tunables_problem(controller: AttitudeController) -> str | None:
-    tunables: object = controller.tunables
+def _tunables_problem(law: ControlLaw) -> str | None:
+    tunables: object = law.tunables
     if tunables is None:
         return None
     if not isinstance(tunables, tuple) or not all(isinstance(item, Tunable) for item in tunables):
         return "must declare its parameters as a tuple of Tunable"
-    return declaration_problem(tunables, fields_of(controller.params_type), fields_of(controller.memory_type))
+    return declaration_problem(tunables, fields_of(law.params_type), fields_of(law.memory_type))
 
 
 def fields_of(kind: type) -> tuple[str, ...]:
@@ -81,26 +104,37 @@ def fields_of(kind: type) -> tuple[str, ...]:
     return names
 
 
-def controller_tunables(controller: AttitudeController) -> tuple[Tunable, ...]:
-    """Return the declarations of the controller's parameters, derived from its fields if it has none."""
-    if controller.tunables is not None:
-        return controller.tunables
-    return undeclared(controller.name, fields_of(controller.params_type))
+def law_tunables(role: str, law: ControlLaw) -> tuple[Tunable, ...]:
+    """Return the declarations of a law's parameters, derived from its fields if it has none."""
+    if law.tunables is not None:
+        return law.tunables
+    fields = fields_of(law.params_type)
+    return undeclared(law.name, [field for field in fields if (role, field) != (POSITION, TILT_FIELD)])
 
 
-def controller_params(controller: AttitudeController, vehicle: Vehicle, gains: Table) -> FloatArray:
-    """Return the controller's parameters for a vehicle, from its table of the gains file; raise ConfigError."""
-    table = gains.optional_table(f"attitude_{controller.name}")
+def law_params(role: str, law: ControlLaw, vehicle: Vehicle, gains: Table) -> FloatArray:
+    """Return a law's parameters for a vehicle, from its table of the gains file; raise ConfigError."""
+    table = gains if law is POSITION_PID else gains.optional_table(f"{role}_{law.name}")
     try:
-        values = np.array(controller.read_params(vehicle, table), dtype=np.float64)
+        values = np.array(law.read_params(vehicle, table), dtype=np.float64)
     except ConfigError:
         raise
     except Exception as error:
-        raise controller_error(controller.name, f"its parameters cannot be read: {_reason(error)}") from error
-    count = len(controller.params_type._fields)  # type: ignore[attr-defined]  # checked when it was loaded
+        raise controller_error(law.name, f"its parameters cannot be read: {_reason(error)}") from error
+    count = len(fields_of(law.params_type))
     if values.shape != (count,) or not np.isfinite(values).all():
-        raise controller_error(controller.name, f"its read_params must return {count} finite numbers")
+        raise controller_error(law.name, f"its read_params must return {count} finite numbers")
     return values
+
+
+def check_python(controller: Controller) -> None:
+    """Raise ConfigError if a law of the controller is written in C: the loops in Python cannot fly it."""
+    for role, law in controller.laws.items():
+        if isinstance(law.step, CStep):
+            problem = (
+                f"its law of {role} is written in C: fly it with --loops c, host, emulated or serial:DEVICE"
+            )
+            raise ConfigError("--controller", controller.name, problem)
 
 
 def compile_error(name: str, error: Exception) -> ConfigError:

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from flightstack.control.attitude_controller import AttitudeController
 from flightstack.control.attitude_reference import (
     REFERENCE_TUNABLES,
     ReferenceParams,
     read_reference_params,
 )
-from flightstack.control.controller_loading import controller_params, controller_tunables, fields_of
-from flightstack.control.position_pid import POSITION_TUNABLES, PositionParams, read_position_params
+from flightstack.control.controller import (
+    ATTITUDE,
+    GUIDANCE,
+    MIXER,
+    POSITION,
+    TILT_FIELD,
+    AnyController,
+    controller_of,
+)
+from flightstack.control.controller_loading import fields_of, law_params, law_tunables
 from flightstack.core.contract import FloatArray
 from flightstack.params.behaviour import SPECS
 from flightstack.params.spec import ParamSpec
@@ -25,37 +32,71 @@ from flightstack.params.vehicle import Vehicle
 
 TILT = "MPC_TILTMAX_AIR"
 """The only parameter of the loops that is also a field of ``Behaviour``; degrees, radians in the kernels."""
-TILT_AT = PositionParams._fields.index("max_tilt_rad")
+
+
+LawValues: TypeAlias = Mapping[str, Mapping[str, float]]
+"""Parameters of laws, by role and field."""
+NOT_GIVEN: LawValues = {}
 
 
 class LoopNumbers(NamedTuple):
     """Parameter arrays that the kernels read, and the declarations of the parameters."""
 
-    position: FloatArray
+    laws: dict[str, FloatArray]
+    """Parameters of the laws, by role."""
     reference: FloatArray
-    controller: FloatArray
+    max_tilt_rad: float
     specs: tuple[ParamSpec, ...]
     """Declarations of all parameters, with defaults from vehicle and gains file."""
 
 
 def loop_numbers(
-    vehicle: Vehicle, controller: AttitudeController, gains: Table, max_tilt_rad: float
+    vehicle: Vehicle,
+    controller: AnyController,
+    gains: Table,
+    max_tilt_rad: float,
+    given: LawValues = NOT_GIVEN,
 ) -> LoopNumbers:
     """Read and declare the loops' parameters from vehicle and gains file; raise ConfigError.
 
-    All backends use these values: loops on a target receive them at their start.
+    ``given`` replaces those of some laws. All backends use these values: loops on a target receive them at their start.
     """
-    position = read_position_params(vehicle, gains, max_tilt_rad)
+    controller = controller_of(controller)
+    values = {
+        role: np.array(list(given[role].values())) if role in given else law_params(role, law, vehicle, gains)
+        for role, law in controller.laws.items()
+    }
+    position_fields = fields_of(controller.position.params_type)
+    if TILT_FIELD in position_fields:
+        values[POSITION][position_fields.index(TILT_FIELD)] = max_tilt_rad
     reference = read_reference_params(gains)
-    values = controller_params(controller, vehicle, gains)
-    by_field = dict(zip(fields_of(controller.params_type), values.tolist(), strict=True))
-    specs = [
-        *_specs(POSITION_TUNABLES, position._asdict(), "Position Loop"),
-        *_specs(REFERENCE_TUNABLES, reference._asdict(), "Attitude Reference"),
-        *_specs(controller_tunables(controller), by_field, f"Attitude Controller {controller.name}"),
-        SPECS[TILT],
-    ]
-    return LoopNumbers(np.array(position), np.array(reference), values, tuple(specs))
+    groups = {
+        POSITION: "Position Loop",
+        GUIDANCE: "Guidance Law",
+        ATTITUDE: f"Attitude Controller {controller.attitude.name}",
+        MIXER: "Mixer",
+    }
+    specs = {
+        role: _specs(
+            law_tunables(role, law),
+            dict(zip(fields_of(law.params_type), values[role].tolist(), strict=True)),
+            groups[role],
+        )
+        for role, law in controller.laws.items()
+    }
+    of_reference = _specs(REFERENCE_TUNABLES, reference._asdict(), "Attitude Reference")
+    every = (
+        *specs[GUIDANCE], *specs[POSITION], *of_reference, *specs[ATTITUDE], *specs[MIXER], SPECS[TILT]
+    )  # fmt: skip
+    return LoopNumbers(values, np.array(reference), max_tilt_rad, every)
+
+
+def own_values(numbers: LoopNumbers, controller: AnyController) -> dict[str, dict[str, float]]:
+    """Return all parameters of the laws that are not built-in, by role and field."""
+    return {
+        role: dict(zip(fields_of(law.params_type), numbers.laws[role].tolist(), strict=True))
+        for role, law in controller_of(controller).own_laws.items()
+    }
 
 
 def _specs(tunables: Sequence[Tunable], values: dict[str, float], group: str) -> list[ParamSpec]:
@@ -81,21 +122,22 @@ class _Slot(NamedTuple):
 class LoopParameters:
     """Gets and sets parameters of running loops by name."""
 
-    def __init__(self, numbers: LoopNumbers, controller: AttitudeController, memory: FloatArray) -> None:
-        """Take the arrays that the kernels read, and the controller's ``memory``; both are written in place."""
+    def __init__(
+        self, numbers: LoopNumbers, controller: AnyController, memories: Mapping[str, FloatArray]
+    ) -> None:
+        """Take the arrays that the kernels read, and the laws' memories by role; both are written in place."""
         self.specs = numbers.specs
-        self._slots = {TILT: _Slot(numbers.position, TILT_AT)}
-        self._add(POSITION_TUNABLES, PositionParams._fields, numbers.position)
-        self._add(REFERENCE_TUNABLES, ReferenceParams._fields, numbers.reference)
-        fields, memory_fields = fields_of(controller.params_type), list(fields_of(controller.memory_type))
-        for tunable in controller_tunables(controller):
-            at = memory_fields.index(tunable.integrates) if tunable.integrates else None
-            integral = None if at is None else memory[at : at + 1]
-            self._slots[tunable.name] = _Slot(numbers.controller, fields.index(tunable.field), integral)
-
-    def _add(self, tunables: Sequence[Tunable], fields: Sequence[str], values: FloatArray) -> None:
-        for tunable in tunables:
-            self._slots[tunable.name] = _Slot(values, fields.index(tunable.field))
+        self._slots = {TILT: _Slot(np.array([numbers.max_tilt_rad]), 0)}
+        for tunable in REFERENCE_TUNABLES:
+            self._slots[tunable.name] = _Slot(numbers.reference, ReferenceParams._fields.index(tunable.field))
+        for role, law in controller_of(controller).laws.items():
+            values, fields = numbers.laws[role], fields_of(law.params_type)
+            for tunable in law_tunables(role, law):
+                at = fields_of(law.memory_type).index(tunable.integrates) if tunable.integrates else None
+                integral = None if at is None else memories[role][at : at + 1]
+                self._slots[tunable.name] = _Slot(values, fields.index(tunable.field), integral)
+            if role == POSITION and TILT_FIELD in fields:
+                self._slots[TILT] = _Slot(values, fields.index(TILT_FIELD))
 
     def get(self, name: str) -> float:
         """Return a parameter's value; raise KeyError for an unknown name."""

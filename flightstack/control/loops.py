@@ -1,260 +1,61 @@
-"""Control loops in Python: outer kernel, inner kernel, and the backend that runs them."""
+"""Control loops in Python: the backend that runs the kernels."""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numba
 import numpy as np
 
-from flightstack.control.attitude_controller import AttitudeController, AttitudeInputs
-from flightstack.control.attitude_reference import (
-    ReferenceMemory,
-    ReferenceParams,
-    attitude_reference_step,
-    in_body_frame,
-)
 from flightstack.control.backend import IdleRow
-from flightstack.control.controller_loading import compile_error
+from flightstack.control.control_law import ControlLaw
+from flightstack.control.controller import (
+    ATTITUDE,
+    GUIDANCE,
+    MIXER,
+    POSITION,
+    AnyController,
+    Controller,
+    controller_of,
+    is_built_in,
+)
+from flightstack.control.controller_loading import check_python, compile_error, fields_of
+from flightstack.control.loop_kernels import BOUND_NAMES, inner_kernel, inner_layout, outer_kernel
 from flightstack.control.loop_parameters import LoopParameters, loop_numbers
-from flightstack.control.mixer import WORK_ROWS, Mixer, mix, mixer_for, relative_rotor_speed
-from flightstack.control.position_pid import (
-    PositionMemory,
-    PositionParams,
-    position_pid_step,
-)
-from flightstack.core.array_items import as_tuple, store
-from flightstack.core.arrays import (
-    achieved_wrench,
-    attitude_target,
-    commanded_wrench,
-    position_setpoint,
-    store_attitude_target,
-    store_status,
-    store_wrenches,
-    vehicle_state,
-)
-from flightstack.core.compiled import compiled, direct, specialise
-from flightstack.core.contract import (
-    ATTITUDE_TARGET_SIZE,
-    MAX_ROTORS,
-    SETPOINT_SIZE,
-    AttitudeReference,
-    FloatArray,
-    LoopRow,
-    LoopStatus,
-    RecordArray,
-    Vector3,
-    Wrench,
-)
-from flightstack.core.geometry import blend, conjugate, quaternion_product, rotation_vector
-from flightstack.core.portable_math import LARGEST_ANGLE_RAD
+from flightstack.control.mixer import mixer_for
+from flightstack.core.compiled import direct, specialise
+from flightstack.core.contract import MAX_ROTORS, SETPOINT_SIZE, FloatArray, LoopRow, RecordArray
 from flightstack.params.toml_file import Table
 from flightstack.params.vehicle import Vehicle
 
-POSITION_MEMORY_SIZE = 3
-POSITION_PARAMS_SIZE = 12
-REFERENCE_MEMORY_SIZE = 7
-REFERENCE_PARAMS_SIZE = 4
 
-REFERENCE_AT = LoopRow.REFERENCE_ATTITUDE.start
-COMMAND_AT = LoopRow.ROTOR_COMMAND.start
-SPEED_AT = LoopRow.ROTOR_SPEED.start
-INPUT_NOT_FINITE = LoopStatus.INPUT_NOT_FINITE
-OUTPUT_NOT_FINITE = LoopStatus.OUTPUT_NOT_FINITE
-
-# bound by ``specialise`` to the selected controller
-controller_step: Any = None
-ControllerMemory: Any = None
-ControllerParams: Any = None
-CONTROLLER_MEMORY_SIZE = 0
-CONTROLLER_PARAMS_SIZE = 0
+def bound_to(
+    template: Callable[..., Any], laws: Mapping[str, ControlLaw], **names: Any
+) -> Callable[..., Any]:
+    """Return a kernel compiled with these laws, and with ``names`` that depend on the laws alone."""
+    for role, law in laws.items():
+        step, memory, params, size = BOUND_NAMES[role]
+        names |= {step: law.step, memory: law.memory_type, params: law.params_type}
+        names |= {f"{size}_MEMORY_SIZE": len(law.initial_memory)}
+        names |= {f"{size}_PARAMS_SIZE": len(fields_of(law.params_type))}
+    chosen = [law.key for role, law in laws.items() if role == ATTITUDE or not is_built_in(role, law)]
+    return specialise(template, "_".join(chosen), **names)
 
 
-@compiled
-def all_finite(values: FloatArray | tuple[float, ...]) -> bool:
-    """Return True if all values of an array or a flat tuple are finite."""
-    for value in values:  # noqa: SIM110  # compiled code has no generators
-        if not math.isfinite(value):
-            return False
-    return True
+def outer_kernel_of(controller: Controller) -> Callable[..., Any]:
+    """Return the outer kernel with the controller's laws; the shared one for the built-in laws."""
+    outer = (GUIDANCE, POSITION)
+    if not controller.own_laws.keys() & set(outer):
+        return outer_kernel
+    template = getattr(outer_kernel, "py_func", outer_kernel)
+    return bound_to(template, {role: controller.laws[role] for role in outer})
 
 
-@compiled
-def outer_kernel(
-    state: FloatArray,
-    setpoint: FloatArray,
-    memory: FloatArray,
-    params: FloatArray,
-    last: FloatArray,
-    dt_s: float,
-    target: FloatArray,
-) -> None:
-    """Run the position loop: update ``memory`` (3,) and ``target`` (5,).
-
-    Both are unchanged if a number is not finite, or if the yaw setpoint is beyond ±10⁴ rad, the limit of ``sin_cos``.
-    ``last`` (48,) is the inner loop's row of the previous tick, which shows saturation of the mixer.
-    """
-    desired = position_setpoint(setpoint)
-    if not (all_finite(state) and all_finite(setpoint) and abs(desired.yaw_rad) <= LARGEST_ANGLE_RAD):
-        return
-    advanced, new_target = position_pid_step(
-        PositionMemory(*as_tuple(memory, POSITION_MEMORY_SIZE)),
-        vehicle_state(state),
-        desired,
-        PositionParams(*as_tuple(params, POSITION_PARAMS_SIZE)),
-        dt_s,
-        _saturation_direction(commanded_wrench(last).thrust_n, achieved_wrench(last).thrust_n, 1e-9),
-    )
-    if not (all_finite(new_target.attitude) and math.isfinite(new_target.thrust_n)):
-        return
-    store(memory, advanced)
-    store_attitude_target(target, new_target)
-
-
-@compiled
-def _saturation_direction(demanded: float, achieved: float, resolution: float) -> float:
-    """Return the direction of saturation: −1, 0 or +1."""
-    if demanded - achieved > resolution:
-        return 1.0
-    if achieved - demanded > resolution:
-        return -1.0
-    return 0.0
-
-
-@compiled
-def _store_reference(row: FloatArray, reference: AttitudeReference) -> None:
-    store(row[REFERENCE_AT:], reference.attitude)
-    store(row[REFERENCE_AT + 4 :], reference.rates_frd_rad_s)
-    store(row[REFERENCE_AT + 7 :], reference.acceleration_frd_rad_s2)
-
-
-@compiled
-def _is_finite(v: Vector3) -> bool:
-    return math.isfinite(v.x) and math.isfinite(v.y) and math.isfinite(v.z)
-
-
-@compiled
-def _saturation(row: FloatArray) -> Vector3:
-    """Return the saturation of each axis in ``row``."""
-    commanded, achieved = commanded_wrench(row).torque_frd_n_m, achieved_wrench(row).torque_frd_n_m
-    return Vector3(
-        _saturation_direction(commanded.x, achieved.x, 1e-9),
-        _saturation_direction(commanded.y, achieved.y, 1e-9),
-        _saturation_direction(commanded.z, achieved.z, 1e-9),
-    )
-
-
-@compiled
-def _status(row: FloatArray) -> int:
-    s = _saturation(row)
-    thrust = _saturation_direction(commanded_wrench(row).thrust_n, achieved_wrench(row).thrust_n, 1e-9)
-    return 2 * int(s.x != 0.0) + 4 * int(s.y != 0.0) + 8 * int(s.z != 0.0) + 16 * int(thrust != 0.0)
-
-
-def inner_layout(rotors: int, controller_memory: int, controller_params: int) -> np.dtype[np.void]:
-    """Return the layout of the inner loop's memory: one record, because each array argument costs time."""
-    return np.dtype(
-        [
-            # state
-            ("last_target", "f8", (ATTITUDE_TARGET_SIZE,)),
-            ("target", "f8", (ATTITUDE_TARGET_SIZE,)),
-            ("reference", "f8", (REFERENCE_MEMORY_SIZE,)),
-            ("controller", "f8", (controller_memory,)),
-            ("last", "f8", (LoopRow.SIZE,)),
-            ("work", "f8", (WORK_ROWS, rotors)),
-            # parameters
-            ("dt_s", "f8"),
-            ("reference_params", "f8", (REFERENCE_PARAMS_SIZE,)),
-            ("controller_params", "f8", (controller_params,)),
-            ("allocation", "f8", (rotors, 4)),
-            ("effectiveness", "f8", (4, rotors)),
-            ("low", "f8", (rotors,)),
-            ("high", "f8", (rotors,)),
-            ("spin", "f8", (rotors,)),
-            ("middle", "f8", (rotors,)),
-            ("reach", "f8", (rotors,)),
-            ("is_inverse", "f8"),
-            ("is_even", "f8"),
-        ]
-    )
-
-
-def inner_kernel(
-    state: FloatArray,
-    fraction: float,
-    rotor_speed_rad_s: FloatArray,
-    memory: RecordArray,
-    row: FloatArray,
-) -> None:
-    """Run reference filter, attitude controller and mixer; write ``row`` (48,) and update ``memory`` (1,).
-
-    ``memory`` has the layout of ``inner_layout``. Its ``last`` is the row of the previous tick: it provides saturation
-    and Ω_r, and is repeated with a status bit if an input or a result is not finite. The target is interpolated from
-    ``last_target`` (previous outer tick) to ``target``; ``fraction`` is the elapsed part of the outer period. Without
-    interpolation, steps of the target would excite the rotors at the outer rate.
-
-    ``specialise`` binds the controller to this template, and to it alone. It is one long function because the values of
-    the controller's types stay inside: the cache of a function that takes them would refer to types that may go.
-    """
-    m = memory[0]
-    target, last, dt_s = m["target"], m["last"], m["dt_s"]
-    if not (all_finite(state) and all_finite(target)):
-        store(row, last)
-        store_status(row, INPUT_NOT_FINITE)
-        return
-    mixer = Mixer(
-        m["allocation"], m["effectiveness"], m["low"], m["high"], m["spin"],
-        m["middle"], m["reach"], m["is_inverse"], m["is_even"],
-    )  # fmt: skip
-    n = mixer.spin.size
-    vehicle, desired = vehicle_state(state), attitude_target(target)
-    filtered, reference = attitude_reference_step(
-        ReferenceMemory(*as_tuple(m["reference"], REFERENCE_MEMORY_SIZE)),
-        blend(attitude_target(m["last_target"]).attitude, desired.attitude, fraction),
-        ReferenceParams(*as_tuple(m["reference_params"], REFERENCE_PARAMS_SIZE)),
-        dt_s,
-    )
-    reference = in_body_frame(reference, vehicle.attitude)
-    inputs = AttitudeInputs(
-        vehicle.attitude,
-        vehicle.rates_frd_rad_s,
-        reference,
-        rotation_vector(quaternion_product(conjugate(vehicle.attitude), reference.attitude)),
-        relative_rotor_speed(last[COMMAND_AT:], mixer.spin),
-        _saturation(last),
-    )
-    advanced, torque = controller_step(
-        ControllerMemory(*as_tuple(m["controller"], CONTROLLER_MEMORY_SIZE)),
-        inputs,
-        ControllerParams(*as_tuple(m["controller_params"], CONTROLLER_PARAMS_SIZE)),
-        dt_s,
-    )
-    is_valid = _is_finite(torque)
-    for value in advanced:
-        is_valid = is_valid and math.isfinite(value)
-    if not is_valid:
-        store(row, last)
-        store_status(row, OUTPUT_NOT_FINITE)
-        return
-    demanded = Wrench(desired.thrust_n, torque)
-    achieved = mix(demanded, mixer, row[COMMAND_AT:], m["work"])
-    is_valid = math.isfinite(achieved.thrust_n) and _is_finite(achieved.torque_frd_n_m)
-    if not (is_valid and all_finite(row[COMMAND_AT : COMMAND_AT + n])):  # a sum overflowed
-        store(row, last)
-        store_status(row, OUTPUT_NOT_FINITE)
-        return
-    store(m["reference"], filtered)
-    for index in range(CONTROLLER_MEMORY_SIZE):
-        m["controller"][index] = advanced[index]
-    store(row, state)
-    _store_reference(row, reference)
-    store_wrenches(row, demanded, achieved)
-    row[COMMAND_AT + n : SPEED_AT] = 0.0
-    store(row[SPEED_AT:], rotor_speed_rad_s)
-    store_status(row, _status(row))
-    store(last, row)
+def joined(values: Mapping[str, FloatArray]) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Return the values of the position law and of guidance in one array, and a view of each."""
+    whole, split = np.concatenate([values[POSITION], values[GUIDANCE]]), values[POSITION].size
+    return whole, {POSITION: whole[:split], GUIDANCE: whole[split:]}
 
 
 class PythonLoops:
@@ -266,7 +67,7 @@ class PythonLoops:
     def __init__(
         self,
         vehicle: Vehicle,
-        controller: AttitudeController,
+        controller: AnyController,
         gains: Table,
         inner_hz: float,
         outer_hz: float,
@@ -274,38 +75,35 @@ class PythonLoops:
     ) -> None:
         self._outer_dt_s = 1.0 / outer_hz
         self._fraction_step, self._fraction = outer_hz / inner_hz, 0.0
-        numbers = loop_numbers(vehicle, controller, gains, max_tilt_rad)
-        self._position_params = numbers.position
-        self._initial_memory = np.array(controller.initial_memory, dtype=np.float64)
-        layout = inner_layout(len(vehicle.rotors), self._initial_memory.size, numbers.controller.size)
-        self._memory: RecordArray = np.zeros(1, layout)
+        controller = controller_of(controller)
+        check_python(controller)
+        numbers, laws = loop_numbers(vehicle, controller, gains, max_tilt_rad), controller.laws
+        self._memory: RecordArray = np.zeros(
+            1, inner_layout(len(vehicle.rotors), laws[ATTITUDE], laws[MIXER])
+        )
         record = self._memory[0]
-        record["dt_s"] = 1.0 / inner_hz
-        record["reference_params"], record["controller_params"] = numbers.reference, numbers.controller
         for name, values in mixer_for(vehicle)._asdict().items():
             record[name] = values
+        record["dt_s"], record["reference_params"] = 1.0 / inner_hz, numbers.reference
+        record["attitude_params"], record["mixer_params"] = numbers.laws[ATTITUDE], numbers.laws[MIXER]
+        self._initial = {role: np.array(law.initial_memory, np.float64) for role, law in laws.items()}
+        self._outer_memory, outer = joined(self._initial)
+        self._memories = {**outer, ATTITUDE: record["attitude"], MIXER: record["mixer"]}
+        self._outer_params, outer = joined(numbers.laws)
+        live = {**outer, ATTITUDE: record["attitude_params"], MIXER: record["mixer_params"]}
+        numbers = numbers._replace(laws=live, reference=record["reference_params"])
+        self._parameters = LoopParameters(numbers, controller, self._memories)
+        self.parameter_specs = numbers.specs
         self.attitude_target: FloatArray = record["target"]
         self._last_target: FloatArray = record["last_target"]
         self._reference_memory: FloatArray = record["reference"]
-        self._controller_memory: FloatArray = record["controller"]
-        live = numbers._replace(reference=record["reference_params"], controller=record["controller_params"])
-        self._parameters = LoopParameters(live, controller, self._controller_memory)
-        self.parameter_specs = numbers.specs
         self._last: FloatArray = record["last"]
-        self._position_memory = np.zeros(POSITION_MEMORY_SIZE)
         self._idle = IdleRow(vehicle)
-        self._kernel = specialise(
-            inner_kernel,
-            controller.key,
-            controller_step=controller.step,
-            ControllerMemory=controller.memory_type,
-            ControllerParams=controller.params_type,
-            CONTROLLER_MEMORY_SIZE=len(controller.initial_memory),
-            CONTROLLER_PARAMS_SIZE=numbers.controller.size,
-        )
+        self._kernel = bound_to(inner_kernel, {role: laws[role] for role in (ATTITUDE, MIXER)})
+        self._outer_kernel = outer_kernel_of(controller)
         self._last_arrays: tuple[FloatArray, FloatArray] | None = None
         self._bound: tuple[FloatArray, FloatArray] | None = None
-        self._inner, self._outer = self._kernel, outer_kernel
+        self._inner, self._outer = self._kernel, self._outer_kernel
         self._compile(controller.name)
 
     def _compile(self, name: str) -> None:
@@ -334,8 +132,8 @@ class PythonLoops:
 
     def reset(self, state: FloatArray) -> None:
         """Reset the integrators to zero and the reference to the present attitude, at rest."""
-        self._position_memory[:] = 0.0
-        self._controller_memory[:] = self._initial_memory
+        for role, values in self._initial.items():
+            self._memories[role][:] = values
         self._reference_memory[:4] = state[6:10]
         self._reference_memory[4:] = 0.0
         self.attitude_target[:4] = state[6:10]
@@ -368,8 +166,8 @@ class PythonLoops:
             self._outer(
                 state,
                 setpoint,
-                self._position_memory,
-                self._position_params,
+                self._outer_memory,
+                self._outer_params,
                 self._last,
                 self._outer_dt_s,
                 self.attitude_target,
@@ -379,12 +177,12 @@ class PythonLoops:
 
     def _bind(self, state: FloatArray, speeds: FloatArray, setpoint: FloatArray, row: FloatArray) -> None:
         """Select the generic kernels for new arrays, or bind direct calls when the same arrays come a second time."""
-        self._inner, self._outer = self._kernel, outer_kernel
+        self._inner, self._outer = self._kernel, self._outer_kernel
         self._bound = None
         if self._last_arrays is not None and state is self._last_arrays[0] and speeds is self._last_arrays[1]:
             self._inner = direct(self._kernel, state, 1.0, speeds, self._memory, row)
             self._outer = direct(
-                outer_kernel, state, setpoint, self._position_memory, self._position_params, self._last,
+                self._outer_kernel, state, setpoint, self._outer_memory, self._outer_params, self._last,
                 self._outer_dt_s, self.attitude_target,
             )  # fmt: skip
             self._bound = state, speeds

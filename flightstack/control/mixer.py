@@ -10,6 +10,7 @@ from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
 
+from flightstack.control.control_law import ControlLaw, NoMemory, NoParams
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Vector3, Wrench
 from flightstack.params.vehicle import Vehicle
@@ -248,6 +249,26 @@ def mix(wrench: Wrench, mixer: Mixer, rotor_speed_rad_s: PerRotor, work: Work) -
     if tilt_scale < 1.0:
         roll, pitch = tilt_scale * roll, tilt_scale * pitch
     return Wrench(thrust_n, Vector3(roll, pitch, yaw_scale * torque.z))
+
+
+@compiled
+def allocation_step(
+    memory: NoMemory,
+    wrench: Wrench,
+    rotors: Mixer,
+    params: NoParams,
+    dt_s: float,
+    rotor_speed_rad_s: PerRotor,
+    work: Work,
+) -> tuple[NoMemory, Wrench]:
+    """Mix without memory; see ``mix``."""
+    achieved = mix(wrench, rotors, rotor_speed_rad_s, work)
+    return memory, achieved
+
+
+ALLOCATION = ControlLaw(
+    "allocation", allocation_step, NoMemory, NoParams, (0.0,), lambda vehicle, gains: NoParams(0.0), ()
+)
 
 
 @compiled

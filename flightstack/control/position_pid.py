@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from flightstack.control.control_law import ControlLaw
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import AttitudeTarget, PositionSetpoint, Quaternion, VehicleState
 from flightstack.core.portable_math import sin_cos, tan
@@ -46,8 +47,11 @@ POSITION_TUNABLES = (
     Tunable("ki_z", "POS_Z_I", 0.0, 1e3, "1/s^3", "Vertical acceleration per integral of the altitude error"),
     Tunable("kd_z", "POS_Z_D", 0.0, 1e3, "1/s", "Vertical acceleration per climb rate error"),
     Tunable("max_integral_m_s2", "POS_I_MAX", 0.0, 20.0, "m/s^2", "Largest acceleration by an integral, per axis"),
+    Tunable(
+        "max_thrust_n", "POS_THR_MAX", 0.0, 1e3, "N", "Largest thrust that the position loop asks for",
+        at_least="POS_THR_MIN",
+    ),
     Tunable("min_thrust_n", "POS_THR_MIN", 0.0, 1e3, "N", "Least thrust that the position loop asks for"),
-    Tunable("max_thrust_n", "POS_THR_MAX", 0.0, 1e3, "N", "Largest thrust that the position loop asks for"),
 )  # fmt: skip
 """Tunable fields of ``PositionParams``; the largest tilt is MPC_TILTMAX_AIR, in degrees."""
 
@@ -186,3 +190,15 @@ def read_position_params(vehicle: Vehicle, gains: Table, max_tilt_rad: float) ->
     position.finish()
     altitude.finish()
     return params
+
+
+POSITION_PID = ControlLaw(
+    "pid",
+    position_pid_step,
+    PositionMemory,
+    PositionParams,
+    (0.0, 0.0, 0.0),
+    lambda vehicle, gains: read_position_params(vehicle, gains, 0.0),
+    POSITION_TUNABLES,
+)
+"""Reads the whole gains file; the largest tilt is set afterwards, from MPC_TILTMAX_AIR."""

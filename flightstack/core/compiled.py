@@ -31,9 +31,10 @@ _TESTED_NUMBA = {(0, minor) for minor in range(60, 69)}
 
 KernelCompiler: type[Compiler] = Compiler
 PartCompiler: type[Compiler] = Compiler
+KernelCache: type[FunctionCache] = FunctionCache
 PartCache: type[FunctionCache] = FunctionCache
 if numba.version_info.short in _TESTED_NUMBA:
-    from flightstack.core.kernel_compiler import KernelCompiler, PartCache, PartCompiler
+    from flightstack.core.kernel_compiler import KernelCache, KernelCompiler, PartCache, PartCompiler
 
 
 def _import_without_scipy() -> None:
@@ -67,7 +68,7 @@ class _Kernel(CPUDispatcher):  # type: ignore[misc]  # Numba has no types
     def __init__(self, function: Callable[..., Any], modules: frozenset[str]) -> None:
         super().__init__(function, targetoptions=self._OPTIONS, pipeline_class=KernelCompiler)
         self._modules = modules
-        self._enable_cache(self, FunctionCache)
+        self._enable_cache(self, KernelCache)
 
     def _enable_cache(self, dispatcher: CPUDispatcher, cache: type[FunctionCache]) -> None:
         if not is_own(self.py_func.__module__):

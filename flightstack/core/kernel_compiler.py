@@ -7,12 +7,14 @@ for each function as well as for the kernel, because Python may call the functio
 from __future__ import annotations
 
 import operator
-from types import SimpleNamespace
+import os
+from types import FunctionType, SimpleNamespace
 from typing import Any
 
+import numba
 from llvmlite.binding import parse_bitcode  # type: ignore[import-untyped]
 from numba.core import types
-from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult, Flags
 from numba.core.environment import lookup_environment
@@ -109,7 +111,31 @@ class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
         return library
 
 
-class _PartCacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
+class _Locator(UserProvidedCacheLocator):  # type: ignore[misc]
+    """Files of a kernel in a cache directory that is keyed by its sources: every copy of them shares its kernels."""
+
+    def __init__(self, function: FunctionType, file: str) -> None:
+        super().__init__(function, file)
+        self._path = os.path.join(numba.config.CACHE_DIR, function.__module__)
+
+    def get_cache_path(self) -> str:
+        return self._path
+
+    def get_source_stamp(self) -> str:
+        return ""
+
+
+class _KernelCacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
+    _locator_classes = [_Locator]  # noqa: RUF012
+
+
+class KernelCache(FunctionCache):  # type: ignore[misc]
+    """Cache on disk of functions that Python calls."""
+
+    _impl_class = _KernelCacheImpl
+
+
+class _PartCacheImpl(_KernelCacheImpl):
     def rebuild(self, target_context: Any, payload: Any) -> CompileResult:
         """Return the result of a compilation as ``CompileResult._rebuild`` does, but without machine code."""
         serialised, description, environment, function_signature, object_mode, lifted, annotation, *rest = (

@@ -1,8 +1,8 @@
 """Measurements of the sensors as an estimator receives them.
 
 Body frame FRD, world frame NED, SI units unless the name states another. ``time_s`` is the time to which the
-measurement applies, on the vehicle's clock: an estimator that receives a delayed measurement fuses it at that time.
-NaN in a measured value means that the sensor does not provide it.
+measurement applies, on the vehicle's clock, or that of its reception, from which an estimator subtracts the delay of
+the sensor, a parameter. NaN in a measured value means that the sensor does not provide it.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class BaroSample(NamedTuple):
 class GnssSample(NamedTuple):
     """Position and velocity of the antenna, with the standard deviations that the receiver states.
 
-    ``time_s`` is the time of reception less the latency of the receiver, where it is known.
+    ``time_s`` is the time of reception: the latency of the receiver is a parameter of the estimator.
     """
 
     time_s: float
@@ -82,7 +82,8 @@ class RangeSample(NamedTuple):
 class FlowSample(NamedTuple):
     """Optical flow over ``dt_s``: angles about the body's x and y axes, with the rotation of the gyro included.
 
-    Over level ground at height h, ``flow_x`` − ``gyro_x`` is v_y · dt / h and ``flow_y`` − ``gyro_y`` is −v_x · dt / h.
+    The signs are MAVLink's: over level ground at height h, ``flow_x`` − ``gyro_x`` is −v_y · dt / h, and ``flow_y`` −
+    ``gyro_y`` is v_x · dt / h.
     """
 
     time_s: float

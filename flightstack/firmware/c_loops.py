@@ -9,9 +9,9 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from flightstack.control.attitude_controller import AttitudeController
 from flightstack.control.backend import IdleRow
-from flightstack.control.loop_parameters import loop_numbers
+from flightstack.control.controller import AnyController
+from flightstack.control.loop_parameters import NOT_GIVEN, LawValues, loop_numbers
 from flightstack.core.contract import (
     ATTITUDE_TARGET_SIZE,
     STATE_SIZE,
@@ -20,7 +20,7 @@ from flightstack.core.contract import (
     LoopRow,
     LoopStatus,
 )
-from flightstack.firmware.numbers import target_numbers
+from flightstack.firmware.numbers import FIRST_NUMBERS, target_numbers
 from flightstack.firmware.sources import source_hash
 from flightstack.params.spec import ParamSpec
 from flightstack.params.toml_file import Table
@@ -53,6 +53,9 @@ class LoopExecutor(Protocol):
     def step(self, flags: int) -> None:
         """Run a tick from ``input`` to ``output``; ``flags`` are ``LoopFlags``."""
 
+    def run(self, flags: Sequence[int], inputs: FloatArray) -> FloatArray:
+        """Run ticks on ``inputs`` (n, 29), one after another; return the outputs (n, 32)."""
+
     def close(self) -> None:
         """Release resources; no step may follow."""
 
@@ -61,17 +64,25 @@ class LoopsSetup(NamedTuple):
     """Configuration of the loops."""
 
     vehicle: Vehicle
-    controller: AttitudeController
+    controller: AnyController
     gains: Table
     max_tilt_rad: float
     inner_hz: float
     outer_hz: float
     divisor: int
+    given: LawValues = NOT_GIVEN
+    """Parameters of laws that replace those of the gains file."""
 
     def numbers(self) -> dict[str, float]:
         """Return the numbers for C by name; raise ConfigError for an unsupported configuration."""
         values = target_numbers(
-            self.vehicle, self.controller, self.gains, self.max_tilt_rad, self.inner_hz, self.divisor
+            self.vehicle,
+            self.controller,
+            self.gains,
+            self.max_tilt_rad,
+            self.inner_hz,
+            self.divisor,
+            self.given,
         )
         return {
             name: value + 0.0 for name, value in values.items()
@@ -89,7 +100,7 @@ class CLoops:
         self.name = name
         self.version = executor.version
         self.executor = executor
-        numbers = loop_numbers(setup.vehicle, setup.controller, setup.gains, setup.max_tilt_rad)
+        numbers = loop_numbers(setup.vehicle, setup.controller, setup.gains, setup.max_tilt_rad, setup.given)
         self.parameter_specs: Sequence[ParamSpec] = numbers.specs
         self._names = frozenset(spec.name for spec in numbers.specs)
         self.attitude_target: FloatArray = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
@@ -193,12 +204,21 @@ class HostLoops:
         real = "double" if functions.fs_sil_real_size() == 8 else "float"
         self.version = f"C, {real}, sources {source_hash().hex()}"
         functions.fs_sil_init(self._loops)
-        for name, value in numbers.items():
+        for name, value in (*FIRST_NUMBERS.items(), *numbers.items()):
             self.set(name, value)
 
     def step(self, flags: int) -> None:
         """Run one tick on ``input`` and write ``output``; ``flags`` as in FS_PIL_STEP."""
         self._step(self._loops, self._in, flags, self._out)
+
+    def run(self, flags: Sequence[int], inputs: FloatArray) -> FloatArray:
+        """Run ticks on ``inputs`` (n, 29), one after another; return the outputs (n, 32)."""
+        outputs = np.empty((len(inputs), OUTPUT_SIZE))
+        for at, flag in enumerate(flags):
+            self.input[:] = inputs[at]
+            self.step(flag)
+            outputs[at] = self.output
+        return outputs
 
     def set(self, name: str, value: float) -> None:
         """Set a number; raise KeyError if unknown, ValueError if out of range."""

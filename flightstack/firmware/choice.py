@@ -10,7 +10,11 @@ PYTHON, C, HOST, EMULATED, SERIAL = "python", "c", "host", "emulated", "serial"
 DEFAULT_BAUD = 115_200
 SLOWEST_BAUD = 1_200
 """Minimum: at lower rates, gaps between bytes exceed the target's frame timeout."""
+FASTEST_BAUD = 20_000_000
+SHORT = "short"
+"""Ending of a target: send and report only what a flight needs, for a slow line."""
 _KNOWN = f"{PYTHON}, {C}, {HOST}, {EMULATED} and {SERIAL}:DEVICE[:BAUD]"
+_ENDINGS = (SHORT,)
 
 
 class LoopsChoice(NamedTuple):
@@ -19,6 +23,8 @@ class LoopsChoice(NamedTuple):
     kind: str
     device: str = ""
     baud: int = DEFAULT_BAUD
+    ending: str = ""
+    """``SHORT`` or nothing."""
 
     @property
     def is_target(self) -> bool:
@@ -27,20 +33,28 @@ class LoopsChoice(NamedTuple):
 
 
 def parse_loops(text: str, flag: str = "--loops") -> LoopsChoice:
-    """Read ``python``, ``c``, ``host``, ``emulated`` or ``serial:DEVICE[:BAUD]``; raise ConfigError."""
-    kind, _, rest = text.partition(":")
-    if kind in (PYTHON, C, HOST, EMULATED) and not rest and not text.endswith(":"):
+    """Read ``python``, ``c``, or a target, which may end in ``,short``; raise ConfigError.
+
+    A target is ``host``, ``emulated`` or ``serial:DEVICE[:BAUD]``.
+    """
+    target, comma, ending = text.rpartition(",")
+    if not comma or ending not in _ENDINGS:
+        target, ending = text, ""
+    kind, _, rest = target.partition(":")
+    if kind in (HOST, EMULATED) and target == kind:
+        return LoopsChoice(kind, ending=ending)
+    if kind in (PYTHON, C) and target == text == kind:
         return LoopsChoice(kind)
     if kind != SERIAL:
         raise ConfigError(flag, text, f"is not one of {_KNOWN}")
-    device, colon, ending = rest.rpartition(":")
-    if not colon or not ending.isdecimal():  # a device name may contain colons
-        device, ending = rest, str(DEFAULT_BAUD)
+    device, colon, number = rest.rpartition(":")
+    if not colon or not number.isdecimal():  # a device name may contain colons
+        device, number = rest, str(DEFAULT_BAUD)
     if not device:
         raise ConfigError(flag, text, "has no device: use for example serial:/dev/ttyACM0")
-    baud = int(ending[:12])
+    baud = int(number[:12])
     if baud < SLOWEST_BAUD:
         raise ConfigError(flag, text, f"has a baud rate below the minimum of {SLOWEST_BAUD}")
-    if baud > 20_000_000:
-        raise ConfigError(flag, text, "has a baud rate above the maximum of 20000000")
-    return LoopsChoice(SERIAL, device, baud)
+    if baud > FASTEST_BAUD:
+        raise ConfigError(flag, text, f"has a baud rate above the maximum of {FASTEST_BAUD}")
+    return LoopsChoice(SERIAL, device, baud, ending)

@@ -1,4 +1,4 @@
-"""Firmware with a user's attitude controller: a copy of the sources with the controller's law generated as C.
+"""Firmware with a user's controller: a copy of the sources with the controller's laws generated as C.
 
 The copy is a whole ``firmware`` folder, which also compiles for a board. Copies are kept in
 ``~/.cache/flightstack/firmware/laws``, by their content.
@@ -7,6 +7,7 @@ The copy is a whole ``firmware`` folder, which also compiles for a board. Copies
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import shutil
 import subprocess
@@ -15,11 +16,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from flightstack.control.attitude_controller import AttitudeController
-from flightstack.control.controller_loading import load_controller
+from flightstack.control.controller import AnyController, Controller, controller_of, laws_with
+from flightstack.control.controller_loading import fields_of, load_controller
+from flightstack.control.loop_parameters import LawValues, loop_numbers, own_values
 from flightstack.core.errors import ConfigError
 from flightstack.firmware.build import COMPILE_LIMIT_S, EXACT, BuildError, cache_root, host_compiler
-from flightstack.firmware.numbers import CONTROLLERS, law_name, with_built_in
+from flightstack.firmware.c_loops import LoopsSetup
+from flightstack.firmware.generator.text import snake_case
 from flightstack.firmware.sources import firmware_root, source_hash, using_firmware
 
 _LAW_MATH = "fs_law_math.h"
@@ -34,23 +37,40 @@ WARNINGS = (
 )  # fmt: skip
 
 
-def controller_named(name: str) -> AttitudeController:
-    """Return the installed attitude controller ``name``; raise ConfigError if it is missing or broken."""
+def controller_named(name: str) -> Controller:
+    """Return the installed controller ``name``; raise ConfigError if it is missing or broken."""
     return load_controller(name)
 
 
-def is_built_in(controller: AttitudeController) -> bool:
-    """Return True if the installation's firmware has the controller."""
-    return any(controller.name == known.name for known in CONTROLLERS)
+def is_built_in(controller: AnyController) -> bool:
+    """Return True if the installation's firmware has all laws of the controller."""
+    return not controller_of(controller).own_laws
 
 
-def generated_files(controller: AttitudeController) -> dict[str, str]:
-    """Return the files of ``core`` with this controller's law; raise ConfigError if it is outside the subset."""
+def own_params(setup: LoopsSetup) -> dict[str, str]:
+    """Return the entry ``law_params`` of a log: parameters of laws that are not built-in; empty without such a law."""
+    numbers = loop_numbers(setup.vehicle, setup.controller, setup.gains, setup.max_tilt_rad, setup.given)
+    own = own_values(numbers, setup.controller)
+    return {"law_params": json.dumps(own)} if own else {}
+
+
+def logged_params(controller: Controller, text: str, log: Path) -> LawValues:
+    """Return the parameters of the controller's own laws from ``law_params`` of a log; raise ConfigError."""
+    values: dict[str, dict[str, float]] = json.loads(text)
+    fields = {role: fields_of(law.params_type) for role, law in controller.own_laws.items()}
+    if values and {role: tuple(known) for role, known in values.items()} != fields:
+        problem = f"was flown by another version of the controller {controller.name}: install that one"
+        raise ConfigError(log, "", problem)
+    return values
+
+
+def generated_files(controller: AnyController) -> dict[str, str]:
+    """Return the files of ``core`` with this controller's laws; raise ConfigError if one is outside the subset."""
     from flightstack.firmware.generator.core_files import core_files  # noqa: PLC0415  # a tenth of a second
     from flightstack.firmware.generator.subset import OutsideSubsetError  # noqa: PLC0415
 
     try:
-        texts = core_files(with_built_in(controller))
+        texts = core_files(laws_with(controller))
     except (OutsideSubsetError, TypeError, ValueError) as error:
         raise ConfigError("--controller", controller.name, f"has no C: {error}") from None
     if any(_LAW_MATH in text for text in texts.values()):
@@ -58,13 +78,13 @@ def generated_files(controller: AttitudeController) -> dict[str, str]:
     return texts
 
 
-def generated_names(controller: AttitudeController) -> set[str]:
+def generated_names(controller: AnyController) -> set[str]:
     """Return the names of the files that the installation's firmware does not have."""
     core = firmware_root() / "core"
     return {name for name in generated_files(controller) if not (core / name).exists()}
 
 
-def write_tree(controller: AttitudeController, folder: Path) -> Path:
+def write_tree(controller: AnyController, folder: Path) -> Path:
     """Write the whole firmware with this controller to ``folder``; return it. Raise ConfigError, OSError.
 
     The generated files are compiled once, with all warnings as errors.
@@ -73,13 +93,14 @@ def write_tree(controller: AttitudeController, folder: Path) -> Path:
     ignored = shutil.ignore_patterns("__pycache__", "*.pyc", "build")
     shutil.copytree(firmware_root(), folder, ignore=ignored, dirs_exist_ok=True)
     for name, text in texts.items():
-        (folder / "core" / name).write_text(text, encoding="ascii")
-    laws = sorted(name for name in texts if name.endswith(".c") and name not in _GENERAL)
+        (folder / "core" / name).write_text(text, encoding="utf-8")
+    by_hand = {path.name for law in controller_of(controller).own_laws.values() for path in law.sources}
+    laws = sorted(name for name in texts.keys() - by_hand - _GENERAL if name.endswith(".c"))
     _compile_strictly(controller, [folder / "core" / name for name in laws])
     return folder
 
 
-def _compile_strictly(controller: AttitudeController, sources: list[Path]) -> None:
+def _compile_strictly(controller: AnyController, sources: list[Path]) -> None:
     """Raise ConfigError if a compiler of this machine has a warning for the generated files."""
     try:
         command = [*host_compiler().command, *EXACT, *WARNINGS, "-fsyntax-only", *map(str, sources)]
@@ -93,7 +114,7 @@ def _compile_strictly(controller: AttitudeController, sources: list[Path]) -> No
         )
 
 
-def law_tree(controller: AttitudeController) -> Path:
+def law_tree(controller: AnyController) -> Path:
     """Return the firmware that flies a controller: that of the installation for a built-in one.
 
     Raise ConfigError if the controller's law is outside the generator's subset.
@@ -104,7 +125,7 @@ def law_tree(controller: AttitudeController) -> Path:
     for name, text in sorted(generated_files(controller).items()):
         digest.update(f"{name}\0{text}\0".encode())
     base = _laws_folder()
-    place = base / f"{law_name(controller)}-{digest.hexdigest()[:16]}"
+    place = base / f"{snake_case(controller.name)}-{digest.hexdigest()[:16]}"
     if place.is_dir():
         os.utime(place)
         return place
@@ -133,7 +154,7 @@ def _laws_folder() -> Path:
 
 
 @contextmanager
-def firmware_for(controller: AttitudeController) -> Iterator[Path]:
+def firmware_for(controller: AnyController) -> Iterator[Path]:
     """Build and identify firmware of this controller's sources within the context; raise ConfigError."""
     tree = law_tree(controller)
     with using_firmware(tree):

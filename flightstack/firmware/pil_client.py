@@ -1,8 +1,8 @@
 """Client of loops that run on a target, without I/O.
 
 ``start_…`` begins an operation, ``poll`` returns bytes to send, ``receive`` processes received bytes, and ``result`` or
-``failure`` is the outcome. One operation runs at a time. A step is resent until its report arrives; the target computes
-it once and repeats the report, so that no step is skipped or computed twice.
+``failure`` is the outcome. One operation runs at a time: a request, a step, or a window of steps. A step is resent
+until its report arrives; the target computes it once and repeats the report: no step is skipped or computed twice.
 """
 
 from __future__ import annotations
@@ -13,16 +13,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from flightstack.firmware.pil_operations import (
+from flightstack.firmware.pil_operations import Command, Operation, Request, Result, SetNumber, message_of
+from flightstack.firmware.pil_steps import (
     OWN_COMPONENT,
     OWN_SYSTEM,
-    REPORT_ID,
-    Operation,
+    REPORT_IDS,
     PilReport,
-    Request,
-    SetNumber,
     Step,
-    message_of,
+    StepInput,
+    Window,
 )
 from flightstack.mavlink.frames import FrameReader
 from flightstack.mavlink.link import Link, Message
@@ -39,6 +38,8 @@ class PilTiming(NamedTuple):
     """Timeout before an operation is resent."""
     attempts: int = 20
     """Number of attempts before the target counts as lost."""
+    step_s: float = 0.0
+    """Additional timeout for each further step of a window: the time of an exchange on the line."""
 
 
 DEFAULT_TIMING = PilTiming()
@@ -81,10 +82,19 @@ class PilClient:
         self.failure: str | None = None
         """Why the operation failed, as a clause about the target, or None."""
 
-    def start_step(self, flags: int, numbers: Sequence[float]) -> None:
-        """Run the next step; ``numbers`` (24,) are the state with the setpoint or attitude target."""
+    def start_step(self, flags: int, numbers: Sequence[float], short_rotors: int = 0) -> None:
+        """Run the next step; ``numbers`` (24,) are the state with the setpoint or attitude target.
+
+        ``short_rotors`` is the vehicle's number of rotors for a short step and report, 0 for full ones.
+        """
         self._step = (self._step + 1) & 0xFFFF_FFFF
-        self._start(Step(self._step, flags, numbers))
+        self._start(Step(self._step, StepInput(flags, numbers), short_rotors))
+
+    def start_window(self, steps: Sequence[StepInput]) -> None:
+        """Run the next steps, sent together; their number must not exceed the target's FS_PIL_IDENTITY.window."""
+        first = (self._step + 1) & 0xFFFF_FFFF
+        self._step = (self._step + len(steps)) & 0xFFFF_FFFF
+        self._start(Window(first, steps))
 
     def start_set(self, name: str, value: float) -> None:
         """Set a number of the target; its float32 value must be confirmed bit by bit."""
@@ -94,15 +104,22 @@ class PilClient:
         """Request the message of this name."""
         self._start(Request(name))
 
+    def start_command(self, number: int, refusal: str, *values: float) -> None:
+        """Send a command; ``refusal`` is the failure if it is refused."""
+        self._start(Command(number, refusal, values))
+
     @property
-    def result(self) -> PilReport | Message | float | None:
-        """Result of the operation: a report, the confirmed number or a message; None until then."""
+    def result(self) -> Result:
+        """Result of the operation: a report, those of a window, the confirmed number or a message; None until then."""
         return None if self._operation is None else self._operation.result
 
     @property
-    def attempts(self) -> int:
-        """Number of times the operation was sent."""
-        return self._attempts
+    def steps(self) -> Sequence[Step]:
+        """Steps of the current operation."""
+        operation = self._operation
+        if isinstance(operation, Window):
+            return operation.steps
+        return [operation] if isinstance(operation, Step) else []
 
     @property
     def step(self) -> int:
@@ -118,8 +135,8 @@ class PilClient:
         counters.bad += reader.faults - faults
         for frame in frames:
             counters.frames += 1
-            if frame.message_id == REPORT_ID:
-                self._take_report(PilReport.of(frame.data))
+            if frame.message_id in REPORT_IDS:
+                self._take_report(PilReport.of(frame.data, frame.message_id))
             elif (message := message_of(self._codec, frame)) is not None:
                 self._take_message(message)
             self._settle()
@@ -134,9 +151,11 @@ class PilClient:
         counters, operation = self.counters, self._operation
         counters.repeated += report.is_repeated
         counters.out_of_order += report.is_out_of_order
-        if not self._is_active or not isinstance(operation, Step):
+        if not self._is_active or not isinstance(operation, Step | Window):
             counters.late += 1
-        elif not operation.take_report(report):
+        elif operation.take_report(report):
+            self._attempts = 1  # the link works: a window may need several attempts
+        else:
             counters.late += not report.is_out_of_order
             if operation.is_refused:  # resend at once
                 operation.is_refused = False
@@ -164,9 +183,10 @@ class PilClient:
             self.counters.resent += 1
             self._drop_partial()
         self._attempts += 1
-        self._deadline_s = now_s + self.timing.timeout_s
-        data = operation.frame(self._codec, self._sequence)
-        self._sequence = (self._sequence + 1) & 255
+        frames = operation.frames(self._codec, self._sequence)
+        self._deadline_s = now_s + self.timing.timeout_s + (len(frames) - 1) * self.timing.step_s
+        self._sequence = (self._sequence + len(frames)) & 255
+        data = b"".join(frames)
         self.counters.octets_sent += len(data)
         return data
 

@@ -6,14 +6,14 @@ import io
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
 from flightstack.core.atomic_file import write_bytes_atomically, write_text_atomically
 from flightstack.core.contract import LoopFlags
 from flightstack.firmware.pil_client import PilCounters
-from flightstack.firmware.pil_operations import PilReport
+from flightstack.firmware.pil_steps import PilReport
 
 LINK_FILE, STEPS_FILE = "pil-link.json", "pil-steps.npz"
 COST_UNITS = ("none", "cycles", "instructions", "ns")
@@ -31,16 +31,46 @@ STEP_ROW = np.dtype(
 of attempts, and wall time from the first attempt to the report."""
 
 
+class Trace(NamedTuple):
+    """Code of an emulated target that ran."""
+
+    image: str
+    """Path of the ELF file."""
+    executed: list[tuple[int, int]]
+    """First address and end of each range."""
+
+
+@runtime_checkable
+class TracedLink(Protocol):
+    """A link to a target whose execution is observed."""
+
+    @property
+    def trace(self) -> Trace:
+        """What ran until now."""
+
+
 class PilRecord:
     """Rows of all steps, and information about target and link."""
 
-    def __init__(self, target: str, identity: dict[str, Any], status_at_start: dict[str, Any]) -> None:
-        """``status_at_start`` is FS_PIL_STATUS before the first step: its counters continue from earlier flights."""
+    def __init__(
+        self,
+        target: str,
+        identity: dict[str, Any],
+        status_at_start: dict[str, Any],
+        note: str | None = None,
+    ) -> None:
+        """``status_at_start`` is FS_PIL_STATUS before the first step: its counters continue from earlier flights.
+
+        ``note`` is a sentence about the link.
+        """
+        self._note = note
         self._target, self._identity, self._status_at_start = target, identity, status_at_start
         self._rows: np.ndarray[Any, np.dtype[np.void]] = np.zeros(1024, STEP_ROW)
         self._count = 0
         self.status: dict[str, Any] | None = None
         """FS_PIL_STATUS after the last step, or None."""
+        self.trace: Trace | None = None
+        """Executed code of an emulated target, or None."""
 
     def add(self, flags: int, report: PilReport, attempts: int, round_trip_s: float) -> None:
         """Record a step; discard a single trial step before the first flight."""
@@ -61,6 +91,7 @@ class PilRecord:
         trips = self.steps["round_trip_s"]
         return {
             "target": self._target,
+            "note": self._note,
             "identity": self._identity,
             "steps": self._count,
             "link": asdict(counters),
@@ -68,6 +99,7 @@ class PilRecord:
             "status_at_start": self._status_at_start,
             "status": self.status,
             "ending": ending,
+            "trace": None if self.trace is None else self.trace._asdict(),
         }
 
     def write(self, log: Path, counters: PilCounters, texts: list[str], ending: str | None) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +14,16 @@ from flightstack.core.contract import ATTITUDE_TARGET_SIZE, FloatArray, LoopFlag
 from flightstack.core.errors import TargetError, WrongFirmwareError
 from flightstack.core.float32 import as_float32
 from flightstack.firmware.c_loops import INPUT_SIZE, OUTPUT_SIZE, SETPOINT_AT, TARGET_AT
-from flightstack.firmware.pil_client import DEFAULT_TIMING, PilClient, PilCounters, PilTiming
-from flightstack.firmware.pil_operations import PilReport
-from flightstack.firmware.pil_record import COST_UNITS, PilRecord
+from flightstack.firmware.identity import check_identity, described
+from flightstack.firmware.numbers import FIRST_NUMBERS
+from flightstack.firmware.pil_client import DEFAULT_TIMING, PilCounters, PilTiming
+from flightstack.firmware.pil_record import PilRecord, TracedLink
+from flightstack.firmware.pil_session import PilSession
+from flightstack.firmware.pil_steps import WANT_REFERENCE, StepInput
 from flightstack.firmware.sources import source_hash
 from flightstack.transports.byte_link import ByteLink
 
 NOTHING = (0.0,) * (TARGET_AT - SETPOINT_AT - ATTITUDE_TARGET_SIZE)
-MOST_READS = 100_000
-"""Maximum reads per attempt, which bounds a step on a link with endless data."""
 FINAL_ATTEMPTS = 6
 """Attempts to read the target's counters at the end."""
 
@@ -40,13 +42,18 @@ class TargetLoops:
         timing: PilTiming = DEFAULT_TIMING,
         clock_s: Callable[[], float] = time.monotonic,
         expected_hash: bytes | None = None,
+        short: bool = False,
+        note: str | None = None,
     ) -> None:
         """Check the target and set ``numbers``; raise TargetError, WrongFirmwareError.
 
-        ``expected_hash`` is the source hash required of the target, by default that of this installation.
+        ``expected_hash`` is the source hash required of the target, by default that of this installation. ``short``
+        steps send and report only what a flight needs, for a slow line: of the stages, the output has the rotor speed
+        commands, in outer ticks the attitude target, once per outer period the attitude reference, else NaN.
+        ``note`` is a sentence about the link for version and record.
         """
-        self._link, self._client, self._clock_s = link, PilClient(timing), clock_s
-        self._waited_s = 0.0  # added to the clock: an emulated target waits without real time
+        self._session = PilSession(link, timing, clock_s)
+        self._link, self._client = link, self._session.client
         self._numbers: dict[str, float] = {}
         self._pending: list[tuple[str, float]] = []  # set one by one: integrals are scaled at each
         self._is_closed = False
@@ -54,19 +61,22 @@ class TargetLoops:
         """Why the target failed, or None."""
         self.input: FloatArray = np.zeros(INPUT_SIZE)
         self.output: FloatArray = np.zeros(OUTPUT_SIZE)
-        identity = self._identify()
-        problem = wrong_firmware(identity, source_hash() if expected_hash is None else expected_hash)
+        identity = self._request("FS_PIL_IDENTITY")
+        problem = check_identity(identity, source_hash() if expected_hash is None else expected_hash)
         if problem is not None:
             raise WrongFirmwareError(f"{link.name}: {problem}")
         self.identity = described(identity)
-        self.record = PilRecord(link.name, self.identity, self._counters())
-        details = (
+        self._window = max(1, identity.window)
+        self._short = ShortSteps(numbers) if short else None
+        self.record = PilRecord(link.name, self.identity, self._counters(), note)
+        details = [
             self.identity["board"],
             f"sources {self.identity['source_hash']}",
             self.identity["compiler"],
-        )
+            *([] if note is None else [note]),
+        ]
         self.version = f"C, float, {', '.join(details)}"
-        for name, value in numbers.items():
+        for name, value in (*FIRST_NUMBERS.items(), *numbers.items()):
             self.set(name, value)
         self._send_numbers()
 
@@ -86,25 +96,43 @@ class TargetLoops:
     def step(self, flags: int) -> None:
         """Run a tick on the target from ``input`` to ``output``; raise TargetError."""
         self._send_numbers()
-        numbers = self.input.tolist()
-        if flags & LoopFlags.SET_TARGET:  # the attitude target is sent in place of the setpoint
-            if flags & LoopFlags.OUTER_DUE:
-                raise ValueError("a step has either a setpoint or an attitude target")
-            numbers = [*numbers[:SETPOINT_AT], *numbers[TARGET_AT:], *NOTHING]
+        client, short = self._client, self._short
+        if short is None:
+            client.start_step(flags, sent_numbers(flags, self.input))
         else:
-            numbers = numbers[:TARGET_AT]
-        client = self._client
-        client.start_step(flags, numbers)
-        began_s = self._clock_s()
+            flags |= short.wanted(flags)
+            client.start_step(flags, sent_numbers(flags, self.input), short.rotors)
+        self._run_steps([flags])
+        (step,) = client.steps
+        assert step.result is not None
+        outputs = step.result.outputs
+        self.output[:-1] = outputs if short is None else short.with_target(flags, self.input, outputs)
+        self.output[-1] = step.result.status & 0xFFFF
+
+    def run(self, flags: Sequence[int], inputs: FloatArray) -> FloatArray:
+        """Run ticks on ``inputs`` (n, 29), several of them in one exchange; return the outputs (n, 32)."""
+        self._send_numbers()
+        outputs = np.empty((len(inputs), OUTPUT_SIZE))
+        for begin in range(0, len(inputs), self._window):
+            end = min(begin + self._window, len(inputs))
+            steps = [StepInput(flags[at], sent_numbers(flags[at], inputs[at])) for at in range(begin, end)]
+            self._client.start_window(steps)
+            self._run_steps(flags[begin:end])
+            for at, step in enumerate(self._client.steps, begin):
+                assert step.result is not None
+                outputs[at, :-1], outputs[at, -1] = step.result.outputs, step.result.status & 0xFFFF
+        return outputs
+
+    def _run_steps(self, flags: Sequence[int]) -> None:
+        """Finish the steps of the client and record them, also those before a failure."""
+        began_s = self._session.clock_s()
         try:
             self._finish()
         finally:  # a step that ended in the safe state has a report too
-            report = client.result
-            if isinstance(report, PilReport):
-                self.record.add(flags, report, client.attempts, self._clock_s() - began_s)
-        assert isinstance(report, PilReport)
-        self.output[:-1] = report.outputs
-        self.output[-1] = report.status & 0xFFFF
+            share_s = (self._session.clock_s() - began_s) / len(flags)
+            for flag, step in zip(flags, self._client.steps, strict=True):
+                if step.result is not None:
+                    self.record.add(flag, step.result, step.attempts, share_s)
 
     def close(self) -> None:
         """Read the target's counters and close the link; a second call does nothing."""
@@ -112,8 +140,11 @@ class TargetLoops:
             return
         self._is_closed = True
         try:
-            if self.ending is None or isinstance(self._client.result, PilReport):  # the target responds
+            responds = any(step.result is not None for step in self._client.steps)
+            if self.ending is None or responds:
                 self.record.status = self._final_counters()
+            if isinstance(self._link, TracedLink):
+                self.record.trace = self._link.trace
         finally:
             self._link.close()
 
@@ -129,50 +160,24 @@ class TargetLoops:
         """Counters of the link."""
         return self._client.counters
 
-    @property
-    def _now_s(self) -> float:
-        return self._clock_s() + self._waited_s
-
     def _finish(self) -> Any:
         """Run the link until the operation ends; return its result or raise TargetError."""
-        client, link = self._client, self._link
+        client = self._client
         try:
-            while client.failure is None and client.result is None:
-                data = client.poll(self._now_s)
-                if data:
-                    link.write(data)
-                self._receive()
+            result = self._session.finish()
         except (OSError, RuntimeError) as error:  # link or emulated processor failed
             self.ending = str(error)
             raise TargetError(str(error)) from error
         if client.failure is not None:
-            sentence = f"the target on {link.name} {client.failure}"
+            sentence = f"the target on {self._link.name} {client.failure}"
             if client.texts:
                 sentence += f"; its last message: {client.texts[-1][1]}"
             self.ending = sentence
             raise TargetError(sentence)
-        return client.result
+        return result
 
-    def _receive(self) -> None:
-        """Read until the end or deadline of the operation."""
-        client, link = self._client, self._link
-        for _ in range(MOST_READS):
-            deadline_s = client.next_deadline()
-            if deadline_s is None:
-                return
-            left_s = deadline_s - self._now_s
-            if left_s <= 0.0:
-                return
-            before_s = self._clock_s()
-            data = link.read(left_s)
-            if data:
-                client.receive(data, self._now_s)
-            else:  # time passed on an emulated target but not on the clock
-                self._waited_s += max(0.0, left_s - (self._clock_s() - before_s))
-        self._waited_s += max(0.0, (client.next_deadline() or 0.0) - self._now_s)
-
-    def _identify(self) -> Any:
-        self._client.start_request("FS_PIL_IDENTITY")
+    def _request(self, name: str) -> Any:
+        self._client.start_request(name)
         return self._finish()
 
     def _send_numbers(self) -> None:
@@ -194,39 +199,46 @@ class TargetLoops:
 
     def _counters(self) -> dict[str, Any]:
         """Request FS_PIL_STATUS; raise TargetError."""
-        self._client.start_request("FS_PIL_STATUS")
-        status: dict[str, Any] = self._finish().to_dict()
+        status: dict[str, Any] = self._request("FS_PIL_STATUS").to_dict()
         status.pop("mavpackettype", None)
         return status
 
 
-def wrong_firmware(identity: Any, expected_hash: bytes) -> str | None:
-    """Return why the firmware of an FS_PIL_IDENTITY is incompatible, or None."""
-    if identity.real_octets != 4:
-        return (
-            f"its loops compute with {8 * identity.real_octets} bits, not with 32: flash the firmware again"
-        )
-    if bytes(identity.source_hash) != expected_hash:
-        return (
-            f"its firmware was made of other sources ({bytes(identity.source_hash).hex()}, on {_board(identity)}) "
-            f"than these ({expected_hash.hex()}): flash it again"
-        )
-    return None
+class ShortSteps:
+    """What short steps leave out, and when they ask for the attitude reference.
+
+    The commander compares attitude and reference in each outer tick, with the row of the tick before.
+    """
+
+    def __init__(self, numbers: Mapping[str, float]) -> None:
+        self.rotors = round(numbers["FS_ROTORS"])
+        self._divisor = round(numbers["FS_OUTER_DIV"])
+        self._ticks = 0
+        self._target: list[float] = [math.nan] * ATTITUDE_TARGET_SIZE
+
+    def wanted(self, flags: int) -> int:
+        """Return the flag for the attitude reference if this tick is the last one of an outer period, or 0."""
+        if flags & (LoopFlags.OUTER_DUE | LoopFlags.SET_TARGET):
+            self._ticks = 0
+        self._ticks += 1
+        return 0 if self._ticks % self._divisor else WANT_REFERENCE
+
+    def with_target(self, flags: int, values: FloatArray, outputs: Sequence[float]) -> Sequence[float]:
+        """Return the outputs with the attitude target, which is reported only when the outer loop runs."""
+        if flags & LoopFlags.RESET:
+            self._target = [*map(as_float32, values[6:10].tolist()), 0.0]
+        if flags & LoopFlags.SET_TARGET:
+            self._target = [*map(as_float32, values[TARGET_AT:].tolist())]
+        elif flags & LoopFlags.OUTER_DUE:
+            self._target = list(outputs[:ATTITUDE_TARGET_SIZE])
+        return (*self._target, *outputs[ATTITUDE_TARGET_SIZE:])
 
 
-def described(identity: Any) -> dict[str, Any]:
-    """Return an FS_PIL_IDENTITY as a JSON object."""
-    unit = identity.cost_unit
-    return {
-        "board": _board(identity),
-        "compiler": identity.compiler.strip() or "unknown compiler",
-        "source_hash": bytes(identity.source_hash).hex(),
-        "cost_unit": COST_UNITS[unit] if unit < len(COST_UNITS) else f"unit {unit}",
-        "clock_hz": identity.clock_hz,
-        "real_octets": identity.real_octets,
-        "char_bits": identity.char_bits,
-    }
-
-
-def _board(identity: Any) -> str:
-    return identity.board.strip() or "unknown board"
+def sent_numbers(flags: int, values: FloatArray) -> list[float]:
+    """Return state and setpoint of an input (29,) for a step; the attitude target in place of the setpoint."""
+    numbers: list[float] = values.tolist()
+    if not flags & LoopFlags.SET_TARGET:
+        return numbers[:TARGET_AT]
+    if flags & LoopFlags.OUTER_DUE:
+        raise ValueError("a step has either a setpoint or an attitude target")
+    return [*numbers[:SETPOINT_AT], *numbers[TARGET_AT:], *NOTHING]

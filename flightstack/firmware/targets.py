@@ -10,8 +10,18 @@ from flightstack.control.loops import PythonLoops
 from flightstack.core.errors import INSTALL_FIRMWARE, ConfigError, WrongFirmwareError
 from flightstack.firmware.build import BuildError, host_library, host_program
 from flightstack.firmware.c_loops import CLoops, HostLoops, LoopsSetup
-from flightstack.firmware.choice import DEFAULT_BAUD, EMULATED, PYTHON, SERIAL, C, LoopsChoice, parse_loops
+from flightstack.firmware.choice import (
+    DEFAULT_BAUD,
+    EMULATED,
+    PYTHON,
+    SERIAL,
+    SHORT,
+    C,
+    LoopsChoice,
+    parse_loops,
+)
 from flightstack.firmware.law_tree import firmware_for
+from flightstack.firmware.line_rate import negotiate_baud
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilTiming
 from flightstack.firmware.target_loops import TargetLoops
 from flightstack.transports.byte_link import ByteLink, LineError
@@ -71,8 +81,8 @@ class HostTarget:
             self._process.wait()
 
 
-EXCHANGE_BITS = 8000.0
-"""Bits of two exchanges with start and stop bits, added to the timeout of a slow serial port."""
+EXCHANGE_BITS = 2800.0
+"""Bits of the longest exchange, with start and stop bits."""
 
 
 def make_loops(loops: str, setup: LoopsSetup, lockstep: bool = True) -> ControlBackend:
@@ -95,7 +105,7 @@ def make_loops(loops: str, setup: LoopsSetup, lockstep: bool = True) -> ControlB
         with firmware_for(setup.controller):
             if choice.kind == C:
                 return CLoops(loops, HostLoops(host_library(), numbers), setup)
-            return CLoops(loops, connect(open_link(choice), numbers, timing_of(choice)), setup)
+            return CLoops(loops, connect(choice, numbers), setup)
     except (BuildError, LineError, WrongFirmwareError) as error:
         raise ConfigError("--loops", loops, str(error).removeprefix(f"{choice.device}: ")) from error
 
@@ -125,13 +135,17 @@ def timing_of(choice: LoopsChoice) -> PilTiming:
     """Return the timeouts of a link."""
     if choice.kind != SERIAL:
         return DEFAULT_TIMING
-    return DEFAULT_TIMING._replace(timeout_s=DEFAULT_TIMING.timeout_s + EXCHANGE_BITS / choice.baud)
+    exchange_s = EXCHANGE_BITS / choice.baud
+    return DEFAULT_TIMING._replace(timeout_s=DEFAULT_TIMING.timeout_s + 3.0 * exchange_s, step_s=exchange_s)
 
 
-def connect(link: ByteLink, numbers: dict[str, float], timing: PilTiming = DEFAULT_TIMING) -> TargetLoops:
-    """Return the loops on the target with their numbers; close the link on an error."""
+def connect(choice: LoopsChoice, numbers: dict[str, float]) -> TargetLoops:
+    """Return the loops on a target with their numbers; raise BuildError, LineError, TargetError, WrongFirmwareError."""
+    link, timing, note = open_link(choice), timing_of(choice), None
     try:
-        return TargetLoops(link, numbers, timing)
+        if isinstance(link, SerialPort):
+            note = negotiate_baud(link, choice.baud, timing)
+        return TargetLoops(link, numbers, timing, short=choice.ending == SHORT, note=note)
     except BaseException:
         link.close()
         raise

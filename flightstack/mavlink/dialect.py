@@ -13,10 +13,13 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from flightstack.mavlink.dialect_generated import LAYOUTS
+from flightstack.mavlink.dialect_generated import ENTRIES, LAYOUTS
 from flightstack.mavlink.layout import Layout, message_class
 
 LAYOUT_BY_NAME: dict[str, Layout] = {layout.name: layout for layout in LAYOUTS}
+
+for _name, _value in ENTRIES.items():
+    setattr(mavlink, _name, _value)
 
 for _layout in LAYOUTS:
     _class = message_class(_layout)

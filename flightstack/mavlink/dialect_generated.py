@@ -2,6 +2,11 @@
 
 from flightstack.mavlink.layout import Field, Layout
 
+ENTRIES = {
+    "MAV_CMD_FS_SET_BAUD_RATE": 53000,
+    "MAV_CMD_FS_FREE_RUN": 53001,
+}
+
 LAYOUTS = (
     Layout(
         291,
@@ -213,6 +218,74 @@ LAYOUTS = (
             Field("char_bits", "B", 1, False, "uint8_t", "", 4),
             Field("board", "s", 24, True, "char", "", 5),
             Field("compiler", "s", 48, True, "char", "", 6),
+            Field("protocol", "B", 1, False, "uint8_t", "", 7, True),
+            Field("window", "B", 1, False, "uint8_t", "", 8, True),
+            Field("baud", "I", 1, False, "uint32_t", "Bd", 9, True),
+            Field("clock_overhead", "I", 1, False, "uint32_t", "", 10, True),
+        ),
+    ),
+    Layout(
+        53014,
+        "FS_PIL_TICK",
+        185,
+        (
+            Field("step", "I", 1, False, "uint32_t", "", 0),
+            Field("flags", "I", 1, False, "uint32_t", "", 1),
+            Field("values", "f", 24, True, "float", "", 2),
+        ),
+    ),
+    Layout(
+        53015,
+        "FS_PIL_OUTPUT",
+        152,
+        (
+            Field("step", "I", 1, False, "uint32_t", "", 0),
+            Field("status", "I", 1, False, "uint32_t", "", 1),
+            Field("cycles", "I", 1, False, "uint32_t", "", 2),
+            Field("values", "f", 17, True, "float", "", 3),
+        ),
+    ),
+    Layout(
+        53016,
+        "FS_PIL_STATE",
+        83,
+        (
+            Field("time_us", "I", 1, False, "uint32_t", "us", 0),
+            Field("flags", "I", 1, False, "uint32_t", "", 1),
+            Field("state", "f", 13, True, "float", "", 2),
+            Field("setpoint", "f", 11, True, "float", "", 3),
+        ),
+    ),
+    Layout(
+        53017,
+        "FS_PIL_DRIVE",
+        159,
+        (
+            Field("state_time_us", "I", 1, False, "uint32_t", "us", 0),
+            Field("status", "I", 1, False, "uint32_t", "", 1),
+            Field("age_us", "I", 1, False, "uint32_t", "us", 2),
+            Field("late_us", "I", 1, False, "uint32_t", "us", 3),
+            Field("rotor_command", "f", 8, True, "float", "", 4),
+        ),
+    ),
+    Layout(
+        53018,
+        "FS_PIL_TIMING",
+        5,
+        (
+            Field("ticks", "I", 1, False, "uint32_t", "", 0),
+            Field("missed", "I", 1, False, "uint32_t", "", 1),
+            Field("overruns", "I", 1, False, "uint32_t", "", 2),
+            Field("states", "I", 1, False, "uint32_t", "", 3),
+            Field("skipped", "I", 1, False, "uint32_t", "", 4),
+            Field("held", "I", 1, False, "uint32_t", "", 5),
+            Field("timeouts", "I", 1, False, "uint32_t", "", 6),
+            Field("period_us", "I", 1, False, "uint32_t", "us", 7),
+            Field("late_max_us", "I", 1, False, "uint32_t", "us", 8),
+            Field("age_max_us", "I", 1, False, "uint32_t", "us", 9),
+            Field("cost_max", "I", 1, False, "uint32_t", "", 10),
+            Field("late_mean_us", "f", 1, False, "float", "us", 11),
+            Field("age_mean_us", "f", 1, False, "float", "us", 12),
         ),
     ),
 )

@@ -10,8 +10,8 @@ BUILT_IN = Path(__file__).parent / "gains"
 DEFAULT_GAINS = "tuned"
 KIND = "built-in gains"
 LOOP_TABLES = ("position", "altitude", "attitude_reference")
-CONTROLLER_PREFIX = "attitude_"
-"""Prefix of the controllers' tables; tables of other controllers are ignored."""
+LAW_PREFIXES = ("guidance_", "position_", "attitude_", "mixer_")
+"""Prefixes of the laws' tables, by role; tables of other laws are ignored."""
 
 
 def built_in_gains() -> list[str]:
@@ -27,5 +27,5 @@ def hidden_gains(name_or_path: str) -> str | None:
 def open_gains(name_or_path: str) -> Table:
     """Open a gains file by the name of a built-in one or by path; raise ConfigError."""
     gains = read_toml(find_file(name_or_path, BUILT_IN, KIND))
-    gains.expect(*LOOP_TABLES, "description", prefix=CONTROLLER_PREFIX)
+    gains.expect(*LOOP_TABLES, "description", prefix=LAW_PREFIXES)
     return gains

@@ -78,6 +78,10 @@ class Table:
             raise self.error(key, f"{value!r} is neither true nor false")
         return value
 
+    def is_flag(self, key: str) -> bool:
+        """Return True if ``key`` is true or false."""
+        return isinstance(self._values.get(key), bool)
+
     def choice(self, key: str, choices: tuple[str, ...]) -> str:
         """Return one of ``choices``."""
         value = self.text(key)
@@ -111,8 +115,8 @@ class Table:
         """Return True if ``key`` is present."""
         return key in self._values
 
-    def expect(self, *keys: str, prefix: str) -> None:
-        """Raise ConfigError for a key that is not in ``keys`` and does not begin with ``prefix``."""
+    def expect(self, *keys: str, prefix: tuple[str, ...]) -> None:
+        """Raise ConfigError for a key that is not in ``keys`` and does not begin with one of ``prefix``."""
         for key in self._values:
             if key not in keys and not key.startswith(prefix):
                 raise self.error(key, "is not a known key")

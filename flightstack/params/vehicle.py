@@ -12,6 +12,7 @@ from flightstack.core.contract import MAX_ROTORS, FloatArray
 from flightstack.core.errors import ConfigError
 from flightstack.core.linear_algebra import pseudo_inverse
 from flightstack.params.battery import Battery, read_battery
+from flightstack.params.sensors import NO_SENSORS, Sensors, read_sensors
 from flightstack.params.toml_file import Table, built_in_names, find_file, hidden_file, read_toml
 from flightstack.params.vehicle_parts import Part, read_parts
 
@@ -69,6 +70,7 @@ class Vehicle:
     """Parts for the multibody plant."""
     default_parts: bool = True
     """Add the parts of a typical multirotor that are not in ``parts`` by name."""
+    sensors: Sensors = NO_SENSORS
 
     @property
     def weight_n(self) -> float:
@@ -181,6 +183,7 @@ def _vehicle(top: Table) -> Vehicle:
         battery=read_battery(top),
         parts=read_parts(top),
         default_parts=top.flag("default_parts", True),
+        sensors=read_sensors(top),
     )
     for table in (top, body, rotor_type):
         table.finish()

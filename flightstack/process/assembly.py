@@ -12,11 +12,12 @@ from typing import NamedTuple, TypeAlias
 
 from flightstack import __version__
 from flightstack.control.backend import ControlBackend
-from flightstack.control.controller_loading import load_controller
+from flightstack.control.controller import controller_of
+from flightstack.control.controller_loading import check_python, load_controller
 from flightstack.control.loop_parameters import loop_numbers
 from flightstack.firmware.c_loops import LoopsSetup
 from flightstack.firmware.choice import PYTHON, parse_loops
-from flightstack.firmware.law_tree import law_tree
+from flightstack.firmware.law_tree import law_tree, own_params
 from flightstack.firmware.targets import make_loops
 from flightstack.flight_log.flight_log import vehicle_fields
 from flightstack.flight_log.recorder import FlightRecorder, OpenLog
@@ -121,6 +122,8 @@ def check(config: StackConfig) -> None:
     if parse_loops(config.loops).kind != PYTHON:
         setup.numbers()
         law_tree(setup.controller)
+    else:
+        check_python(controller_of(setup.controller))
     numbers = loop_numbers(setup.vehicle, setup.controller, setup.gains, setup.max_tilt_rad)
     read_parameters(config, numbers.specs)
 
@@ -151,7 +154,7 @@ def build(
     backend = make(config.loops, setup, config.lockstep)
     compile_helper.finish(with_streams=not config.lockstep)
     try:
-        return _join(config, setup.vehicle, loop_rates, backend, open_log, logs)
+        return _join(config, setup, loop_rates, backend, open_log, logs)
     except BaseException:
         backend.close()  # a target may hold a process or a serial port
         raise
@@ -159,15 +162,16 @@ def build(
 
 def _join(
     config: StackConfig,
-    vehicle: Vehicle,
+    setup: LoopsSetup,
     loop_rates: Rates,
     backend: ControlBackend,
     open_log: OpenLog,
     logs: LogStore,
 ) -> Stack:
+    vehicle = setup.vehicle
     params, loaded = load_parameters(config, backend)
     behaviour, system_id = behaviour_of(params), int(params.value(SYSTEM_ID))
-    info = _log_info(config, vehicle, loop_rates, backend.version)
+    info = _log_info(config, setup, loop_rates, backend.version)
     simulator = SimulatorEndpoint(vehicle, config.home, config.lockstep, system_id, loop_rates.interval_us)
     recorder = FlightRecorder(open_log, info, params.values, config.home, lambda: simulator.battery)
     parts = assemble(
@@ -193,19 +197,24 @@ def _join(
 
 
 def _log_info(
-    config: StackConfig, vehicle: Vehicle, loop_rates: Rates, loops_version: str
+    config: StackConfig, setup: LoopsSetup, loop_rates: Rates, loops_version: str
 ) -> dict[str, str | int | float]:
-    """Return the information messages of a log."""
+    """Return the information messages of a log.
+
+    ``law_params`` has the parameters of laws from other packages at the start, which a replay needs: not all are
+    parameters of the vehicle.
+    """
     return {
         "sys_name": "flightstack",
         "ver_sw": __version__,
-        **vehicle_fields(vehicle),
+        **vehicle_fields(setup.vehicle),
         "controller": config.controller,
         "gains": config.gains,
         "loops": config.loops,
         "ver_loops": loops_version,
         "inner_hz": loop_rates.inner_hz,
         "outer_hz": loop_rates.outer_hz,
+        **own_params(setup),
     }
 
 

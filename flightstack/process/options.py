@@ -44,7 +44,7 @@ Loops = Annotated[
     str,
     typer.Option(
         help="Control loops: python, c (compiled here), or on a target: host (a process), emulated (a Cortex-M4F) "
-        "or serial:DEVICE[:BAUD] (a board).",
+        "or serial:DEVICE[:BAUD] (a board); TARGET,short sends less, for a slow line.",
         metavar="LOOPS",
         **IN_LOOPS,
     ),

@@ -15,7 +15,6 @@ from flightstack.commander.failsafe import Failsafe
 from flightstack.control.controller_loading import ENTRY_POINT_GROUP, load_controller
 from flightstack.core.enums import Mode
 from flightstack.core.errors import ConfigError
-from flightstack.core.kernel_cache import is_own
 from flightstack.params.config import DEFAULT_CONTROLLER, DEFAULT_HOME, parse_home
 from flightstack.params.gains_file import DEFAULT_GAINS
 from flightstack.params.store import read_assignment
@@ -149,7 +148,7 @@ class Scenario:
             self.path,
             *(setup.plan_path(plan) for plan in plans if plan is not None),
             *(Path(name) for name in records if name.endswith(".toml")),
-            *(() if is_own(controller.step.__module__) else controller.sources),
+            *(source for law in controller.own_laws.values() for source in law.sources),
         )
 
     def setup(self, seed: int) -> Setup:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from flightstack.control.controller_loading import load_controller
+from flightstack.control.loop_parameters import loop_numbers
 from flightstack.core.contract import Vector3
 from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import GeoPoint
@@ -21,7 +22,7 @@ from flightstack.params.vehicle import DEFAULT_VEHICLE, Vehicle, load_vehicle
 from flightstack.plan import Plan, load_plan
 from flightstack.process.assembly import vehicle_of
 from flightstack.process.clock import nearest_outer_hz, rates
-from flightstack.vehicle.parameters import load_parameters
+from flightstack.vehicle.parameters import load_parameters, read_parameters
 from gcs_cli.transfers.plan_files import example_plans
 from sim_bridge.arguments import check_battery, check_plant, check_range
 from sim_bridge.errors import UsageProblemError
@@ -120,7 +121,6 @@ class Setup:
         Raise ConfigError. Loops on a target are not connected.
         """
         config = self.stack_config()
-        parse_loops(config.loops)
         vehicle, loop_rates = vehicle_of(config), rates(config.inner_hz, config.outer_hz)
         self.plant_options(vehicle)
         parts = LoopsSetup(
@@ -130,7 +130,10 @@ class Setup:
             math.radians(config.behaviour.max_tilt_deg),
             *loop_rates[:3],
         )
-        load_parameters(config, make_loops(PYTHON, parts))
+        if parse_loops(config.loops).kind == PYTHON:
+            load_parameters(config, make_loops(PYTHON, parts))
+        else:
+            read_parameters(config, loop_numbers(*parts[:4]).specs)
         return vehicle
 
     def plant_options(self, vehicle: Vehicle) -> tuple[Vehicle, PlantOptions]:

@@ -30,6 +30,7 @@ class SerialPort:
 
     def __init__(self, device: str, baud: int) -> None:
         """Open ``device``; raise LineError."""
+        self._device = device
         self.name = f"{device} at {baud} baud"
         try:
             self._port = serial.Serial(device, baud, timeout=0.0, write_timeout=5.0, exclusive=True)
@@ -38,6 +39,16 @@ class SerialPort:
             raise LineError(f"{device}: {_reason(error)}") from error
         self._poll = select.poll()
         self._poll.register(self._port.fileno(), select.POLLIN)
+
+    def set_baud(self, baud: int) -> None:
+        """Change the baud rate and drop received bytes; raise LineError."""
+        try:
+            self._port.flush()
+            self._port.baudrate = baud
+            self._port.reset_input_buffer()
+        except (serial.SerialException, OSError, ValueError, OverflowError) as error:
+            raise LineError(f"{self._device}: cannot run at {baud} baud: {_reason(error)}") from error
+        self.name = f"{self._device} at {baud} baud"
 
     def write(self, data: bytes) -> None:
         """Send bytes; raise LineError if the connection is lost."""

@@ -118,11 +118,16 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "pil fly": ("gcs pil fly square", "gcs pil fly hop --target serial:/dev/ttyUSB1:921600 --open"),
     "pil replay": ("gcs pil replay flight.ulg", "gcs pil replay flight.ulg --target host --fail-over"),
+    "pil vectors": ("gcs pil vectors excitation.csv", "gcs pil vectors flight.mat --log flight.ulg"),
     "pil generate": (
         "gcs pil generate --controller lqr",
         "gcs pil generate --controller lqr --out build/lqr",
     ),
-    "pil doctor": ("gcs pil doctor --target emulated", "gcs pil doctor --port /dev/ttyUSB1 --baud 921600"),
+    "pil doctor": (
+        "gcs pil doctor --target emulated",
+        "gcs pil doctor --port /dev/ttyUSB1 --baud 921600",
+        "gcs pil doctor --port /dev/ttyACM0 --conformance",
+    ),
 }
 
 

@@ -8,25 +8,13 @@ from typing import Annotated
 
 import typer
 
-from flightstack.process.command_line import IN_LOOPS, IN_OUTPUT, PanelCommand, expand_options, make_app
-from gcs_cli.fly.fly_flags import FlyOptions, ResultOptions, RunOptions, complete_options
-from gcs_cli.settings import JsonOption
+from flightstack.process.command_line import IN_LOOPS, VEHICLE, PanelCommand, expand_options, make_app
+from flightstack.process.options import Controller, Gains, InnerHz, OuterHz
+from gcs_cli.fly.fly_flags import FlyOptions, RunOptions, complete_options
+from gcs_cli.pil.pil_flags import JudgeOptions
+from gcs_cli.settings import JsonOption, OverwriteOption
 
 app = make_app(add_completion=False)
-
-FailOverOption = Annotated[
-    bool, typer.Option("--fail-over", help="Exit with 1 when a difference is over its limit.", **IN_OUTPUT)
-]
-OutOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--out",
-        "-o",
-        metavar="DIR",
-        help="Directory of the results.  [default: runs/<stamp>-<name>-pil]",
-        **IN_OUTPUT,
-    ),
-]
 
 
 @app.command(cls=PanelCommand)
@@ -35,11 +23,10 @@ def fly(
     context: typer.Context,
     options: FlyOptions,
     run: RunOptions,
+    judge: JudgeOptions,
     target: Annotated[
         str, typer.Option(metavar="TARGET", help="emulated, host, or serial:DEVICE[:BAUD].", **IN_LOOPS)
     ] = "emulated",
-    out: OutOption = None,
-    fail_over: FailOverOption = False,
 ) -> None:
     """Fly a mission with each of the loops, and compare.
 
@@ -47,22 +34,22 @@ def fly(
     """
     from gcs_cli.pil.pil_commands import run_flights
 
-    run_flights(complete_options(context, "pil", options, run), run, target, out, fail_over)
+    run_flights(complete_options(context, "pil", options, run), judge, target)
 
 
 @app.command()
 @expand_options
 def replay(
-    log: Annotated[Path, typer.Argument(help="A flight log (ULog).", show_default=False)],
-    results: ResultOptions,
+    log: Annotated[
+        Path, typer.Argument(help="A flight log (ULog), or test vectors (.csv, .mat).", show_default=False)
+    ],
+    judge: JudgeOptions,
     target: Annotated[
         str, typer.Option(metavar="TARGET", help="emulated, host, c, or serial:DEVICE[:BAUD].")
     ] = "emulated",
     vehicle: Annotated[
         str | None, typer.Option(help="The vehicle's TOML file.  [default: the log's vehicle, by its name]")
     ] = None,
-    out: OutOption = None,
-    fail_over: FailOverOption = False,
 ) -> None:
     """Feed a target with the inputs of a flight log.
 
@@ -70,7 +57,33 @@ def replay(
     """
     from gcs_cli.pil.pil_commands import run_replay
 
-    run_replay(log, results, target, vehicle, out, fail_over)
+    run_replay(log, judge, target, vehicle)
+
+
+@app.command()
+def vectors(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="The file to write: .csv or .mat.", show_default=False)
+    ],
+    log: Annotated[
+        Path | None,
+        typer.Option(metavar="LOG", help="Take inputs and outputs from this flight log.", show_default=False),
+    ] = None,
+    vehicle: Annotated[str, VEHICLE] = "paper_quad",
+    controller: Controller = "pid",
+    gains: Gains = "tuned",
+    inner_hz: InnerHz = 500.0,
+    outer_hz: OuterHz = None,
+    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Write test vectors for a replay, as CSV or MATLAB.
+
+    Without a log, they are an excitation that reaches every term and limit of the loops.
+    """
+    from gcs_cli.pil.pil_commands import run_vectors
+
+    run_vectors(file, log, (vehicle, controller, gains, inner_hz, outer_hz), overwrite, as_json)
 
 
 @app.command()
@@ -105,9 +118,17 @@ def doctor(
         typer.Option(min=1_200, help="Rate to try; may be repeated.  [default: 115200 230400 460800 921600]"),
     ] = None,
     exchanges: Annotated[int, typer.Option(min=1, max=100_000, help="Steps to measure at each rate.")] = 300,
+    conformance: Annotated[
+        bool,
+        typer.Option("--conformance", help="Check that a port keeps the contract of the firmware instead."),
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Measure the link to a target, and suggest settings."""
+    from gcs_cli.pil.conformance.command import run_conformance
     from gcs_cli.pil.pil_commands import run_doctor
 
+    if conformance:
+        run_conformance(port, target, baud, as_json)
+        return
     run_doctor(port, target, baud, exchanges, as_json)

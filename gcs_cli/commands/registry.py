@@ -161,6 +161,7 @@ class PilGroup(LazyGroup):
     lazy = {  # noqa: RUF012
         _PIL_FLY: LazyCommand(_PIL, "Fly a mission with each of the loops, and compare."),
         "replay": LazyCommand(_PIL, "Feed a target with the inputs of a flight log."),
+        "vectors": LazyCommand(_PIL, "Write test vectors for a replay, as CSV or MATLAB."),
         "generate": LazyCommand(_PIL, "Write the firmware with your own controller as C."),
         "doctor": LazyCommand(_PIL, "Measure the link to a target, and suggest settings."),
     }

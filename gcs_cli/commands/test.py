@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import typer
 
 from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.errors import INTERRUPTED, USAGE, CliError
 from gcs_cli.scenarios.options import TestOptions
-from gcs_cli.settings import settings_of
+from gcs_cli.settings import check_output_file, settings_of
 
 app = make_app(add_completion=False)
 
@@ -27,8 +25,8 @@ def fly_scenarios(context: typer.Context, options: TestOptions) -> None:
         raise CliError("test flies vehicles of its own: leave --connect out", USAGE)
     if options.watch and options.as_json:
         raise CliError("--watch and --json exclude each other", USAGE)
-    _check_file("--junit", options.junit, (".xml",))
-    _check_file("--report", options.report, (".html", ".htm"))
+    check_output_file("--junit", options.junit, (".xml",))
+    check_output_file("--report", options.report, (".html", ".htm"))
     jobs = options.jobs or default_jobs()
     try:
         with Pool(jobs) as pool:  # its first worker imports while this process does
@@ -40,12 +38,3 @@ def fly_scenarios(context: typer.Context, options: TestOptions) -> None:
     except KeyboardInterrupt:  # not in flight
         raise CliError("interrupted", INTERRUPTED) from None
     raise typer.Exit(code)
-
-
-def _check_file(flag: str, path: Path | None, suffixes: tuple[str, ...]) -> None:
-    if path is None:
-        return
-    if path.suffix.lower() not in suffixes:
-        raise CliError(f"{flag} {path}: give the file a name that ends in {suffixes[0]}", USAGE)
-    if not path.parent.is_dir():
-        raise CliError(f"{flag} {path}: there is no directory {path.parent}", USAGE)

@@ -13,6 +13,18 @@ from gcs_cli.pil.flight_samples import FlightSamples, Samples
 from gcs_cli.pil.signals import SIGNALS, Signal
 from gcs_cli.pil.ulps import Float32Array, steps_apart, ulp_of
 
+_LEAST_VARIATION = 0.01
+"""Standard deviation of a component in least scales of its signal, from which a slope is meaningful."""
+
+
+class Line(NamedTuple):
+    """Least-squares line of the second flight on the first, of one component: ``slope`` × first + ``offset``."""
+
+    component: int
+    slope: float
+    offset: float
+    """In the signal's unit."""
+
 
 class Difference(NamedTuple):
     """Difference of one signal in two flights, over ticks in which the loops of both ran."""
@@ -29,6 +41,8 @@ class Difference(NamedTuple):
     """Largest value of the signal in the first flight, or its ``least_scale``."""
     steps: int
     """Largest number of float32 steps between two values."""
+    line: Line | None = None
+    """Regression of the component whose slope is furthest from 1; None if no component varies enough."""
 
     @property
     def ulps(self) -> float:
@@ -40,6 +54,11 @@ class Difference(NamedTuple):
         """The root mean square in units of the last place of ``full_scale``."""
         return self.rms / ulp_of(self.full_scale)
 
+    @property
+    def slope_ppm(self) -> float:
+        """Distance of the slope from 1 [10⁻⁶]; NaN without a line."""
+        return math.nan if self.line is None else abs(self.line.slope - 1.0) * 1e6
+
     def as_json(self, signal: Signal) -> dict[str, Any]:
         """Return the object for ``pil.json``; null for values that are not finite."""
         figures = {
@@ -49,6 +68,8 @@ class Difference(NamedTuple):
             "full_scale": self.full_scale,
             "ulps": self.ulps,
             "rms_ulps": self.rms_ulps,
+            "slope": math.nan if self.line is None else self.line.slope,
+            "offset": math.nan if self.line is None else self.line.offset,
         }
         return {
             "pair": self.pair,
@@ -58,6 +79,7 @@ class Difference(NamedTuple):
             "samples": self.samples,
             **{key: value if math.isfinite(value) else None for key, value in figures.items()},
             "float32_steps": self.steps,
+            "slope_component": None if self.line is None else self.line.component,
         }
 
 
@@ -162,4 +184,26 @@ def _difference(pair: str, signal: Signal, a: Samples, b: Samples, first: Flight
         float(_since_start_s(a, first)[at]) if largest else math.nan,
         max(float(sizes.max(initial=0.0)), signal.least_scale),
         int(np.where(apart > 0.0, steps_apart(a.values, b.values), 0).max()),
+        _regression(a.values, b.values, signal.least_scale),
     )
+
+
+def _regression(a: Float32Array, b: Float32Array, least_scale: float) -> Line | None:
+    """Return the line of the component whose slope is furthest from 1.
+
+    A component that varies by less than ``_LEAST_VARIATION`` of ``least_scale`` has no meaningful slope. The slope is
+    computed from the difference of the flights, so that its rounding is that of the difference.
+    """
+    first, second = a.astype(np.float64), b.astype(np.float64)
+    if not (np.isfinite(first).all() and np.isfinite(second).all()):
+        return None
+    centred = first - first.mean(axis=0)
+    variance = np.mean(centred**2, axis=0)
+    varies = np.sqrt(variance) >= _LEAST_VARIATION * least_scale
+    if not varies.any():
+        return None
+    excess = np.mean(centred * (second - first), axis=0) / np.where(varies, variance, 1.0)
+    component = int(np.where(varies, np.abs(excess), -1.0).argmax())
+    slope = 1.0 + float(excess[component])
+    offset = float(second[:, component].mean() - slope * first[:, component].mean())
+    return Line(component, slope, offset)

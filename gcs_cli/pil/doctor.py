@@ -9,11 +9,14 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from flightstack.core.errors import TargetError
 from flightstack.firmware.build import BuildError
 from flightstack.firmware.choice import SERIAL, LoopsChoice
+from flightstack.firmware.line_rate import negotiate_baud
 from flightstack.firmware.sources import source_hash
 from flightstack.firmware.targets import open_link, timing_of
-from flightstack.transports.byte_link import LineError
+from flightstack.transports.byte_link import ByteLink, LineError
+from flightstack.transports.serial_port import SerialPort
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
 from gcs_cli.pil.advice import Port, advice
 from gcs_cli.pil.probe import Measurement, measured
@@ -27,7 +30,7 @@ def examine(
     choice: LoopsChoice, bauds: Sequence[int], exchanges: int, progress: Callable[[int, int], None]
 ) -> list[Measurement]:
     """Measure the link at each baud rate, or once if it is not serial; raise CliError if it cannot be opened."""
-    found = []
+    found: list[Measurement] = []
     for baud in bauds if choice.kind == SERIAL else (None,):
         tried = choice if baud is None else choice._replace(baud=baud)
         try:
@@ -35,12 +38,21 @@ def examine(
         except (BuildError, LineError) as error:
             raise CliError(str(error), USAGE) from None
         try:
-            found.append(measured(link, baud, exchanges, progress, timing_of(tried)))
-        except OSError as error:  # LineError
+            note = None if all(each.identity is None for each in found) and found else _changed(link, tried)
+            if note is None:
+                found.append(measured(link, baud, exchanges, progress, timing_of(tried)))
+            else:
+                found.append(Measurement(baud, None, note))
+        except (OSError, TargetError) as error:
             raise CliError(str(error), NO_ANSWER) from None
         finally:
             link.close()
     return found
+
+
+def _changed(link: ByteLink, choice: LoopsChoice) -> str | None:
+    """Bring a serial line to the rate of ``choice``; return why that failed, or None."""
+    return negotiate_baud(link, choice.baud, timing_of(choice)) if isinstance(link, SerialPort) else None
 
 
 def port_of(choice: LoopsChoice) -> Port | None:

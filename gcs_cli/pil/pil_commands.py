@@ -3,51 +3,93 @@
 from __future__ import annotations
 
 import json
+import time
 import webbrowser
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
+from flightstack.core.atomic_file import write_bytes_atomically
 from flightstack.firmware.law_parity import VECTORS, differing_steps
 from flightstack.firmware.law_tree import controller_named, generated_names, is_built_in, write_tree
+from flightstack.process.clock import nearest_outer_hz
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.fly.fly_display import FlyConsole
-from gcs_cli.fly.fly_flags import FlyOptions, ResultOptions, RunOptions
+from gcs_cli.fly.fly_flags import FlyOptions
 from gcs_cli.fly.fly_options import checked_plan
+from gcs_cli.output import Output
 from gcs_cli.pil import doctor, replay_run
+from gcs_cli.pil.excitation import excitation
+from gcs_cli.pil.junit import pil_junit
+from gcs_cli.pil.limits_file import read_limits
+from gcs_cli.pil.pil_flags import JudgeOptions
 from gcs_cli.pil.result import PASSED, Outcome
 from gcs_cli.pil.run import HTML_NAME, make_pil_directory, run, write_outcome
-from gcs_cli.pil.targets import checked_target
-from gcs_cli.tui.transfer_bar import step_bar
+from gcs_cli.pil.targets import checked_target, port_or_target
+from gcs_cli.pil.vectors import SUFFIXES, Vectors, vectors_of, write_vectors
+from gcs_cli.pil.verdict import LimitSet
+from gcs_cli.settings import check_output_file
+from gcs_cli.tui.widgets.transfer_bar import step_bar
 
 
-def run_flights(
-    options: FlyOptions, chosen: RunOptions, target: str, out: Path | None, fail_over: bool
-) -> None:
+def run_flights(options: FlyOptions, judge: JudgeOptions, target: str) -> None:
     """Fly the mission as MIL, SIL and PIL and print the comparison; raise CliError, ConfigError."""
     checked_target(target)
-    items = checked_plan(options)
-    console = FlyConsole(stderr=chosen.as_json, highlight=False)
-    finished = run(options, items, target, out, console, chosen.overwrite)
-    _show(finished.outcome, finished.folder, console, chosen)
+    items, limits, began_s = checked_plan(options), _checked(judge), time.monotonic()
+    console = FlyConsole(stderr=judge.as_json, highlight=False)
+    finished = run(options, items, target, judge.out, console, judge.overwrite, limits.flight)
+    _finish(finished.outcome, finished.folder, console, judge, "pil.fly", began_s)
     if finished.problem is not None:
         raise finished.problem
-    _check_verdict(finished.outcome, fail_over)
+    _check_verdict(finished.outcome, judge.fail_over)
 
 
-def run_replay(
-    log: Path, chosen: ResultOptions, target: str, vehicle: str | None, out: Path | None, fail_over: bool
-) -> None:
+def run_replay(log: Path, judge: JudgeOptions, target: str, vehicle: str | None) -> None:
     """Replay a flight log on a target and print the comparison; raise CliError, ConfigError."""
-    choice = checked_target(target, more=("c",))
+    choice, limits, began_s = checked_target(target, more=("c",)), _checked(judge), time.monotonic()
     prepared = replay_run.prepared(log, vehicle)
-    folder = make_pil_directory(log.stem, out, chosen.overwrite)
-    console = FlyConsole(stderr=chosen.as_json, highlight=False)
-    outcome = replay_run.replay(log, choice, target, prepared, folder, console)
+    folder = make_pil_directory(log.stem, judge.out, judge.overwrite)
+    console = FlyConsole(stderr=judge.as_json, highlight=False)
+    outcome = replay_run.replay(log, choice, target, prepared, folder, console, limits)
     write_outcome(folder, outcome)
-    _show(outcome, folder, console, chosen)
-    _check_verdict(outcome, fail_over)
+    _finish(outcome, folder, console, judge, "pil.replay", began_s)
+    _check_verdict(outcome, judge.fail_over)
+
+
+def run_vectors(
+    file: Path,
+    log: Path | None,
+    loops: tuple[str, str, str, float, float | None],
+    overwrite: bool,
+    as_json: bool,
+) -> None:
+    """Write test vectors of a log, or of the excitation of ``loops``; raise CliError, ConfigError.
+
+    ``loops``: vehicle, controller, gains, rates of inner and outer loop.
+    """
+    if file.suffix.lower() not in SUFFIXES:
+        raise CliError(f"{file}: give the file a name that ends in {' or '.join(SUFFIXES)}", USAGE)
+    if file.exists() and not overwrite:
+        raise CliError(f"{file}: exists; give --overwrite to replace it", USAGE)
+    if log is None:
+        vehicle, controller, gains, inner_hz, outer_hz = loops
+        rates = inner_hz, outer_hz or nearest_outer_hz(inner_hz)
+        setup, info, parameters = replay_run.configured(vehicle, controller, gains, *rates)
+        vectors = Vectors(excitation(setup), None, info, parameters)
+    else:
+        vectors = vectors_of(*replay_run.read_flight(log))
+    write_vectors(file, vectors)
+    steps = len(vectors.record.time_us)
+    what = "excitation, inputs only" if log is None else f"inputs and outputs of {log.name}"
+    Output(as_json).say("vectors", f"{file}: {steps} steps, {what}", file=str(file), steps=steps)
+
+
+def _checked(judge: JudgeOptions) -> LimitSet:
+    """Return the limits; raise CliError or ConfigError for a file of ``judge`` that cannot be used."""
+    check_output_file("--junit", judge.junit, (".xml",))
+    return read_limits(judge.limits)
 
 
 def run_generate(name: str, out: Path | None, as_json: bool) -> None:
@@ -82,9 +124,7 @@ def run_doctor(
     port: str | None, target: str | None, bauds: list[int] | None, exchanges: int, as_json: bool
 ) -> None:
     """Measure the link to a serial port or a target and print the findings; raise CliError."""
-    if (port is None) == (target is None):
-        raise CliError("give either --port DEVICE or --target", USAGE)
-    choice = checked_target(f"serial:{port}" if target is None else target)
+    choice = port_or_target(port, target)
     rates = bauds or (doctor.BAUDS if target is None else [choice.baud])
     console = FlyConsole(stderr=as_json, highlight=False)
     with step_bar("exchanges", console) as bar:
@@ -97,12 +137,21 @@ def run_doctor(
     doctor.check_findings(result)
 
 
-def _show(outcome: Outcome, folder: Path, console: Console, chosen: ResultOptions) -> None:
-    if chosen.as_json:
+def _finish(
+    outcome: Outcome, folder: Path, console: Console, judge: JudgeOptions, command: str, began_s: float
+) -> None:
+    """Print the outcome, and write the file of ``--junit``; raise CliError."""
+    if judge.as_json:
         print(json.dumps({**outcome.result, "directory": str(folder)}), flush=True)
     else:
         print_outcome(console, outcome.result, folder)
-    if chosen.open_report:
+    if judge.junit is not None:
+        try:
+            content = pil_junit(outcome.result, command, time.monotonic() - began_s)
+            write_bytes_atomically(judge.junit, content)
+        except OSError as error:
+            raise CliError(f"--junit {judge.junit}: cannot be written: {error.strerror}", USAGE) from None
+    if judge.open_report:
         webbrowser.open((folder / HTML_NAME).resolve().as_uri())
 
 
@@ -126,10 +175,24 @@ def print_outcome(console: Console, result: dict[str, Any], folder: Path) -> Non
         unit = result["profile"]["unit"]
         words = f"mean {figures['mean']:.1f}, p99 {figures['p99']:.0f}, max {figures['max']:.0f} {unit}"
         console.print(f"[bright_black]{stage:<9}[/]{words}", highlight=False)
+    for line in _code_lines(result):
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
     style = "green" if result["verdict"] == PASSED else "red"
     console.print(f"[bright_black]verdict  [/][{style}]{result['verdict']}[/]", highlight=False)
     console.print("[bright_black]files    [/]", end="")
     console.print(f"{folder}/  pil.html pil.json", markup=False, highlight=False, soft_wrap=True)
+
+
+def _code_lines(result: dict[str, Any]) -> Iterator[str]:
+    """Yield a line for each of CPU load, coverage and stack that is known."""
+    load, coverage, usage = result["load"], result["coverage"], result["stack_usage"]
+    if load is not None:
+        percent = f"mean {load['mean_percent']:.3g} %, max {load['max_percent']:.3g} %"
+        yield f"load     {percent} of {load['period_us']:g} µs at {load['clock_hz'] / 1e6:g} MHz"
+    if coverage is not None:
+        yield f"coverage {coverage['percent']:.1f} % of {coverage['lines']} lines of core"
+    if usage is not None:
+        yield f"stack    {usage['total']} bytes on the deepest path, {usage['compiler']}"
 
 
 def _cells(check: dict[str, Any]) -> tuple[str, str, str, str]:

@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flightstack.core.contract import LoopFlags
-from flightstack.firmware.pil_client import DEFAULT_TIMING, PilClient, PilCounters, PilTiming
-from flightstack.firmware.target_loops import described
+from flightstack.firmware.identity import described
+from flightstack.firmware.pil_client import DEFAULT_TIMING, PilCounters, PilTiming
+from flightstack.firmware.pil_session import PilSession
 from flightstack.transports.byte_link import ByteLink
 
 EXCHANGES = 300
@@ -20,7 +21,6 @@ HELLO_ATTEMPTS, STEADY_ATTEMPTS = 4, 5
 LEVEL = [0.0] * 6 + [1.0] + [0.0] * 16 + [1e-3]
 """A level vehicle at its setpoint: each step resets the loops, so that they stay at rest. The last number makes the
 frame as long as those of a flight: zeros at the end are not sent."""
-_MOST_READS = 10_000
 _TROUBLES = ("bad_frames", "skipped_octets", "uart_overruns", "uart_errors", "dropped_frames")
 
 
@@ -77,48 +77,19 @@ class Probe:
         self, link: ByteLink, timing: PilTiming, clock_s: Callable[[], float] = time.monotonic
     ) -> None:
         """``timing`` is that of flights on this link; see ``targets.timing_of``."""
-        self._link, self._timing, self._clock_s = link, timing, clock_s
-        self._waited_s = 0.0  # in addition to the clock: an emulated target does not wait in real time
-        self.client = PilClient(timing._replace(attempts=HELLO_ATTEMPTS))
-
-    @property
-    def _now_s(self) -> float:
-        return self._clock_s() + self._waited_s
+        self._session = PilSession(link, timing, clock_s)
+        self._timing, self.client = timing, self._session.client
 
     def request(self, name: str) -> Any | None:
         """Request a message; return None without an answer. Raise LineError."""
-        self.client.timing = self._timing._replace(attempts=HELLO_ATTEMPTS)
-        self.client.start_request(name)
-        return self._finished()
+        return self._session.request(name, HELLO_ATTEMPTS)
 
     def step(self) -> float | None:
         """Run a step at rest and return its round trip [s]; None without an answer. Raise LineError."""
         self.client.timing = self._timing._replace(attempts=STEADY_ATTEMPTS)
         self.client.start_step(LoopFlags.RESET | LoopFlags.OUTER_DUE, LEVEL)
-        began_s = self._now_s
-        return None if self._finished() is None else self._now_s - began_s
-
-    def _finished(self) -> Any | None:
-        client = self.client
-        while client.failure is None and client.result is None:
-            data = client.poll(self._now_s)
-            if data:
-                self._link.write(data)
-            self._listen()
-        return client.result
-
-    def _listen(self) -> None:
-        for _ in range(_MOST_READS):
-            deadline_s = self.client.next_deadline()
-            if deadline_s is None or deadline_s <= self._now_s:
-                return
-            before_s, left_s = self._clock_s(), deadline_s - self._now_s
-            data = self._link.read(left_s)
-            if data:
-                self.client.receive(data, self._now_s)
-            else:
-                self._waited_s += max(0.0, left_s - (self._clock_s() - before_s))
-        self._waited_s += max(0.0, (self.client.next_deadline() or 0.0) - self._now_s)
+        began_s = self._session.now_s
+        return None if self._session.finish() is None else self._session.now_s - began_s
 
 
 def measured(

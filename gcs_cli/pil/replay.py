@@ -5,7 +5,8 @@ Logs and links to targets both carry float32: a flight with the loops in C repla
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import itertools
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
@@ -18,7 +19,7 @@ FlagArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
 STATE, SETPOINT, TARGET, INPUT_SIZE = slice(0, 13), slice(13, 24), slice(24, 29), 29
 OUTPUT_SIZE, STATUS_AT = 32, 31
-_OUTPUTS = {
+OUTPUTS = {
     "target_attitude": slice(0, 4),
     "target_thrust": slice(4, 5),
     "reference_attitude": slice(5, 9),
@@ -35,20 +36,17 @@ _SETPOINT_FIELDS = (
     *(f"{name}[{axis}]" for name in ("position", "velocity", "acceleration") for axis in range(3)),
     *("yaw", "yawspeed"),
 )
-_PROGRESS_STEPS = 500
+_PROGRESS_STEPS = 200
 
 
 class Loops(Protocol):
     """Computes steps of the loops; see ``flightstack.firmware.c_loops.LoopExecutor``."""
 
-    input: FloatArray
-    output: FloatArray
-
     def set(self, name: str, value: float) -> None:
         """Change a parameter from the next step on."""
 
-    def step(self, flags: int) -> None:
-        """Compute a step from ``input`` into ``output``."""
+    def run(self, flags: Sequence[int], inputs: FloatArray) -> FloatArray:
+        """Compute steps from ``inputs`` (n, 29); return their outputs (n, 32)."""
 
 
 class UnfitLogError(ValueError):
@@ -174,28 +172,25 @@ def replayed(
     count = len(record.time_us)
     outputs = np.empty((count, OUTPUT_SIZE))
     flags = record.flags.tolist()
-    for index in range(count):
-        for name, value in record.changes.get(index, ()):
+    begins = sorted({*range(0, count, _PROGRESS_STEPS), *(at for at in record.changes if at < count)})
+    for begin, end in itertools.pairwise((*begins, count)):
+        for name, value in record.changes.get(begin, ()):
             if known(name):
                 loops.set(name, value)
-        loops.input[:] = record.inputs[index]
-        loops.step(flags[index])
-        outputs[index] = loops.output
-        if index % _PROGRESS_STEPS == 0:
-            progress(index, count)
-    progress(count, count)
+        outputs[begin:end] = loops.run(flags[begin:end], record.inputs[begin:end])
+        progress(end, count)
     return outputs
 
 
-def as_flight(record: Recording, outputs: FloatArray, flight: FlightSamples) -> FlightSamples:
-    """Return the outputs in the form of a log, for comparison with the replayed one.
+def as_flight(record: Recording, outputs: FloatArray, info: Mapping[str, Any]) -> FlightSamples:
+    """Return the outputs in the form of a log with this ``info``, for comparison with others.
 
     The attitude target is that of the outer ticks. If the log does not mark those of the outer loop, all were given,
     and none is compared.
     """
     signals = {
         name: Samples(record.time_us, outputs[:, columns].astype(np.float32))
-        for name, columns in _OUTPUTS.items()
+        for name, columns in OUTPUTS.items()
     }
     aims = record.is_outer & ((record.flags & LoopFlags.OUTER_DUE) != 0)
     for name in _OF_TARGET:
@@ -203,4 +198,4 @@ def as_flight(record: Recording, outputs: FloatArray, flight: FlightSamples) -> 
         if record.tells_targets:
             signals[name] = Samples(samples.time_us[aims], samples.values[aims])
     status = Samples(record.time_us, outputs[:, STATUS_AT:].astype(np.float32))
-    return flight._replace(signals=signals, status=status)
+    return FlightSamples(signals, status, {}, info, {}, ())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,18 +15,23 @@ from flightstack.core.contract import FloatArray
 from flightstack.core.errors import ConfigError, TargetError
 from flightstack.firmware.c_loops import CLoops, LoopsSetup
 from flightstack.firmware.choice import PYTHON, SERIAL, LoopsChoice
-from flightstack.firmware.law_tree import controller_named
+from flightstack.firmware.law_tree import controller_named, logged_params, own_params
+from flightstack.firmware.stages import has_model
 from flightstack.firmware.targets import finish_loops, make_loops
+from flightstack.flight_log.flight_log import vehicle_fields
+from flightstack.params.behaviour import SPECS
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
 from flightstack.params.vehicle import Vehicle, load_vehicle
 from gcs_cli.errors import NO_ANSWER, USAGE, CliError
-from gcs_cli.pil.compare import compared, deviation
+from gcs_cli.pil.code_facts import code_facts
+from gcs_cli.pil.compare import Difference, compared, deviation
 from gcs_cli.pil.flight_samples import FlightSamples, read_samples
 from gcs_cli.pil.replay import Recording, UnfitLogError, as_flight, recording, replayed
 from gcs_cli.pil.report_charts import DeviationChart
 from gcs_cli.pil.result import (
     Outcome,
     assembled,
+    costs_of,
     largest_difference,
     pair_name,
     profiles_of,
@@ -35,14 +40,26 @@ from gcs_cli.pil.result import (
     target_tiles,
 )
 from gcs_cli.pil.signals import BY_NAME, TARGET
+from gcs_cli.pil.stagewise import STAGEWISE, expected_outputs
 from gcs_cli.pil.target_record import TargetRecord, read_record
 from gcs_cli.pil.targets import has_same_bits, meaning
-from gcs_cli.pil.verdict import OPEN_LOOP_ULPS, board_limits, difference_checks, same_bits_limits
+from gcs_cli.pil.vectors import SUFFIXES, read_vectors
+from gcs_cli.pil.verdict import (
+    DEFAULT_LIMITS,
+    Check,
+    Limits,
+    LimitSet,
+    board_limits,
+    difference_checks,
+    same_bits_limits,
+)
 from gcs_cli.report.run_directory import LOG_NAME
-from gcs_cli.tui.transfer_bar import step_bar
+from gcs_cli.tui.widgets.transfer_bar import step_bar
 
 LOG = "log"
 _TILT = "MPC_TILTMAX_AIR"
+_OF_TARGET = "FS_"
+"""Prefix of numbers of a target that are no parameters."""
 _SHOWN = ("target_attitude", "reference_acceleration", "torque", "rotor_command")
 _MASS_TOLERANCE = 1e-6
 
@@ -57,17 +74,46 @@ class Replay(NamedTuple):
     """Parameters of the loops at the start of the log."""
 
 
-def prepared(log: Path, vehicle: str | None) -> Replay:
-    """Read a log and configure the loops that flew it; raise ConfigError, CliError (usage)."""
-    flight = read_samples(log)
-    try:
-        record = recording(flight)
-    except UnfitLogError as error:
-        raise ConfigError(log, "", f"cannot be replayed: {error}") from error
-    setup = _setup(flight, log, vehicle)
+def prepared(source: Path, vehicle: str | None) -> Replay:
+    """Read a log or a file of test vectors and configure the loops; raise ConfigError, CliError (usage)."""
+    if source.suffix.lower() in SUFFIXES:
+        vectors = read_vectors(source)
+        flight, record = vectors.as_flight(), vectors.record
+    else:
+        flight, record = read_flight(source)
+    setup = _setup(flight, source, vehicle)
     names = setup.numbers()
     numbers = {name: value for name, value in flight.parameters.items() if name in names}
     return Replay(flight, record, setup, numbers)
+
+
+def read_flight(log: Path) -> tuple[FlightSamples, Recording]:
+    """Read a log; raise ConfigError."""
+    flight = read_samples(log)
+    try:
+        return flight, recording(flight)
+    except UnfitLogError as error:
+        raise ConfigError(log, "", f"cannot be replayed: {error}") from error
+
+
+def configured(
+    vehicle: str, controller: str, gains: str, inner_hz: float, outer_hz: float
+) -> tuple[LoopsSetup, dict[str, Any], dict[str, float]]:
+    """Return the setup of loops that did not fly, its info entries and its parameters; raise ConfigError."""
+    flown = load_vehicle(vehicle)
+    setup = LoopsSetup(
+        flown,
+        controller_named(controller),
+        open_gains(gains),
+        math.radians(SPECS[_TILT].default),
+        inner_hz,
+        outer_hz,
+        max(1, round(inner_hz / outer_hz)),
+    )
+    info = {**vehicle_fields(flown), "controller": controller, "gains": gains}
+    info |= {"inner_hz": inner_hz, "outer_hz": outer_hz, **own_params(setup)}
+    own = {name: value for name, value in setup.numbers().items() if not name.startswith(_OF_TARGET)}
+    return setup, info, own
 
 
 def _setup(flight: FlightSamples, log: Path, vehicle: str | None) -> LoopsSetup:
@@ -77,14 +123,16 @@ def _setup(flight: FlightSamples, log: Path, vehicle: str | None) -> LoopsSetup:
         tilt_deg = flight.parameters[_TILT]
     except KeyError as error:
         raise ConfigError(log, "", f"cannot be replayed: it does not say its {error.args[0]}") from error
+    controller = controller_named(name)
     return LoopsSetup(
         _vehicle(flight, log, vehicle),
-        controller_named(name),
+        controller,
         open_gains(DEFAULT_GAINS),  # each gain is a parameter, and the values of the log replace them
         math.radians(tilt_deg),
         inner_hz,
         outer_hz,
         max(1, round(inner_hz / outer_hz)),
+        logged_params(controller, str(info.get("law_params", "{}")), log),
     )
 
 
@@ -126,7 +174,13 @@ def fed(replay: Replay, target: str, folder: Path, console: Console) -> tuple[Fl
 
 
 def replay(
-    log: Path, choice: LoopsChoice, target: str, prepared_replay: Replay, folder: Path, console: Console
+    log: Path,
+    choice: LoopsChoice,
+    target: str,
+    prepared_replay: Replay,
+    folder: Path,
+    console: Console,
+    limits: LimitSet = DEFAULT_LIMITS,
 ) -> Outcome:
     """Replay a log on a target and compare; raise ConfigError, CliError."""
     outputs, version = fed(prepared_replay, target, folder, console)
@@ -135,10 +189,13 @@ def replay(
         "title": f"{log.name} replayed: {target}",
         "about": f"{len(outputs)} steps of {log.name} · {version}",
         "meaning": f"Open loop: the inputs that the log holds are fed to the target, step by step, and its outputs "
-        f"compared with the log's. {meaning(choice, replay=True)}",
+        "compared with the log's, and stage by stage with Python's, computed in float64 from what the target reports. "
+        f"{meaning(choice, replay=True)}",
         "conditions": _conditions(log, target, prepared_replay),
+        "inner_hz": prepared_replay.setup.inner_hz,
+        **code_facts(record, prepared_replay.setup.controller.name),
     }
-    return judged(prepared_replay, outputs, record, has_same_bits(choice), facts)
+    return judged(prepared_replay, outputs, record, has_same_bits(choice), facts, limits)
 
 
 def _conditions(log: Path, target: str, replay: Replay) -> dict[str, Any]:
@@ -153,35 +210,76 @@ def judged(
     record: TargetRecord | None,
     same_bits: bool,
     facts: Mapping[str, Any],
+    limits: LimitSet = DEFAULT_LIMITS,
 ) -> Outcome:
-    """Compare the outputs with the log and check them. Pure."""
-    flight = replay.flight
-    made = as_flight(replay.record, outputs, flight)
-    pair = pair_name(LOG, "target")
+    """Compare the outputs with the log and with Python's stages, and check them. Pure."""
+    flight, steps = replay.flight, replay.record
+    made = as_flight(steps, outputs, {})
+    modelled = has_model(replay.setup)
+    computed = expected_outputs(steps, outputs, replay.setup, replay.numbers) if modelled else outputs
+    expected = as_flight(steps, computed, {})
+    pair, stages = pair_name(LOG, "target"), pair_name(STAGEWISE, "target")
     differences = list(compared(pair, flight, made))
-    flown = str(flight.info.get("loops", PYTHON))
-    exact = same_bits and flown != PYTHON and not flown.startswith(SERIAL)
-    limits = same_bits_limits(OPEN_LOOP_ULPS) if exact else OPEN_LOOP_ULPS
-    if not exact and not (flown == PYTHON or same_bits):
-        limits = board_limits(OPEN_LOOP_ULPS)
+    by_stage = list(compared(stages, expected, made)) if modelled else []
+    left_out = None if steps.tells_targets else TARGET
+    of_stages = limits.stages if same_bits else board_limits(limits.stages)
     checks = [
-        *difference_checks(pair, differences, limits, None if replay.record.tells_targets else TARGET),
-        status_check(f"{pair} steps of another status", flight, made, exact),
+        *(_log_checks(pair, differences, replay, made, same_bits, limits.replay) if flight.signals else ()),
+        *(_stage_checks(stages, by_stage, of_stages, left_out, expected, made) if modelled else ()),
         *(target_checks(record, len(outputs)) if record is not None else ()),
     ]
-    result = assembled(differences, checks, record, facts)
+    result = assembled([*differences, *by_stage], checks, record, facts)
+    if not modelled:
+        result["meaning"] += " A law is written in C: it has no stage in Python to compare with."
     if not replay.record.tells_targets:
         result["meaning"] += (
             " This log does not tell which attitude targets the outer loop made: all were given to the inner loop, "
             "and the outer loop did not run."
         )
+    shown = pair if differences else stages
     result["tiles"] = [
-        {"name": f"largest difference {pair}", "value": largest_difference(differences)},
+        {"name": f"largest difference {shown}", "value": largest_difference(differences or by_stage)},
         *target_tiles(record),
     ]
+    first = flight if differences else expected
     charts = [
-        DeviationChart(BY_NAME[name], {pair: deviation(BY_NAME[name], flight, made)}) for name in _SHOWN
+        DeviationChart(BY_NAME[name], {shown: deviation(BY_NAME[name], first, made)}) for name in _SHOWN
     ]
     return Outcome(
-        result, [chart for chart in charts if np.size(chart.pairs[pair].size)], profiles_of(record)
+        result,
+        [chart for chart in charts if np.size(chart.pairs[shown].size)],
+        profiles_of(record),
+        costs_of(record),
     )
+
+
+def _stage_checks(
+    pair: str,
+    differences: Sequence[Difference],
+    limits: Limits,
+    left_out: str | None,
+    expected: FlightSamples,
+    made: FlightSamples,
+) -> Iterator[Check]:
+    """Yield the checks against Python's stages."""
+    yield from difference_checks(pair, differences, limits, left_out)
+    yield status_check(f"{pair} steps of another status", expected, made, False)
+
+
+def _log_checks(
+    pair: str,
+    differences: Sequence[Difference],
+    replay: Replay,
+    made: FlightSamples,
+    same_bits: bool,
+    limits: Limits,
+) -> Iterator[Check]:
+    """Yield the checks against the outputs in the log, which has the same bits if C flew on the same arithmetic."""
+    flown = str(replay.flight.info.get("loops", PYTHON))
+    exact = same_bits and flown != PYTHON and not flown.startswith(SERIAL)
+    if exact:
+        limits = same_bits_limits(limits)
+    elif not (flown == PYTHON or same_bits):
+        limits = board_limits(limits)
+    yield from difference_checks(pair, differences, limits, None if replay.record.tells_targets else TARGET)
+    yield status_check(f"{pair} steps of another status", replay.flight, made, exact)

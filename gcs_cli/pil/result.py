@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import Any, NamedTuple
 
+from flightstack.core.contract import FloatArray
 from gcs_cli.pil.compare import (
     Difference,
     compared,
@@ -15,16 +16,17 @@ from gcs_cli.pil.compare import (
     ticks_apart,
 )
 from gcs_cli.pil.flight_samples import FlightSamples
-from gcs_cli.pil.profile import StageProfile, stage_profiles
+from gcs_cli.pil.profile import StageProfile, cpu_load, stage_profiles
 from gcs_cli.pil.report_charts import DeviationChart
 from gcs_cli.pil.signals import BY_NAME
 from gcs_cli.pil.target_record import TargetRecord
 from gcs_cli.pil.verdict import (
-    CLOSED_LOOP_ULPS,
+    DEFAULT_LIMITS,
     MIL,
     PIL,
     SIL,
     Check,
+    Limits,
     all_passed,
     board_limits,
     difference_checks,
@@ -61,6 +63,8 @@ class Outcome(NamedTuple):
     result: dict[str, Any]
     charts: list[DeviationChart]
     profiles: list[StageProfile]
+    costs: FloatArray | None = None
+    """Cost of the stages of each step, (steps, 4); None without a target that measures them."""
 
     @property
     def passed(self) -> bool:
@@ -74,7 +78,11 @@ def pair_name(first: str, second: str) -> str:
 
 
 def closed_loop(
-    flights: Mapping[str, Flown], record: TargetRecord | None, same_bits: bool, facts: Mapping[str, Any]
+    flights: Mapping[str, Flown],
+    record: TargetRecord | None,
+    same_bits: bool,
+    facts: Mapping[str, Any],
+    limits: Limits = DEFAULT_LIMITS.flight,
 ) -> Outcome:
     """Compare the flights MIL, SIL and PIL, each with its own vehicle, and check them.
 
@@ -92,7 +100,7 @@ def closed_loop(
             chart.pairs[pair] = deviation(BY_NAME[name], first, second, airborne=not exact)
     checks = [
         Check("flights that failed", 0.0, _failures(flights), "", _reasons(flights)),
-        *_closed_loop_checks(there, differences, same_bits),
+        *_closed_loop_checks(there, differences, same_bits, limits),
         *(target_checks(record, len(there[PIL].flown_us)) if PIL in there else ()),
     ]
     listed = [difference for pair in differences.values() for difference in pair]
@@ -112,7 +120,7 @@ def closed_loop(
     }
     result["compared"] = _ABOUT_TICKS + ("every tick in which the loops run." if same_bits else "the same.")
     result["tiles"] = [*_tiles(differences, checks), *target_tiles(record)]
-    return Outcome(result, list(charts.values()), profiles_of(record))
+    return Outcome(result, list(charts.values()), profiles_of(record), costs_of(record))
 
 
 def assembled(
@@ -124,11 +132,15 @@ def assembled(
     """Return the keys that every ``pil.json`` has."""
     return {
         "format": FORMAT,
+        "inner_hz": None,
+        "coverage": None,
+        "stack_usage": None,
         **facts,
         "verdict": PASSED if all_passed(checks) else FAILED,
         "checks": [check.as_json() for check in checks],
         "differences": [found.as_json(BY_NAME[found.signal]) for found in differences],
         "profile": _profile(record),
+        "load": _load(record, facts.get("inner_hz")),
         "target": None if record is None else dict(record.identity),
         "stack": _stack(record),
         "link": {} if record is None else dict(record.link),
@@ -157,7 +169,10 @@ def _reasons(flights: Mapping[str, Flown]) -> str:
 
 
 def _closed_loop_checks(
-    flights: Mapping[str, FlightSamples], differences: Mapping[str, Sequence[Difference]], same_bits: bool
+    flights: Mapping[str, FlightSamples],
+    differences: Mapping[str, Sequence[Difference]],
+    same_bits: bool,
+    limits: Limits,
 ) -> Iterator[Check]:
     for a, b in combinations(flights, 2):
         pair, first, second = pair_name(a, b), flights[a], flights[b]
@@ -166,10 +181,10 @@ def _closed_loop_checks(
         yield Check(f"{pair} ticks flown by one alone", 0.0 if exact else _LANDING_TICKS, apart, "")
         if MIL not in (a, b):
             yield status_check(f"{pair} ticks of another status", first, second, exact)
-        limits: Mapping[str, float] = CLOSED_LOOP_ULPS
+        of_pair = limits
         if MIL not in (a, b):
-            limits = same_bits_limits(limits) if exact else board_limits(limits)
-        yield from difference_checks(pair, differences[pair], limits)
+            of_pair = same_bits_limits(limits) if exact else board_limits(limits)
+        yield from difference_checks(pair, differences[pair], of_pair)
 
 
 def status_check(name: str, first: FlightSamples, second: FlightSamples, exact: bool) -> Check:
@@ -202,9 +217,21 @@ def target_checks(record: TargetRecord | None, ticks: int) -> Iterator[Check]:
         yield Check("steps that overran their period", 0.0, float(overruns), "")
 
 
+def costs_of(record: TargetRecord | None) -> FloatArray | None:
+    """Return the costs of all steps, or None if the target measures none."""
+    return None if record is None or not record.unit else record.costs
+
+
 def profiles_of(record: TargetRecord | None) -> list[StageProfile]:
     """Return the profile of each stage; empty if the target measures no cost."""
     return [] if record is None or not record.unit else stage_profiles(record.costs)
+
+
+def _load(record: TargetRecord | None, inner_hz: float | None) -> dict[str, Any] | None:
+    if record is None:
+        return None
+    load = cpu_load(profiles_of(record), record.unit, record.identity["clock_hz"], inner_hz)
+    return None if load is None else load.as_json()
 
 
 def _profile(record: TargetRecord | None) -> dict[str, Any] | None:

@@ -19,12 +19,13 @@ from gcs_cli.fly.fly_display import BarDisplay, Display, draws_bars
 from gcs_cli.fly.fly_flags import FlyOptions
 from gcs_cli.fly.fly_options import outer_rate_hz
 from gcs_cli.fly.fly_run import fly, write_results
+from gcs_cli.pil.code_facts import code_facts
 from gcs_cli.pil.flight_samples import read_samples
 from gcs_cli.pil.report import render_report
 from gcs_cli.pil.result import COMPLETED, Flown, Outcome, closed_loop
 from gcs_cli.pil.target_record import TargetRecord, read_record
 from gcs_cli.pil.targets import check_there, checked_target, has_same_bits, meaning
-from gcs_cli.pil.verdict import MIL, PIL, SIL
+from gcs_cli.pil.verdict import DEFAULT_LIMITS, MIL, PIL, SIL, Limits
 from gcs_cli.report.run_directory import LOG_NAME, RUNS, fresh_directory
 
 JSON_NAME, HTML_NAME = "pil.json", "pil.html"
@@ -57,7 +58,13 @@ class Finished(NamedTuple):
 
 
 def run(
-    options: FlyOptions, plan: Plan, target: str, out: Path | None, console: Console, overwrite: bool = False
+    options: FlyOptions,
+    plan: Plan,
+    target: str,
+    out: Path | None,
+    console: Console,
+    overwrite: bool = False,
+    limits: Limits = DEFAULT_LIMITS.flight,
 ) -> Finished:
     """Fly the mission three times and write ``pil.json`` and ``pil.html``; raise CliError, ConfigError.
 
@@ -83,8 +90,10 @@ def run(
         "about": _about(options, target),
         "meaning": meaning(choice),
         "conditions": _conditions(options, target),
+        "inner_hz": options.inner_hz,
+        **code_facts(record, options.controller),
     }
-    outcome = closed_loop(flights, record, has_same_bits(choice), facts)
+    outcome = closed_loop(flights, record, has_same_bits(choice), facts, limits)
     write_outcome(folder, outcome)
     return Finished(folder, outcome, problem)
 
@@ -187,7 +196,7 @@ def _battery(options: FlyOptions) -> str | None:
 def write_outcome(folder: Path, outcome: Outcome) -> None:
     """Write ``pil.json`` and ``pil.html`` atomically; raise CliError."""
     text = json.dumps(outcome.result, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
-    html = render_report(outcome.result, outcome.charts, outcome.profiles)
+    html = render_report(outcome.result, outcome.charts, outcome.profiles, outcome.costs)
     try:
         write_text_atomically(folder / JSON_NAME, text)
         write_text_atomically(folder / HTML_NAME, html)

@@ -12,8 +12,8 @@ import numpy as np
 
 from flightstack.core.contract import FloatArray
 from flightstack.core.errors import ConfigError
-from flightstack.firmware.pil_operations import BAD_INPUT, OVERRUN
 from flightstack.firmware.pil_record import COST_UNITS, LINK_FILE, STEPS_FILE
+from flightstack.firmware.pil_steps import BAD_INPUT, OVERRUN
 
 StatusArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 NO_COUNTERS = ("time_boot_ms", "stack_size", "stack_high_water", "state")
@@ -41,6 +41,8 @@ class TargetRecord(NamedTuple):
     """Steps reported with stopped rotors."""
     ending: str | None = None
     """The reason of an early end, or None."""
+    trace: Mapping[str, Any] | None = None
+    """``image`` and ``executed`` addresses of an emulated target."""
 
     @property
     def counted(self) -> dict[str, int]:
@@ -111,4 +113,5 @@ def record_of(content: Mapping[str, Any], costs: FloatArray, statuses: StatusArr
         overruns,
         bad_inputs,
         content["ending"],
+        content.get("trace"),
     )

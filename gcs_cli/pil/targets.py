@@ -36,7 +36,20 @@ def checked_target(text: str, more: tuple[str, ...] = (), flag: str = "--target"
     if text.partition(":")[0] not in (HOST, EMULATED, SERIAL, *more):
         known = ", ".join([EMULATED, HOST, *more])
         raise CliError(f"{flag} {text}: expected {known} or serial:DEVICE[:BAUD]", USAGE)
-    return parse_loops(text, flag)
+    choice = parse_loops(text, flag)
+    if choice.ending:
+        raise CliError(
+            f"{flag} {text}: every stage is compared, which needs full reports: leave out ,{choice.ending}",
+            USAGE,
+        )
+    return choice
+
+
+def port_or_target(port: str | None, target: str | None) -> LoopsChoice:
+    """Return the target of ``--port`` or ``--target``; raise CliError (usage), ConfigError."""
+    if (port is None) == (target is None):
+        raise CliError("give either --port DEVICE or --target", USAGE)
+    return checked_target(f"serial:{port}" if target is None else target)
 
 
 def check_there(target: LoopsChoice, controller: str) -> Path | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from gcs_cli.pil.compare import Difference
@@ -50,14 +50,85 @@ OPEN_LOOP_ULPS = {
 """The same for the same inputs, replayed from the logs of those flights of Python's loops, on the ground as well."""
 
 
-def same_bits_limits(limits_ulps: Mapping[str, float]) -> dict[str, float]:
+class Limits(NamedTuple):
+    """Limits by the name of a signal. A signal without a limit of a kind is not checked in that respect."""
+
+    ulp: Mapping[str, float]
+    """Largest difference [ulp]."""
+    rms_ulp: Mapping[str, float] = {}  # never changed
+    """Root mean square of the difference [ulp]."""
+    slope_ppm: Mapping[str, float] = {}
+    """Distance of the regression's slope from 1 [10⁻⁶]."""
+
+    def scaled(self, factor: float) -> Limits:
+        """Return all limits times a factor."""
+        return Limits(*({name: factor * limit for name, limit in kind.items()} for kind in self))
+
+
+_SLOPE_PPM = 2.0
+STAGE_LIMITS = Limits(
+    {
+        "target_attitude": 10.0,  # measured 2.4
+        "target_thrust": 12.0,  # 3.0
+        "reference_attitude": 6.0,  # 1.5
+        "reference_rates": 32.0,  # 8.0
+        "reference_acceleration": 700.0,  # 169
+        "thrust": 0.0,  # the target's own attitude target, unchanged
+        "torque": 10.0,  # 2.5
+        "thrust_achieved": 4.0,  # 1.0
+        "torque_achieved": 8.0,  # 2.0
+        "rotor_command": 44.0,  # 11
+    },
+    {
+        "target_attitude": 2.0,  # 0.50
+        "target_thrust": 4.0,  # 0.95
+        "reference_attitude": 1.0,  # 0.25
+        "reference_rates": 3.5,  # 0.86
+        "reference_acceleration": 48.0,  # 12
+        "thrust": 0.0,
+        "torque": 1.7,  # 0.41
+        "thrust_achieved": 1.3,  # 0.32
+        "torque_achieved": 1.7,  # 0.41
+        "rotor_command": 2.3,  # 0.55
+    },
+    {
+        "target_attitude": _SLOPE_PPM,  # 0.43
+        "target_thrust": _SLOPE_PPM,  # 0.03
+        "reference_attitude": _SLOPE_PPM,  # 0.07
+        "reference_rates": _SLOPE_PPM,  # 0.03
+        "reference_acceleration": 8.0,  # 1.8
+        "torque": _SLOPE_PPM,  # 0.03
+        "thrust_achieved": _SLOPE_PPM,  # 0.08
+        "torque_achieved": _SLOPE_PPM,  # 0.07
+        "rotor_command": _SLOPE_PPM,  # 0.03
+    },
+)
+"""Limits of each stage, computed in float64 from the inputs that the target reports for it: four times the rounding of
+float32, measured in three flights in gusts and in the excitation, both vehicles and both controllers."""
+
+
+class LimitSet(NamedTuple):
+    """Limits of all comparisons."""
+
+    flight: Limits
+    """Between flights in Python and in C, each with its own vehicle."""
+    replay: Limits
+    """Between the log of Python's loops and a target."""
+    stages: Limits
+    """Between Python's stages and a target's."""
+
+
+DEFAULT_LIMITS = LimitSet(Limits(CLOSED_LOOP_ULPS), Limits(OPEN_LOOP_ULPS), STAGE_LIMITS)
+
+
+def same_bits_limits(limits: Limits) -> Limits:
     """Return the limits of the same signals if no bit may differ."""
-    return dict.fromkeys(limits_ulps, SAME_BITS_ULPS)
+    return Limits(dict.fromkeys(limits.ulp, SAME_BITS_ULPS))
 
 
-def board_limits(limits_ulps: Mapping[str, float]) -> dict[str, float]:
+def board_limits(limits: Limits) -> Limits:
     """Return the limits between the host and a board."""
-    return {name: BOARD_FACTOR * limit for name, limit in limits_ulps.items()}
+    return limits.scaled(BOARD_FACTOR)
 
 
 class Check(NamedTuple):
@@ -92,39 +163,60 @@ class Check(NamedTuple):
         }
 
 
+class _Kind(NamedTuple):
+    """One kind of limit: the suffix of its check, its unit, and the measured value."""
+
+    suffix: str
+    unit: str
+    measured: Callable[[Difference], float]
+
+
+_KINDS = {
+    "ulp": _Kind("", "ulp", lambda found: found.ulps),
+    "rms_ulp": _Kind(" rms", "ulp", lambda found: found.rms_ulps),
+    "slope_ppm": _Kind(" slope", "ppm", lambda found: found.slope_ppm),
+}
+
+
 def difference_checks(
     pair: str,
     differences: Iterable[Difference],
-    limits_ulps: Mapping[str, float],
+    limits: Limits,
     left_out: str | None = None,
 ) -> Iterator[Check]:
-    """Yield a check per stage, of the signal nearest to its limit, or furthest beyond it.
+    """Yield a check per stage and kind of limit, of the signal nearest to its limit, or furthest beyond it.
 
-    A signal with a limit that was not compared in any tick fails its stage. ``left_out``: a stage without a check.
+    A signal with a limit that was not compared in any tick fails its stage. A signal that does not vary has no slope,
+    which is not checked then. ``left_out``: a stage without a check.
     """
     there = {found.signal: found for found in differences}
     for stage in STAGES:
-        checks = [
-            _difference_check(f"{pair} {stage}", limit, signal, there.get(signal))
-            for signal, limit in limits_ulps.items()
-            if BY_NAME[signal].stage == stage != left_out
-        ]
-        if checks:
-            yield max(checks, key=_closeness)
+        for kind, by_signal in limits._asdict().items():
+            checks = [
+                _difference_check(f"{pair} {stage}", _KINDS[kind], limit, signal, there.get(signal))
+                for signal, limit in by_signal.items()
+                if BY_NAME[signal].stage == stage != left_out
+                and (kind != "slope_ppm" or (signal in there and there[signal].line is not None))
+            ]
+            if checks:
+                yield max(checks, key=_closeness)
 
 
-def _difference_check(name: str, limit: float, signal: str, found: Difference | None) -> Check:
+def _difference_check(name: str, kind: _Kind, limit: float, signal: str, found: Difference | None) -> Check:
+    name += kind.suffix
     if found is None or not found.samples:
-        return Check(name, limit, math.nan, "ulp", f"{BY_NAME[signal].title}: no samples to compare")
-    return Check(name, limit, found.ulps, "ulp", _about(found))
+        return Check(name, limit, math.nan, kind.unit, f"{BY_NAME[signal].title}: no samples to compare")
+    return Check(name, limit, kind.measured(found), kind.unit, _about(found, kind))
 
 
-def _about(found: Difference) -> str:
+def _about(found: Difference, kind: _Kind) -> str:
     signal = BY_NAME[found.signal]
     if found.largest == 0.0:
         return "same bits"
+    if kind.unit == "ppm" and found.line is not None:
+        return f"{signal.title} {found.line.component}: slope {found.line.slope:.6f}"
     unit = "" if signal.unit == "1" else f" {signal.unit}"
-    return f"{signal.title}: {found.largest:.3g}{unit}"
+    return f"{signal.title}: {found.rms if kind.suffix else found.largest:.3g}{unit}"
 
 
 def _closeness(check: Check) -> float:

@@ -13,7 +13,7 @@ from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.plan import Plan, Rejection
 from flightstack.plan.fence_areas import fence_areas
 from gcs_cli.plans.itinerary import Itinerary
-from gcs_cli.tui.canvas import DASHED, DOTS_X, DOTS_Y, Canvas, circle_vertices
+from gcs_cli.tui.widgets.canvas import DASHED, DOTS_X, DOTS_Y, Canvas, circle_vertices
 
 ROUTE, ITEM, HOME, RALLY, INSIDE, OUTSIDE = "cyan", "bold", "bold green", "magenta", "green", "red"
 _MARGIN = 0.06

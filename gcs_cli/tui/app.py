@@ -16,17 +16,17 @@ from textual.screen import Screen
 
 from flightstack.core.enums import Severity
 from gcs_cli.actions.action import Action
-from gcs_cli.tui.confirm import Confirm
 from gcs_cli.tui.feed import Feed
 from gcs_cli.tui.key_queue import KeyQueue
-from gcs_cli.tui.order_form import OrderForm
-from gcs_cli.tui.orders import ORDERS, action_of, order_named, question_for
+from gcs_cli.tui.mission.plan_fetcher import PlanFetcher
+from gcs_cli.tui.orders.confirm import Confirm
+from gcs_cli.tui.orders.form import OrderForm
+from gcs_cli.tui.orders.orders import ORDERS, action_of, order_named, question_for
+from gcs_cli.tui.orders.vehicle_list import ALL, VehicleList
 from gcs_cli.tui.palette import Palette, monochrome, palette_of
-from gcs_cli.tui.plan_fetcher import PlanFetcher
-from gcs_cli.tui.plot_fields import PlotFields
+from gcs_cli.tui.plot.fields import PlotFields
 from gcs_cli.tui.screens import SCREENS
 from gcs_cli.tui.themes import THEMES
-from gcs_cli.tui.vehicle_list import ALL, VehicleList
 from gcs_cli.tui.watch_screen import WatchScreen
 from gcs_cli.vehicle.view_types import VehicleView
 

@@ -17,9 +17,9 @@ from gcs_cli.errors import CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.session import Session
 from gcs_cli.link.subscription import ROTORS_AND_TIMING
-from gcs_cli.tui.history import History
-from gcs_cli.tui.message_log import MessageLog
-from gcs_cli.tui.traffic import Traffic
+from gcs_cli.tui.fly.history import History
+from gcs_cli.tui.map.traffic import Traffic
+from gcs_cli.tui.messages.message_log import MessageLog
 from gcs_cli.vehicle.view_types import VehicleView
 
 Value = TypeVar("Value")

@@ -10,8 +10,8 @@ from textual.events import Click
 from textual.screen import Screen
 from textual.widget import Widget
 
-from gcs_cli.tui.drawing import watch_app
 from gcs_cli.tui.palette import Palette
+from gcs_cli.tui.widgets.drawing import watch_app
 
 _MORE = " …"
 

@@ -11,7 +11,7 @@ from textual.app import App
 from textual.dom import DOMNode
 from textual.events import InputEvent, Key, MouseUp, Paste
 
-from gcs_cli.tui.confirm import Confirm
+from gcs_cli.tui.orders.confirm import Confirm
 
 _ROUNDS = 2
 """A key is handled in the first round; a message of the widget, such as the end of an input, in the second."""

@@ -25,27 +25,35 @@ class ScreenEntry(NamedTuple):
 
 
 SCREENS = (
-    ScreenEntry("fly", "1", "Fly", "gcs_cli.tui.fly_screen:FlyScreen", "attitude, position, battery, link"),
-    ScreenEntry("map", "2", "Map", "gcs_cli.tui.map_screen:MapScreen", "plan, track and vehicles from above"),
+    ScreenEntry("fly", "1", "Fly", "gcs_cli.tui.fly.screen:FlyScreen", "attitude, position, battery, link"),
+    ScreenEntry("map", "2", "Map", "gcs_cli.tui.map.screen:MapScreen", "plan, track and vehicles from above"),
     ScreenEntry(
         "mission",
         "3",
         "Mission",
-        "gcs_cli.tui.mission_screen:MissionScreen",
+        "gcs_cli.tui.mission.screen:MissionScreen",
         "items, edits, upload, progress",
     ),
-    ScreenEntry("plot", "4", "Plot", "gcs_cli.tui.plot_screen:PlotScreen", "telemetry fields over time"),
+    ScreenEntry("plot", "4", "Plot", "gcs_cli.tui.plot.screen:PlotScreen", "telemetry fields over time"),
     ScreenEntry(
-        "messages", "5", "Messages", "gcs_cli.tui.messages_screen:MessagesScreen", "texts of the vehicle"
+        "messages",
+        "5",
+        "Messages",
+        "gcs_cli.tui.messages.messages_screen:MessagesScreen",
+        "texts of the vehicle",
     ),
     ScreenEntry(
         "inspector",
         "6",
         "Inspector",
-        "gcs_cli.tui.inspector_screen:InspectorScreen",
+        "gcs_cli.tui.messages.inspector_screen:InspectorScreen",
         "every message with its fields",
     ),
     ScreenEntry(
-        "parameters", "7", "Parameters", "gcs_cli.tui.param_screen:ParamScreen", "search, edit, compare, save"
+        "parameters",
+        "7",
+        "Parameters",
+        "gcs_cli.tui.params.screen:ParamScreen",
+        "search, edit, compare, save",
     ),
 )

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from rich.text import Text
 
+from gcs_cli.tui.fly.panels import clock_text
 from gcs_cli.tui.palette import Palette
-from gcs_cli.tui.panels import clock_text
 from gcs_cli.vehicle.numbers import number
 from gcs_cli.vehicle.view_types import VehicleView
 

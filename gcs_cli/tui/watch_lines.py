@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from gcs_cli.tui.panels import SEVERITIES, clock_text
+from gcs_cli.tui.fly.panels import SEVERITIES, clock_text
 from gcs_cli.vehicle.view_types import StatusText, VehicleView
 
 

@@ -9,11 +9,11 @@ from textual.events import Click
 from textual.screen import Screen
 from textual.widget import Widget
 
-from gcs_cli.tui.drawing import Drawing, watch_app
 from gcs_cli.tui.key_bar import KeyBar
 from gcs_cli.tui.palette import Palette
 from gcs_cli.tui.screens import SCREENS
 from gcs_cli.tui.status_line import status_line
+from gcs_cli.tui.widgets.drawing import Drawing, watch_app
 from gcs_cli.vehicle.view_types import VehicleView
 
 

@@ -65,6 +65,17 @@ def _ground(flight: Flight) -> str | None:
     return None if flight.options.ground else "there is no ground"
 
 
+def _sensor(fault: Fault, flight: Flight) -> str | None:
+    name, number = fault.sensor.rstrip("0123456789"), fault.sensor.lstrip("abcdefghijklmnopqrstuvwxyz")
+    is_imu = name in ("imu", "gyro", "accel")
+    sensors = flight.vehicle.sensors
+    if ("imu" if is_imu else name) not in sensors.numbers:
+        return f"the vehicle {flight.vehicle.name} has no such sensor"
+    if is_imu and number and int(number) > sensors.imu_count:
+        return f"the vehicle {flight.vehicle.name} has inertial sensors 1 to {sensors.imu_count}"
+    return None
+
+
 _REASONS: Mapping[Need, Callable[[Flight], str | None]] = MappingProxyType(
     {
         Need.BATTERY: _battery,
@@ -94,4 +105,6 @@ def _refusal(fault: Fault, flight: Flight) -> str | None:
     row = ROWS[fault.kind]
     if row.is_event and fault.end_us is not None:
         return NO_END
+    if Need.SENSOR in row.needs:
+        return _sensor(fault, flight)
     return next((reason for need in row.needs if (reason := _REASONS[need](flight)) is not None), None)

@@ -15,7 +15,20 @@ from typing import NamedTuple
 
 from flightstack.core.contract import Vector3
 from sim_bridge.errors import UsageProblemError
-from sim_bridge.plant.fault_table import NO_END, ROTOR_NUMBER, ROWS, TABLE, Fault, Kind, Range, Row
+from sim_bridge.plant.fault_table import (
+    NO_END,
+    ROTOR_NUMBER,
+    ROWS,
+    SENSOR_NAME,
+    SENSOR_VALUE,
+    SENSORS,
+    TABLE,
+    Fault,
+    Kind,
+    Range,
+    Row,
+    SensorUnit,
+)
 
 __all__ = ["Fault", "Kind", "Schedule", "parse_fault"]
 
@@ -78,10 +91,18 @@ def _parse_effect(what: str, rotor_count: int) -> Fault:
     for name, word in zip(words, given, strict=True):
         if name == ROTOR_NUMBER:
             fault = fault._replace(rotor=_parse_rotor(word, rotor_count))
+        elif name == SENSOR_NAME or (word in SENSORS and words[0] == "sensor"):
+            fault = fault._replace(sensor=_parse_sensor(word))
+        elif name == SENSOR_VALUE:
+            fault = fault._replace(vector=_parse_sensor_value(word, fault.sensor))
         elif name in row.ranges and "," in name:
             fault = fault._replace(vector=_parse_vector(word, name, row.ranges[name]))
         elif name in row.ranges:
-            fault = fault._replace(value=_parse_number(word, name, row.ranges[name]))
+            span = row.ranges[name]
+            if row.kind is Kind.SENSOR_NOISE:
+                unit, _, most = _sensor_unit(fault.sensor)
+                span = Range(0.0, most, unit)
+            fault = fault._replace(value=_parse_number(word, name, span))
     return fault
 
 
@@ -131,6 +152,36 @@ def _parse_vector(text: str, name: str, allowed: Range) -> Vector3:
     if len(parts) != 3:
         raise ValueError(f"{name} must be three numbers separated by commas, each {allowed}")
     x, y, z = (_parse_number(part, axis, allowed) for part, axis in zip(parts, name.split(","), strict=True))
+    return Vector3(x, y, z)
+
+
+def _parse_sensor(text: str) -> str:
+    match = re.fullmatch(r"([a-z]+)([1-9]?)", text)
+    if match is None or match[1] not in SENSORS or (match[2] and match[1] not in ("imu", "gyro", "accel")):
+        names = ", ".join(SENSORS)
+        raise ValueError(
+            f"{text[:_LONGEST_QUOTE]!r} is not a sensor: {names}; imu2, gyro2, accel2 is the second one"
+        )
+    return text
+
+
+def _sensor_unit(sensor: str) -> SensorUnit:
+    """Return the unit of the faults of a sensor that have a value."""
+    found = SENSORS[sensor.rstrip("0123456789")]
+    if not found.components:
+        raise ValueError(f"{sensor} is gyro and accelerometer: name one of them")
+    return found
+
+
+def _parse_sensor_value(text: str, sensor: str) -> Vector3:
+    """Parse one number for each component of a sensor."""
+    unit, count, most = _sensor_unit(sensor)
+    parts = text.split(",")
+    if len(parts) != count:
+        numbers = "one number," if count == 1 else f"{count} numbers separated by commas, each"
+        raise ValueError(f"VALUE of {sensor} must be {numbers} {Range(-most, most, unit)}")
+    values = [_parse_number(part, SENSOR_VALUE, Range(-most, most, unit)) for part in parts]
+    x, y, z = (*values, 0.0, 0.0)[:3]
     return Vector3(x, y, z)
 
 

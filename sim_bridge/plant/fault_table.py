@@ -36,6 +36,16 @@ class Kind(Enum):
     STATE_NAN = "state nan"
     STATE_DROP = "state drop"
     STATE_LATE = "state late"
+    SENSOR_OFF = "sensor off"
+    SENSOR_FREEZE = "sensor freeze"
+    SENSOR_BIAS = "sensor bias"
+    SENSOR_DRIFT = "sensor drift"
+    SENSOR_NOISE = "sensor noise"
+    SENSOR_LATE = "sensor late"
+    SENSOR_LOSS = "sensor loss"
+    GNSS_JAM = "gnss jam"
+    MAG_TURN = "mag turn"
+    VIBRATION = "vibration"
     CLOCK_STALL = "clock stall"
     CLOCK_JUMP = "clock jump"
     CLEAR = "clear"
@@ -54,10 +64,11 @@ class Need(Enum):
     MASS = "not `paper`"
     PAYLOAD = "a payload"
     GROUND = "ground, not `paper`"
+    SENSOR = "the sensor"
 
 
 class Fault(NamedTuple):
-    """One fault. ``rotor`` counts from 0, −1 for none; ``end_us`` None is never."""
+    """One fault. ``rotor`` counts from 0, −1 for none; ``end_us`` None is never; ``sensor`` is a name as "gyro2"."""
 
     kind: Kind
     rotor: int = -1
@@ -65,6 +76,7 @@ class Fault(NamedTuple):
     begin_us: int = 0
     end_us: int | None = None
     vector: Vector3 = Vector3(0.0, 0.0, 0.0)
+    sensor: str = ""
 
     def is_active(self, time_us: int) -> bool:
         """Return True if the fault is active at ``time_us``."""
@@ -88,6 +100,36 @@ NO_END = "it acts at one time: give no end"
 ROTOR_NUMBER = "N"
 """Placeholder of the number of a rotor, from 1."""
 
+SENSOR_NAME = "SENSOR"
+"""Placeholder of a sensor, a name of ``SENSORS``; with a number from 1 for one of several inertial sensors."""
+
+SENSOR_VALUE = "VALUE"
+"""Placeholder of a value in the unit of a sensor: one number for each of its components, separated by commas."""
+
+
+class SensorUnit(NamedTuple):
+    """Unit of the faults of a sensor."""
+
+    unit: str
+    components: int
+    most: float
+    """Largest value of a fault."""
+
+
+SENSORS: Mapping[str, SensorUnit] = MappingProxyType(
+    {
+        "imu": SensorUnit("", 0, 0.0),
+        "gyro": SensorUnit("°/s", 3, 2000.0),
+        "accel": SensorUnit("m/s²", 3, 200.0),
+        "mag": SensorUnit("gauss", 3, 10.0),
+        "baro": SensorUnit("hPa", 1, 1000.0),
+        "gnss": SensorUnit("m", 3, 1e6),
+        "range": SensorUnit("m", 1, 1e4),
+        "flow": SensorUnit("rad/s", 2, 100.0),
+    }
+)
+"""Sensors that can fail; ``imu`` is gyro and accelerometer together, without values."""
+
 _NO_VALUES: Mapping[str, Range] = MappingProxyType({})
 
 
@@ -105,12 +147,12 @@ class Row(NamedTuple):
 
     @property
     def part(self) -> str:
-        """Part that fails: the first word of the compact notation."""
+        """Kind of part that fails: the first word of the compact notation."""
         return self.compact.partition(":")[0]
 
     def is_placeholder(self, word: str) -> bool:
         """Return True if a word of a notation stands for a value."""
-        return word == ROTOR_NUMBER or word in self.ranges
+        return word in (ROTOR_NUMBER, SENSOR_NAME, SENSOR_VALUE) or word in self.ranges
 
 
 _SHARE = Range(0.0, 1.0)
@@ -182,6 +224,50 @@ TABLE: tuple[Row, ...] = (
         Kind.BATTERY_CELL, "battery:cell", "battery cell dead",
         "One cell has no voltage: the open-circuit voltage of the pack falls by one cell.",
         needs=(Need.BATTERY, Need.CELLS),
+    ),
+    Row(
+        Kind.SENSOR_OFF, "sensor:SENSOR:off", "sensor SENSOR off", "The sensor sends no measurements.",
+        needs=(Need.SENSOR,),
+    ),
+    Row(
+        Kind.SENSOR_FREEZE, "sensor:SENSOR:freeze", "sensor SENSOR frozen",
+        "It sends its last measurement again and again.", needs=(Need.SENSOR,),
+    ),
+    Row(
+        Kind.SENSOR_BIAS, "sensor:SENSOR:bias=VALUE", "sensor SENSOR bias VALUE",
+        "Its measurements are off by this; a GNSS position jumps.", needs=(Need.SENSOR,),
+    ),
+    Row(
+        Kind.SENSOR_DRIFT, "sensor:SENSOR:drift=VALUE", "sensor SENSOR drift VALUE",
+        "Its measurements move away by this per second; a GNSS position is spoofed slowly, with its velocity.",
+        needs=(Need.SENSOR,),
+    ),
+    Row(
+        Kind.SENSOR_NOISE, "sensor:SENSOR:noise=SPREAD", "sensor SENSOR noise SPREAD",
+        "White noise of this standard deviation, in the unit of the sensor, adds to each measurement.",
+        {"SPREAD": Range(0.0, 1e6)}, (Need.SENSOR,),
+    ),
+    Row(
+        Kind.SENSOR_LATE, "sensor:SENSOR:late=SECONDS", "sensor SENSOR late SECONDS",
+        "Its measurements are older by this time.", {"SECONDS": Range(1e-4, 10.0, "s")}, (Need.SENSOR,),
+    ),
+    Row(
+        Kind.SENSOR_LOSS, "sensor:SENSOR:loss=SHARE", "sensor SENSOR loss SHARE",
+        "This share of its measurements, at random, is lost.", {"SHARE": _SHARE}, (Need.SENSOR,),
+    ),
+    Row(
+        Kind.GNSS_JAM, "sensor:gnss:jam=SHARE", "sensor gnss jammed SHARE",
+        "The receiver loses this share of its satellites; noise and stated accuracy grow as 1 / (1 − SHARE), and with "
+        "fewer than four satellites there is no fix.", {"SHARE": _SHARE}, (Need.SENSOR,),
+    ),
+    Row(
+        Kind.MAG_TURN, "sensor:mag:turn=DEGREES", "sensor mag turned DEGREES",
+        "The magnetometer is turned about the vertical axis of the body by this.",
+        {"DEGREES": Range(-360.0, 360.0, "°")}, (Need.SENSOR,),
+    ),
+    Row(
+        Kind.VIBRATION, "sensor:imu:vibration=FACTOR", "sensor imu vibration FACTOR",
+        "The rotors shake the inertial sensors by this factor.", {"FACTOR": Range(0.0, 1000.0)}, (Need.SENSOR,),
     ),
     Row(Kind.STATE_FREEZE, "state:freeze", "state frozen", "The same state is sent, with new times."),
     Row(Kind.STATE_NAN, "state:nan", "state nan", "All numbers of the state are NaN."),

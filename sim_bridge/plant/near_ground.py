@@ -13,8 +13,8 @@ vehicle is left out, and so is the upwash between them.
 from __future__ import annotations
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import Record
-from flightstack.core.portable_math import exp, log
+from flightstack.core.contract import Record, RecordArray
+from flightstack.core.portable_math import distance, exp, log
 
 REFERENCE_M = 10.0
 LOWEST_M = 0.1
@@ -27,6 +27,17 @@ def wind_share(m: Record, z: float) -> float:
     height = max(m["surface_z"] - z, LOWEST_M)
     share: float = exp(m["shear"] * log(height / REFERENCE_M))
     return share
+
+
+@compiled
+def airspeed(memory: RecordArray) -> float:
+    """Return the airspeed [m/s] of a plant over the record ``MEMORY``, shape (1,)."""
+    m = memory[0]
+    x, wind, gust = m["body"], m["wind"], m["gust"]
+    share = wind_share(m, x[2]) if m["alters_air"] != 0 else 1.0
+    north, east = x[3] - share * wind[0] - gust[0], x[4] - share * wind[1] - gust[1]
+    speed: float = distance(north, east, x[5] - share * wind[2] - gust[2])
+    return speed
 
 
 @compiled

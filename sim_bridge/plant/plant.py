@@ -67,6 +67,11 @@ class Plant(Protocol):
         """State of the battery; None without one."""
         ...
 
+    @property
+    def current_a(self) -> float:
+        """Current of the battery; 0 without one."""
+        ...
+
     def set_charge(self, share: float) -> None:
         """Set the charge of the battery, 0 to 1."""
         ...

@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from flightstack.core.contract import FloatArray, RecordArray, Vector3
-from flightstack.core.portable_math import distance, exp
+from flightstack.core.portable_math import exp
 from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
 from sim_bridge.plant.battery import BatteryState, battery_state, set_battery, set_pack
 from sim_bridge.plant.dead_time import DeadTime
@@ -16,7 +16,7 @@ from sim_bridge.plant.dimensions import foot_z_m, propeller_radius_m
 from sim_bridge.plant.fault_effects import PlantFaults, RotorFault
 from sim_bridge.plant.layout import MEMORY, OUTPUT
 from sim_bridge.plant.loading import AS_BUILT, Body, Loading, inverse, loaded
-from sim_bridge.plant.near_ground import wind_share
+from sim_bridge.plant.near_ground import airspeed
 from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.plant.turbulence import Turbulence
 
@@ -31,6 +31,7 @@ class RecordPlant(ABC):
         self._vehicle = vehicle
         self.memory: RecordArray = np.zeros(1, MEMORY)
         """State, rotors, faults and disturbances, dtype ``MEMORY``, shape (1,)."""
+        self._current: FloatArray = self.memory["current"]
         m = self.memory[0]
         disturbance = options.disturbance
         m["wind"], m["force"] = disturbance.wind_ned_m_s, disturbance.force_ned_n
@@ -122,6 +123,11 @@ class RecordPlant(ABC):
         """State of the battery; None without one."""
         return battery_state(self.memory[0]) if self._has_battery else None
 
+    @property
+    def current_a(self) -> float:
+        """Current of the battery; 0 without one."""
+        return float(self._current[0])
+
     def set_charge(self, share: float) -> None:
         """Set the charge of the battery, 0 to 1."""
         self.memory[0]["charge"] = share
@@ -170,9 +176,7 @@ class RecordPlant(ABC):
 
     def airspeed_m_s(self) -> float:
         """Return the airspeed."""
-        m = self.memory[0]
-        share = wind_share(m, m["body"][2]) if m["alters_air"] else 1.0
-        return distance(*(m["body"][3:6] - share * m["wind"] - m["gust"]).tolist())
+        return airspeed(self.memory)
 
     def description(self) -> str | None:
         """Return a description of the plant for the user, or None."""

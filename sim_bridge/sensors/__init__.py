@@ -1,1 +1,1 @@
-"""Sensor models of the simulator. There are none yet: the vehicle flies on the true state."""
+"""Sensor models: compiled functions from the true state to measurements, with seeded errors."""

@@ -106,6 +106,16 @@ class Connection:
                 raise PeerSilentError
         return data
 
+    def receive_within(self, timeout_s: float) -> memoryview | None:
+        """Wait for bytes; return None at the timeout; raise PeerClosedError, StoppedError, or PeerSilentError."""
+        try:
+            self._stop.waiter(self._socket, select.POLLIN).wait(timeout_s)
+        except PeerSilentError:
+            self.check_alive(False)
+            return None
+        self.check_alive(True)
+        return self.receive_now()
+
     def receive_now(self, flags: int = socket.MSG_DONTWAIT) -> memoryview | None:
         """Return the received bytes, or None; raise PeerClosedError."""
         try:

@@ -1,9 +1,12 @@
 """The simulator's end of the simulator link, sans-IO: bytes in, bytes out.
 
 The flight stack requests a message and an interval with SET_MESSAGE_INTERVAL: FS_PLANT_STATE, answered by
-FS_ACTUATORS, or the standard HIL_STATE_QUATERNION, answered by HIL_ACTUATOR_CONTROLS. In lockstep each state is
-answered by actuators with the same timestamp. Actuators without the lockstep flag mean that the flight stack runs on
-its own clock: the simulator then runs in real time with the newest commands.
+FS_ACTUATORS, or the standard HIL_STATE_QUATERNION, answered by HIL_ACTUATOR_CONTROLS. HIL_SENSOR requests the messages
+of the sensors beside it. PX4 requests HIL_STATE_QUATERNION alone and needs both: it gets the sensors as well, and its
+answers begin after some steps, until which the simulator does not wait for them.
+
+In lockstep each state is answered by actuators with the same timestamp. Actuators without the lockstep flag mean that
+the flight stack runs on its own clock: the simulator then runs in real time with the newest commands.
 """
 
 from __future__ import annotations
@@ -18,6 +21,7 @@ from flightstack.mavlink.frames import FrameFinder
 from flightstack.mavlink.link import Link, Message
 from flightstack.params.vehicle import Vehicle
 from flightstack.simulator_link.hot_frames import LOCKSTEP_FLAG, ActuatorsFrame
+from flightstack.simulator_link.sensor_frames import HIL_SENSOR_ID
 from sim_bridge.plant.fault_schedule import Kind
 from sim_bridge.server.failure_command import inject_failure
 from sim_bridge.server.hil import HilControls, hil_state
@@ -33,6 +37,7 @@ Bytes: TypeAlias = bytes | bytearray | memoryview
 
 HIL_STATE_QUATERNION_ID = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
 HIL_ACTUATOR_CONTROLS_ID = mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS
+_ACCEPTED, _DENIED = int(mavlink.MAV_RESULT_ACCEPTED), int(mavlink.MAV_RESULT_DENIED)
 _INJECT_FAILURE = mavlink.MAV_CMD_INJECT_FAILURE
 _SET_INTERVAL = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
 
@@ -47,6 +52,8 @@ class FlightStackEndpoint:
         self.answered = False  # in lockstep: actuators for the present state were received
         self.free_running = False  # the flight stack runs on its own clock
         self.ready = False  # the flight stack has requested a state message
+        self.is_sent = False  # the present state
+        self.freewheels = False  # do not wait for answers, which have not begun
         self.peer_ended = False  # the flight stack sent a POWEROFF heartbeat
         self.error: str | None = None
         self.stale = 0
@@ -54,7 +61,9 @@ class FlightStackEndpoint:
         self._frame = LocalFrame(home)
         self._controls = HilControls(vehicle)
         self._rotor_count = len(vehicle.rotors)
-        self._requested = 0  # id of the requested message
+        self._requested = 0  # id of the requested state
+        self._wants_sensors = self._sends_sensors = False
+        self._home = home
         self.finder = FrameFinder()
         """Splits the received bytes into frames."""
         self._replies: list[bytes] = []
@@ -98,22 +107,23 @@ class FlightStackEndpoint:
     def state(self) -> Bytes:
         """Return the bytes to send for the present state, whose answer is pending from now on.
 
-        During the fault ``state:drop`` only a due BATTERY_STATUS.
+        During the fault ``state:drop`` no state, only a due BATTERY_STATUS and the sensors.
         """
-        self.answered = False
+        self.answered, self.is_sent = False, True
         simulator = self.simulator
         if self._requested == FS_PLANT_STATE_ID:
             return simulator.outgoing()
-        battery = simulator.battery_frame()
-        return (
-            battery
-            if simulator.drops_state
-            else battery + self._link.encode(hil_state(simulator, self._frame))
-        )
+        data = simulator.battery_frame()
+        if self._requested and not simulator.drops_state:
+            data += self._link.encode(hil_state(simulator, self._frame))
+        if self._sends_sensors and simulator.sensors is not None:
+            data += simulator.sensors.frames(simulator.stamp_us)
+        return data
 
     def step(self) -> None:
         """Advance the plant with the newest commands; raise PlantDivergedError."""
         self.simulator.apply(self.actuators)
+        self.is_sent = False
 
     def poweroff(self) -> bytes:
         """Return the POWEROFF heartbeat, which announces an orderly end."""
@@ -135,6 +145,7 @@ class FlightStackEndpoint:
                 f"{self._rotor_count}; start both with the same --vehicle"
             )
         self.free_running = not actuators.flags & LOCKSTEP_FLAG
+        self.freewheels = False
         if not self.free_running and not self._faults_checked:
             self._reject_drops()
         if self.ready and actuators.time_us == self.simulator.stamp_us:
@@ -185,18 +196,42 @@ class FlightStackEndpoint:
         return self._set_interval(message.param1, message.param2)
 
     def _set_interval(self, kind: float, interval: float) -> int:
-        if kind not in (FS_PLANT_STATE_ID, HIL_STATE_QUATERNION_ID):
-            return int(mavlink.MAV_RESULT_DENIED)
-        if kind != FS_PLANT_STATE_ID and self._requested == FS_PLANT_STATE_ID:
-            return int(mavlink.MAV_RESULT_DENIED)  # one state message at a time: the precise one has priority
+        if kind not in (FS_PLANT_STATE_ID, HIL_STATE_QUATERNION_ID, HIL_SENSOR_ID):
+            return _DENIED
+        if kind == HIL_STATE_QUATERNION_ID and self._requested == FS_PLANT_STATE_ID:
+            return _DENIED  # one state message at a time: the precise one has priority
         if interval == -1.0:  # MAVLink: stop
-            self.ready, self._requested = False, 0
-            return int(mavlink.MAV_RESULT_ACCEPTED)
+            self._stop(int(kind))
+            return _ACCEPTED
         if interval == 0.0:  # MAVLink: the default rate
             interval = DEFAULT_INTERVAL_US
         if not math.isfinite(interval) or not SHORTEST_INTERVAL_US <= round(interval) <= LONGEST_INTERVAL_US:
-            return int(mavlink.MAV_RESULT_DENIED)
+            return _DENIED
+        if kind == HIL_SENSOR_ID and not self.simulator.vehicle.sensors.numbers:
+            return _DENIED
         self.simulator.set_interval_us(round(interval))
-        self._requested = int(kind)
+        if kind == HIL_SENSOR_ID:
+            self._wants_sensors = True
+        else:
+            self._requested = int(kind)
+        self._start_sensors()
+        if kind == HIL_STATE_QUATERNION_ID and self._sends_sensors and not self.ready:
+            self.freewheels = True
         self.ready = True
-        return int(mavlink.MAV_RESULT_ACCEPTED)
+        return _ACCEPTED
+
+    def _start_sensors(self) -> None:
+        """Begin or end to send the sensors, as requested."""
+        needs_sensors = self._wants_sensors or self._requested == HIL_STATE_QUATERNION_ID
+        self._sends_sensors = needs_sensors and self.simulator.start_sensors(self._home)
+        if not needs_sensors:
+            self.simulator.stop_sensors()
+
+    def _stop(self, kind: int) -> None:
+        """Stop sending a message."""
+        if kind == HIL_SENSOR_ID:
+            self._wants_sensors = False
+        else:
+            self._requested = 0
+        self._start_sensors()
+        self.ready = bool(self._requested) or self._sends_sensors

@@ -10,6 +10,9 @@ from sim_bridge.server.connection import Connection, StoppedError, StopSignal
 from sim_bridge.server.endpoint import FlightStackEndpoint
 from sim_bridge.server.pacing import Pacer
 
+FREEWHEEL_S = 0.05
+"""Wait for an answer while the client's answers have not begun; PX4 takes 20 to 40 steps to start."""
+
 
 class Session:
     """The session of one client."""
@@ -54,9 +57,15 @@ class Session:
 
     def _exchange_in_lockstep(self) -> None:
         link, connection = self.link, self._connection
-        connection.send(link.state())
+        if link.freewheels and link.simulator.time_us == 0:
+            link.step()  # PX4 takes its clock from the sensors, and zero is no time
+        if not link.is_sent:
+            connection.send(link.state())
         while not link.answered:
-            self._receive(connection.receive())
+            data = connection.receive_within(FREEWHEEL_S) if link.freewheels else connection.receive()
+            if data is None:
+                break
+            self._receive(data)
             if link.free_running or link.error is not None:
                 return
         link.step()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import functools
 import hashlib
+import itertools
 import os
 import subprocess
 import tempfile
@@ -31,6 +32,10 @@ ABOVE = (0.0, 0.0, -1.0, *(0.0,) * 8)
 """A setpoint: one metre above the origin."""
 GCS = (255, 190)
 Clock = ctypes.CFUNCTYPE(ctypes.c_uint32)
+BaudCall = ctypes.CFUNCTYPE(ctypes.c_uint16, ctypes.c_uint32)
+START_BAUD = 115_200
+CLOCK_READINGS = 32
+"""Of the application at its start, which measures their cost."""
 
 
 def sources(*folders: str) -> list[Path]:
@@ -86,6 +91,9 @@ class Port(ctypes.Structure):
         ("source_hash", ctypes.POINTER(ctypes.c_uint16)),
         ("stack_size", ctypes.c_uint32),
         ("stack_high_water", Clock),
+        ("baud", ctypes.c_uint32),
+        ("can_set_baud", BaudCall),
+        ("set_baud", BaudCall),
     ]
 
 
@@ -97,7 +105,7 @@ def library(path: str = "", real: str = "float") -> ctypes.CDLL:
         path = os.environ.get(LIBRARY, "")
     loaded = ctypes.CDLL(path or str(cached(f"app-{real}.so", *flags)))
     loaded.fs_host_app_new.restype = ctypes.c_void_p
-    for name in ("fs_host_app_transmit", "fs_app_wait_ms"):
+    for name in ("fs_host_app_transmit", "fs_app_wait_ms", "fs_app_run_wait_us"):
         getattr(loaded, name).restype = ctypes.c_uint32
     loaded.fs_app_state.restype = ctypes.c_uint16
     return loaded
@@ -115,15 +123,25 @@ class Target:
         was_watchdog: bool = False,
         real: str = "float",
         own_port: bool = False,
+        bauds: Sequence[int] = (),
+        overhead: int = 0,
     ) -> None:
-        """``ticks``: what the clock shows at each call; without, it stands still. ``own_port``: the host's."""
+        """``ticks``: what the clock shows at each call; without, it stands still. ``own_port``: the host's.
+
+        ``bauds``: rates that the line can run at; without any, the port has no functions for rates. ``overhead``: cost
+        of reading the clock that the application finds at its start, before ``ticks``.
+        """
+        self.baud = START_BAUD
+        self.is_sending = False
+        """True while the port still sends, so that its rate cannot change."""
         self._library = library(real=real)
-        times = iter(ticks)
+        times = itertools.chain((overhead * at for at in range(CLOCK_READINGS)), ticks)
         self._hash = (ctypes.c_uint16 * 8)(*(0xFF00 + octet for octet in range(1, 9)))  # high bits: rubbish
         self._port = Port(
             Clock(lambda: next(times, 0)), clock_hz, cost_unit, was_watchdog,
             b"test board with a name of many letters", b"compiler of " + b"many words " * 5, self._hash,
-            4096, Clock(lambda: 321),
+            4096, Clock(lambda: 321), START_BAUD,
+            *((BaudCall(lambda baud: baud in bauds), BaudCall(self._set_baud)) if bauds else ()),
         )  # fmt: skip
         port = None if own_port else ctypes.byref(self._port)
         self._app = ctypes.c_void_p(self._library.fs_host_app_new(port))
@@ -132,6 +150,12 @@ class Target:
         self.codec.robust_parsing = True
         self._rest = b""
         self._room = (ctypes.c_ubyte * 65536)()
+
+    def _set_baud(self, baud: int) -> int:
+        if self.is_sending:
+            return 0
+        self.baud = baud
+        return 1
 
     def close(self) -> None:
         """Give the memory back."""
@@ -163,6 +187,15 @@ class Target:
         """Let time pass, then the application do what is due."""
         self.now_ms = (self.now_ms + passed_ms) & 0xFFFF_FFFF
         self._library.fs_app_poll(self._app, ctypes.c_uint32(self.now_ms))
+
+    def run(self, now_us: int) -> None:
+        """Let the application run the tick that is due at this time."""
+        self._library.fs_app_run(self._app, ctypes.c_uint32(now_us & 0xFFFF_FFFF))
+
+    @property
+    def run_wait_us(self) -> int:
+        """In how many microseconds a tick is due."""
+        return int(self._library.fs_app_run_wait_us(self._app))
 
     def uart_errors(self, overruns: int, errors: int) -> None:
         """Tell the totals of the serial port."""
@@ -227,6 +260,11 @@ def step(
     return mavlink.MAVLink_fs_pil_step_message(number, flags, list(state), [*setpoint, *[0.0] * 11][:11])
 
 
+def tick(number: int, flags: int = 0, values: Sequence[float] = LEVEL[6:]) -> Any:
+    """Return an FS_PIL_TICK; ``values`` as in the message, the rest zero."""
+    return mavlink.MAVLink_fs_pil_tick_message(number, flags, [*values, *[0.0] * 24][:24])
+
+
 def command(number: int, *values: float, system: int = 1, component: int = 1) -> Any:
     """Return a COMMAND_LONG."""
     parameters = [*values, *[0.0] * 7][:7]
@@ -236,3 +274,16 @@ def command(number: int, *values: float, system: int = 1, component: int = 1) ->
 def kinds(messages: Iterable[Any]) -> list[str]:
     """Return the names of messages."""
     return [message.get_type() for message in messages]
+
+
+REAL32 = mavlink.MAV_PARAM_TYPE_REAL32
+
+
+def read(name: str = "", index: int = -1, system: int = 1, component: int = 1) -> Any:
+    """Return a PARAM_REQUEST_READ."""
+    return mavlink.MAVLink_param_request_read_message(system, component, name.encode(), index)
+
+
+def write(name: str, value: float, kind: int = REAL32, system: int = 1, component: int = 1) -> Any:
+    """Return a PARAM_SET."""
+    return mavlink.MAVLink_param_set_message(system, component, name.encode(), value, kind)

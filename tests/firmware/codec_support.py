@@ -41,7 +41,17 @@ NAMES = [
         "PARAM_ERROR",
     ),
     *("COMMAND_LONG", "COMMAND_ACK", "AUTOPILOT_VERSION", "STATUSTEXT"),
-    *("FS_PIL_STEP", "FS_PIL_REPORT", "FS_PIL_STATUS", "FS_PIL_IDENTITY"),
+    *(
+        "FS_PIL_STEP",
+        "FS_PIL_REPORT",
+        "FS_PIL_STATUS",
+        "FS_PIL_IDENTITY",
+        "FS_PIL_TICK",
+        "FS_PIL_OUTPUT",
+        "FS_PIL_STATE",
+        "FS_PIL_DRIVE",
+        "FS_PIL_TIMING",
+    ),
 ]
 KINDS: dict[int, Any] = {kind.id: kind for kind in mavlink.mavlink_map.values() if kind.msgname in NAMES}
 """The messages of the codec, as pymavlink has them."""

@@ -17,7 +17,10 @@ FIRMWARE = ROOT / "firmware"
 PORT = FIRMWARE / "ports" / "f28377s"
 FAKE = Path(__file__).parent / "c" / "fake_driverlib"
 PORTABLE = [file for part in ("core", "mavlink", "app") for file in sorted((FIRMWARE / part).glob("*.c"))]
-INCLUDE = [f"-I{folder}" for folder in (*(FIRMWARE / part for part in ("core", "mavlink", "app")), PORT)]
+RING = FIRMWARE / "ports" / "bare" / "fs_ring.c"
+INCLUDE = [
+    f"-I{folder}" for folder in (*(FIRMWARE / part for part in ("core", "mavlink", "app")), RING.parent, PORT)
+]
 
 CYCLES_PER_S = 200_000_000
 FRAMING, BREAK, PAUSE, OVERRUN = 0x100, 0x200, 0x400, 0x800
@@ -29,7 +32,7 @@ HEARTBEAT_LIGHT, SAFE_LIGHT = 12, 13
 LIT, DARK = 0, 1
 
 
-PORT_SOURCES = sorted(file for file in PORT.glob("*.c") if file.name != "f28_main.c")
+PORT_SOURCES = [RING, *sorted(file for file in PORT.glob("*.c") if file.name != "f28_main.c")]
 FLAGS = ["-fPIC", "-O2", *WARNINGS, *INCLUDE]
 
 

@@ -41,7 +41,7 @@ def tool(name: str, package: str) -> str:
     return found
 
 
-def _state(*sources: Path) -> str:
+def state_flag(*sources: Path) -> str:
     """A definition that is another one whenever a file of the tests is: ``cached`` knows the firmware's files alone."""
     content = b"".join(path.read_bytes() for path in (*sources, C / "steps.h"))
     return f"-DSTEPS_STATE=0x{hashlib.sha256(content).hexdigest()[:15]}"
@@ -62,7 +62,7 @@ def hashes(octets: bytes) -> np.ndarray:
 def on_host(stream: bytes, folder: Path) -> np.ndarray:
     """Run the steps on this machine."""
     sources = [*LOOPS, *STEPS, C / "steps_host.c"]
-    flags = [*EXACT, *INCLUDES, _state(*sources)]
+    flags = [*EXACT, *INCLUDES, state_flag(*sources)]
     program = cached("steps_host", host_compiler(), flags, sources)
     (folder / "steps").write_bytes(stream)
     run([program, folder / "steps", folder / "host"])
@@ -73,7 +73,7 @@ def on_host(stream: bytes, folder: Path) -> np.ndarray:
 def zig_image() -> Path:
     """Return the steps for the emulator, compiled by zig as the application is."""
     sources = [*LOOPS, *STEPS, C / "steps_cortex_m4.c"]
-    return emulated_image("steps.elf", sources, flags=[f"-I{C}", _state(*sources)])
+    return emulated_image("steps.elf", sources, flags=[f"-I{C}", state_flag(*sources)])
 
 
 def gcc_image(folder: Path) -> Path:

@@ -13,7 +13,8 @@ from tests.firmware.app_support import FIRMWARE, LIBRARY, PORTABLE, build, sourc
 from tests.firmware.codec_support import compiler
 from tests.support.tools import missing
 
-TESTS = [str(Path(__file__).with_name(name)) for name in ("test_app_pil.py", "test_app_services.py")]
+APP_TESTS = ("pil", "windows", "baud", "free", "services", "params", "damage")
+TESTS = [str(Path(__file__).with_name(f"test_app_{name}.py")) for name in APP_TESTS]
 NEEDLESS = "double"
 """Part of the names of tests that would compile another library."""
 

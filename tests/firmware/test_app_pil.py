@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from contextlib import closing
 
 import numpy as np
@@ -37,13 +36,6 @@ from tests.firmware.core_support import Core, Loops
 EMERGENCY = mavlink.MAV_SEVERITY_EMERGENCY
 STANDBY, ACTIVE, CRITICAL, IN_EMERGENCY = 3, 4, 5, 6
 FIELDS = ("attitude_target", "reference", "wrench", "wrench_achieved", "rotor_command")
-
-
-@pytest.fixture
-def target() -> Iterator[Target]:
-    made = Target()
-    yield made
-    made.close()
 
 
 def numbers(report: object) -> list[float]:
@@ -101,6 +93,20 @@ def test_costs_are_differences_of_the_clock_also_when_it_wraps() -> None:
     times = [0xFFFF_FFFB, 0, 100, 400, 1400, 2000]
     target = Target(ticks=times)
     assert target.step(0, RESET | OUTER_DUE).cycles == [100, 300, 1000, 2005]
+    target.close()
+
+
+def test_costs_are_told_without_the_readings_of_the_clock() -> None:
+    """10 for each of six readings: the stages have one each, the whole step five."""
+    target = Target(ticks=[1000, 1010, 1210, 1410, 1460, 1500], overhead=10)
+    assert target.request("FS_PIL_IDENTITY").clock_overhead == 10
+    assert target.step(0, RESET | OUTER_DUE).cycles == [190, 190, 40, 450]
+    target.close()
+
+
+def test_a_cost_below_that_of_the_clock_is_zero() -> None:
+    target = Target(ticks=[5 * at for at in range(6)], overhead=10)
+    assert target.step(0, RESET | OUTER_DUE).cycles == [0, 0, 0, 0]
     target.close()
 
 

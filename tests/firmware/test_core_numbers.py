@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from flightstack.control.controller import laws_with
 from flightstack.control.controller_loading import load_controller
 from flightstack.core.errors import ConfigError
 from flightstack.firmware.numbers import (
@@ -13,7 +14,6 @@ from flightstack.firmware.numbers import (
     declared,
     default_numbers,
     target_numbers,
-    with_built_in,
 )
 from flightstack.params.gains_file import open_gains
 from flightstack.params.tunable import Tunable
@@ -51,7 +51,7 @@ def test_the_defaults_are_of_every_law() -> None:
 def test_user_controller_gives_every_field_of_its_parameters() -> None:
     controller = example_module().CONTROLLER
     values = target_numbers(ring(4), controller, open_gains("tuned"), 0.6, 500.0, 5)
-    numbers = {number.name: number.place for number in declared(with_built_in(controller))}
+    numbers = {number.name: number.place for number in declared(laws_with(controller))}
     assert values["FS_CTRL"] == 2.0
     for field in controller.params_type._fields:
         (name,) = (name for name, place in numbers.items() if place == f"controller.lqr.{field}")

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from flightstack.firmware.sources import source_hash
-from tests.firmware.f28377s_support import FIRMWARE, PORT, PORTABLE
+from tests.firmware.f28377s_support import FIRMWARE, PORT, PORTABLE, RING
 from tests.support.tools import missing
 
 STAND_IN = """#!/bin/sh
@@ -76,7 +76,7 @@ def hash_in(header: Path) -> bytes:
 
 def test_every_source_is_compiled_as_the_core_demands(tmp_path: Path) -> None:
     calls = commands(tmp_path)
-    for source in [*PORTABLE, *PORT.glob("*.c")]:
+    for source in [*PORTABLE, RING, *PORT.glob("*.c")]:
         (call,) = [call for call in calls if f"/{source.name} " in call and "--c_file=" in call]
         for option in (
             "--abi=eabi",
@@ -149,8 +149,10 @@ def test_the_ccs_project_lists_the_sources_and_options_of_cmake() -> None:
     project = root.find("project")
     assert project is not None
     files = [file.get("path", "") for file in project.findall("file")]
-    listed = {Path(path).name for path in files if path.startswith("../f28_")}
-    assert listed == {path.name for path in PORT.glob("*.c")}
+    listed = {
+        (PORT / "ccs" / path).resolve() for path in files if path.endswith(".c") and path.startswith("..")
+    }
+    assert listed == {RING, *PORT.glob("*.c")}
     for folder in ("core", "mavlink", "app"):
         assert f"../../../{folder}" in files
         assert (PORT / "ccs" / f"../../../{folder}").resolve() == FIRMWARE / folder

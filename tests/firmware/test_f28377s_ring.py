@@ -17,7 +17,7 @@ START = 65_530
 
 
 class RingFields(ctypes.Structure):
-    """``f28_ring`` of f28_ring.h."""
+    """``fs_ring`` of fs_ring.h."""
 
     _fields_ = (
         ("written", ctypes.c_uint16),
@@ -33,30 +33,30 @@ class Ring:
     def __init__(self, size: int) -> None:
         """Begin with an empty ring of so many octets."""
         self.c: Any = ctypes.CDLL(str(built()))
-        for name in ("f28_ring_held", "f28_ring_room", "f28_ring_put", "f28_ring_take"):
+        for name in ("fs_ring_held", "fs_ring_room", "fs_ring_put", "fs_ring_take"):
             getattr(self.c, name).restype = ctypes.c_uint16
         self.octets = (ctypes.c_uint16 * WORDS)(*[UNTOUCHED] * WORDS)
         self.fields = RingFields()
-        self.c.f28_ring_init(ctypes.byref(self.fields), self.octets, ctypes.c_uint16(size))
+        self.c.fs_ring_init(ctypes.byref(self.fields), self.octets, ctypes.c_uint16(size))
         assert (self.fields.written, self.fields.read, self.fields.size) == (0, 0, size)
         self.fields.written = self.fields.read = START
 
     def held(self) -> int:
         """Return how many octets it holds."""
-        return int(self.c.f28_ring_held(ctypes.byref(self.fields)))
+        return int(self.c.fs_ring_held(ctypes.byref(self.fields)))
 
     def room(self) -> int:
         """Return how many more it has room for."""
-        return int(self.c.f28_ring_room(ctypes.byref(self.fields)))
+        return int(self.c.fs_ring_room(ctypes.byref(self.fields)))
 
     def put(self, octet: int) -> int:
         """Put one octet; return 1, or 0 when the ring is full."""
-        return int(self.c.f28_ring_put(ctypes.byref(self.fields), ctypes.c_uint16(octet)))
+        return int(self.c.fs_ring_put(ctypes.byref(self.fields), ctypes.c_uint16(octet)))
 
     def take(self) -> int | None:
         """Take the oldest octet; None when the ring is empty, which has to leave the place for it alone."""
         octet = ctypes.c_uint16(UNTOUCHED)
-        if self.c.f28_ring_take(ctypes.byref(self.fields), ctypes.byref(octet)):
+        if self.c.fs_ring_take(ctypes.byref(self.fields), ctypes.byref(octet)):
             return octet.value
         assert octet.value == UNTOUCHED
         return None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import select
 import subprocess
+import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -87,6 +88,22 @@ def test_it_does_not_compute_while_it_waits(process: subprocess.Popen[bytes], co
     assert os.waitstatus_to_exitcode(status) == 0
     process.returncode = 0
     assert used.ru_utime + used.ru_stime < 0.2
+
+
+def test_its_status_has_the_time_of_the_request(process: subprocess.Popen[bytes], codec: Any) -> None:
+    """Between two requests the process waits without a byte; its clock is the machine's."""
+    device = os.open(terminal(process), os.O_RDWR | os.O_NOCTTY)
+    request = command(512, mavlink.MAVLINK_MSG_ID_FS_PIL_STATUS)
+    until(device, codec, "HEARTBEAT")
+    os.write(device, request.pack(codec))
+    first, answered_s = until(device, codec, "FS_PIL_STATUS"), time.monotonic()
+    while select.select([device], [], [], 0.3)[0]:
+        os.read(device, 4096)
+    asked_s = time.monotonic()
+    os.write(device, request.pack(codec))
+    second = until(device, codec, "FS_PIL_STATUS")
+    os.close(device)
+    assert second.time_boot_ms - first.time_boot_ms >= (asked_s - answered_s) * 1e3 - 1.0
 
 
 def test_on_standard_streams_it_answers_all_that_came_before_the_end(codec: Any) -> None:

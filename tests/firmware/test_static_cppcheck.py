@@ -23,7 +23,7 @@ from tests.firmware.static_support import (
 from tests.parity import generated_laws
 from tests.support.tools import missing
 
-CHECKED = (*PORTABLE, "ports/f28377s")
+CHECKED = (*PORTABLE, "ports/bare", "ports/f28377s")
 TEMPLATE = "{file}|{line}|{id}|{message}"
 BUILD = [
     *("--std=c99", f"--platform={CPPCHECK / 'c28x.xml'}", f"-I{CPPCHECK / 'include'}"),

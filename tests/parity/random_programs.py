@@ -31,6 +31,15 @@ class Pair(NamedTuple):
     v: Vector3
 
 
+class Box(NamedTuple):
+    """Arrays."""
+
+    values: Annotated[FloatArray, 3]
+    grid: Annotated[FloatArray, 2, 3]
+    scale: float
+    counts: Annotated[np.ndarray[tuple[int], np.dtype[np.int64]], 2]
+
+
 @compiled
 def _turned(x: float, y: float) -> tuple[float, float]:
     return y, x - y
@@ -46,11 +55,47 @@ def _fill(values: Annotated[FloatArray, 3], x: float) -> float:
     for i in range(values.size):
         values[i] += x * i
     return values[2]
+
+
+@compiled
+def _turn(box: Box, x: float) -> None:
+    for i in range(box.grid.shape[0]):
+        for j in range(i + 1):
+            box.grid[i, j] -= x * box.values[j]
+
+
+@compiled
+def _clear(box: Box, start: int, count: int) -> int:
+    for i in range(start, start + count):
+        box.values[i] = 0.5 * box.values[i]
+        box.counts[0] += 1
+    return box.counts[0]
+
+
+@compiled
+def _sum(grid: Annotated[FloatArray, 2, 3]) -> float:
+    return grid[0, 0] + grid[1, 2]
 '''
 NAMES = st.sampled_from(["a", "b", "x", "y"])
 NUMBERS = st.sampled_from(["0.0", "-0.0", "1.0", "-2.5", "1e-9", "3", "HALF", "math.pi", "TABLE[1]", "1e30"])
 _LEAVES = st.one_of(
-    NAMES, NUMBERS, st.sampled_from(["v.x", "v.z", "pair.first", "pair.v.y", "w[0]", "w[2]", "float(n)"])
+    NAMES,
+    NUMBERS,
+    st.sampled_from(
+        [
+            "v.x",
+            "v.z",
+            "pair.first",
+            "pair.v.y",
+            "w[0]",
+            "w[2]",
+            "float(n)",
+            "box.values[1]",
+            "box.grid[1, 0]",
+            "box.scale",
+            "_sum(box.grid)",
+        ]
+    ),
 )
 
 
@@ -110,6 +155,14 @@ _SIMPLE = [
     "w[2] -= {number}",
     "b = _fill(w, {number})",
     "x, y, a = v",
+    "box.values[0], box.grid[1, 2] = box.grid[0, 1], {number}",
+    "box.grid[1, 0] *= {number}",
+    "y = _fill(box.values, {number})",
+    "_turn(box, {number})",
+    "box.counts[1] = _clear(box, COUNT - 2, 2)",
+    "_clear(box, 0, 1)",
+    "a = {number} + float(box.counts[1])",
+    "w[0] = _sum(box.grid) - {number}",
     "v = v if flag and a > {number} else cross(v, pair.v)",
     "a = cross(v, pair.v).x if flag else {number}",
     "flag = flag or not cross(v, pair.v).y > {number}",
@@ -152,6 +205,6 @@ def programs(draw: st.DrawFn) -> list[str]:
 
 def function(number: int, body: list[str]) -> str:
     """Return a program as a function of a module."""
-    signature = "x: float, y: float, v: Vector3, pair: Pair, n: int, flag: bool"
+    signature = "x: float, y: float, v: Vector3, pair: Pair, n: int, flag: bool, box: Box"
     lines = "\n".join(f"    {line}" for line in body)
     return f"\n\n@compiled\ndef law_{number}({signature}) -> tuple[Pair, float]:\n{lines}\n"

@@ -31,6 +31,7 @@ from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
 from tests.firmware.core_support import run_tool
 from tests.parity import generated_laws as laws
+from tests.parity.generated_filter import FILTERS, AttitudeFilter, FilterNoise
 from tests.parity.generated_laws import LAWS
 from tests.support.generated_c import WARNINGS, compile_program, in_python
 from tests.support.plugin_site import example_module
@@ -56,7 +57,7 @@ OWN: dict[str, Callable[..., Any]] = {
     "logarithm": portable_math.log,
     "distance": portable_math.distance,
 }
-EVERY = {**OWN, **LAWS, "LQR": example_module().step}
+EVERY = {**OWN, **LAWS, **FILTERS, "LQR": example_module().step}
 
 
 @compiled
@@ -89,10 +90,23 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
 def test_generated_law_has_pythons_bits(name: str, built: Built) -> None:
     function = built.functions[name]
     vectors = Vectors(len(name)), Vectors(len(name) + 1, edges=0.0)
-    samples = [made.arguments(function) for made in vectors for _ in range(COUNT)]
+    count = {"covariance of 24 states": 4, "fusion": 20}.get(name, COUNT)
+    samples = [made.arguments(function) for made in vectors for _ in range(count)]
     if name == "logarithm":
         samples = [[abs(value)] for (value,) in samples if 0.0 < abs(value) < np.inf]
     assert not differences(CFunction(built.library, function), in_python(EVERY[name]), samples)
+
+
+def test_generated_attitude_filter_finds_tilt_and_bias(built: Built) -> None:
+    """It is a filter, not only arithmetic: 0.3 rad of roll and 0.05 rad/s of bias, from nothing."""
+    step = CFunction(built.library, built.functions["attitude filter"])
+    state = AttitudeFilter(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), 0.1 * np.eye(6), 0.0)
+    force = Vector3(0.0, -9.81 * math.sin(0.3), -9.81 * math.cos(0.3))
+    for _ in range(4000):
+        step(state, Vector3(0.05, 0.0, 0.0), force, FilterNoise(1e-5, 1e-6, 1e-3), 0.01)
+    roll = 2.0 * math.atan2(state.attitude[1], state.attitude[0])
+    assert roll == pytest.approx(0.3, abs=1e-3)
+    assert state.bias_rad_s == pytest.approx([0.05, 0.0, 0.0], abs=1e-3)
 
 
 @pytest.mark.parametrize("vehicle", ["plus", "octo", "unlike"])
@@ -163,7 +177,7 @@ def test_difference_in_the_last_bit_is_found(built: Built) -> None:
 
 
 @pytest.mark.skipif(not NIGHTLY, reason="compiles each law with Numba")
-@pytest.mark.parametrize("name", [*LAWS, "LQR", "trajectory"])
+@pytest.mark.parametrize("name", [*LAWS, *FILTERS, "LQR", "trajectory"])
 def test_generated_law_has_the_bits_of_numba(name: str, built: Built) -> None:
     function = built.functions[name]
     vectors = Vectors(9, edges=0.0 if name == "trajectory" else 0.02)  # compiled, math.floor of NaN is -2**63

@@ -23,7 +23,7 @@ from flightstack.transports.udp import UdpSocket
 from gcs_cli.fly.fly_flags import FlyOptions
 from gcs_cli.fly.processes import Child, Children
 from gcs_cli.report.analysis import read_flight
-from gcs_cli.tui.panels import SEVERITIES, clock_text
+from gcs_cli.tui.fly.panels import SEVERITIES, clock_text
 from tests.support.commands import Ended, gcs
 from tests.support.process import await_output, children_of, ends_of
 

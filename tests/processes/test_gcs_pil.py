@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 
@@ -120,6 +121,10 @@ def test_the_emulated_target_counts_instructions_and_makes_the_same_bits(flown: 
     assert result["profile"]["unit"] == "instructions"
     assert result["stack"]["high_water"] > 0
     assert "no board" in result["meaning"]
+    assert 0.0 < result["load"]["mean_percent"] < result["load"]["max_percent"] < 2.0
+    ran = result["coverage"]["files"]
+    assert ran["core/fs_attitude_pid.c"]["missed"] == []
+    assert ran["core/fs_attitude_backstepping.c"]["executed"] == 0
     assert "F28377S" not in json.dumps([result["target"], result["profile"], result["title"]])
     of_host = result_of(flown)
     assert result["flights"]["SIL"]["log_sha256"] == of_host["flights"]["SIL"]["log_sha256"]
@@ -216,6 +221,11 @@ def test_a_board_that_is_unplugged_ends_the_run_with_a_sentence(
         (["hop.plan", "--target", "host", "--controller", "mine"], "--controller: mine: there is no such"),
         (["replay", "hop.plan", "--target", "c"], "not a readable flight log"),
         (["replay", "none.ulg"], "none.ulg"),
+        (["hop.plan", "--target", "host", "--limits", "none.toml"], "none.toml: cannot be read"),
+        (
+            ["replay", "none.ulg", "--junit", "out.txt"],
+            "--junit out.txt: give the file a name that ends in .xml",
+        ),
         (["doctor"], "give either --port DEVICE or --target"),
         (["doctor", "--port", "/dev/ttyNONE"], "no such device"),
     ],
@@ -241,8 +251,25 @@ def test_a_verdict_that_is_not_good_fails_when_it_is_asked_for(flown: Path, tmp_
     forged = (flown / "mil" / "flight.ulg").read_bytes().replace(b"loopspython", b"loopshost\0\0")
     log = tmp_path / "flight.ulg"
     log.write_bytes(forged)
-    for flags, code in (([], DONE), (["--fail-over"], FAILED)):
+    junit = tmp_path / "results.xml"
+    for flags, code in (([], DONE), (["--fail-over", "--junit", junit], FAILED)):
         done = pil("replay", log, "--target", "c", "--out", tmp_path / f"out{code}", *flags)
         assert done.returncode == code, done.stdout + done.stderr
         assert "verdict  failed" in done.stdout
     assert "the verdict is not good: log–target attitude target" in done.stderr
+    failed = [
+        case.get("name")
+        for case in ElementTree.parse(junit).iter("testcase")
+        if case.find("failure") is not None
+    ]
+    assert "log–target attitude target" in failed
+    assert not any(name.startswith("stages–target") for name in failed if name)  # Python's log, sound loops
+
+
+def test_limits_of_a_file_judge_a_replay(flown: Path, tmp_path: Path) -> None:
+    limits = tmp_path / "limits.toml"
+    limits.write_text("[stages.target_thrust]\nulp = 0.01\n")
+    log, out = flown / "mil" / "flight.ulg", tmp_path / "out"
+    done = pil("replay", log, "--target", "c", "--out", out, "--limits", limits, "--fail-over")
+    assert done.returncode == FAILED, done.stdout + done.stderr
+    assert "the verdict is not good: stages–target attitude target\n" in done.stderr

@@ -83,6 +83,20 @@ def test_a_target_flies_the_bits_of_c_here(tmp_path: Path, in_c: ULog, loops: st
     assert json.loads((out / "summary.json").read_text())["loops"] == loops
 
 
+def test_short_steps_fly_the_same_flight_and_log_fewer_stages(tmp_path: Path, in_c: ULog) -> None:
+    log = flown(tmp_path / "run", "--loops", "host,short")
+    for topic in ("rotor_speeds", "vehicle_attitude_setpoint", "vehicle_attitude", "vehicle_local_position"):
+        here, there = in_c.get_dataset(topic).data, log.get_dataset(topic).data
+        assert all(np.array_equal(here[name], there[name], equal_nan=True) for name in here), topic
+    wrench, idle = log.get_dataset("wrench").data, 32
+    assert np.isnan(wrench["torque_n_m[0]"][wrench["status"] != idle]).all()
+    link = json.loads((tmp_path / "run" / "pil-link.json").read_text())
+    assert (
+        link["link"]["octets_sent"] / link["steps"] < 90
+    )  # 48 in an inner tick, at most 116 in an outer one
+    assert link["link"]["octets_received"] / link["steps"] < 70  # 40, 60 or 56
+
+
 def test_a_target_that_dies_in_flight_ends_it_with_a_sentence(tmp_path: Path) -> None:
     out = tmp_path / "run"
     process = subprocess.Popen(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
@@ -107,8 +106,7 @@ def test_the_log_after_a_reboot_has_the_loops_timing(tmp_path: Path, clock: str)
                 run("reboot")
             there.wait_until_healthy()
             run("arm")
-            while json.loads(run("status", "--json"))["armed"]:
-                pass  # it disarms by itself
+            run("wait", "disarmed")  # by itself
     for name in ("flight.ulg", "flight-2.ulg"):
         log = ULog(str(tmp_path / name))
         seconds = (log.last_timestamp - log.start_timestamp) // 1_000_000

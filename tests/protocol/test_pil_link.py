@@ -118,6 +118,63 @@ def test_whatever_the_line_does_the_target_computes_what_c_does_here(device, nam
     assert (status["repeats"] + status["out_of_order"] > 0) == (name != "fair")
 
 
+@pytest.mark.parametrize("name", WEATHERS)
+def test_short_steps_fly_the_rotor_commands_of_c(device, name) -> None:
+    """The attitude target and status too, and the attitude reference before each outer tick."""
+    line = LossyLine(device, WEATHERS[name], seed=7)
+    loops = connected(line, short=True)
+    short, full = drive(loops, 1000), drive(sil(), 1000)
+    loops.close()
+    same = [*range(13), *range(31, short.shape[1])]
+    assert np.array_equal(short[:, same], full[:, same])
+    reference = LoopRow.REFERENCE_ATTITUDE
+    assert np.array_equal(short[4::5, reference], full[4::5, reference])
+    assert np.isnan(short[:4, reference]).all()
+    assert np.isnan(short[:, LoopRow.WRENCH]).all()
+
+
+@pytest.mark.parametrize("name", WEATHERS)
+def test_windows_of_steps_make_the_outputs_of_single_ones(device, name) -> None:
+    """And of C here, with a change of a gain in between; the latency of the line is paid once per window."""
+    rng = np.random.default_rng(2)
+    inputs = rng.normal(size=(400, 29)) * 0.3
+    inputs[:, 6] += 1.0
+    flags = [LoopFlags.RESET if at == 0 else LoopFlags.OUTER_DUE if at % 5 == 0 else 0 for at in range(400)]
+    line = LossyLine(device, WEATHERS[name], seed=7)
+    executors = [connected(line).executor, sil().executor]
+    began_s, made = line.now_s, []
+    for executor in executors:
+        first = executor.run(flags[:123], inputs[:123])
+        executor.set("POS_XY_P", 2.5)
+        made.append(np.concatenate([first, executor.run(flags[123:], inputs[123:])]))
+    assert np.array_equal(*made)
+    if name == "fair":  # 1 ms in each direction, 8 steps in a window
+        assert line.now_s - began_s == pytest.approx(0.002 * (math.ceil(123 / 8) + 1 + math.ceil(277 / 8)))
+
+
+def test_firmware_of_another_protocol_is_refused_in_one_sentence(device) -> None:
+    class Older:
+        """Firmware from before there were versions: the extension fields of its identity are missing."""
+
+        def __getattr__(self, name: str) -> object:
+            return getattr(device, name)
+
+        def take(self) -> bytes:
+            answers = b""
+            for message in device.heard():
+                if message.get_type() == "FS_PIL_IDENTITY":
+                    message.protocol = message.window = 0
+                answers += bytes(message.pack(mavlink.MAVLink(None, 1, 1)))
+            return answers
+
+    line = LossyLine(Older())
+    with pytest.raises(
+        WrongFirmwareError,
+        match=r"line: its firmware speaks version 0 of the target protocol, not 2: flash it",
+    ):
+        TargetLoops(line, setup().numbers(), clock_s=line.clock, expected_hash=HASH)
+
+
 def test_a_gain_that_is_set_again_in_flight_changes_no_bit(device) -> None:
     """A late copy of the host's own, or a ground station that writes all parameters back."""
     flown = connected(LossyLine(device))
@@ -327,6 +384,10 @@ def test_what_is_left_of_a_flight_beside_its_log(device, tmp_path) -> None:
         "clock_hz": 200_000_000,
         "real_octets": 4,
         "char_bits": 8,
+        "protocol": 2,
+        "window": 8,
+        "baud": 115_200,
+        "clock_overhead": 0,
     }
     assert told["steps"] == 200
     assert told["ending"] is None

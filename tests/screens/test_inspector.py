@@ -12,10 +12,17 @@ from textual.widgets import Input
 from flightstack.mavlink.dialect import mavlink
 from gcs_cli.actions import on_vehicle
 from gcs_cli.tui.app import WatchApp
-from gcs_cli.tui.history import History
-from gcs_cli.tui.inspector_lines import field_texts, filtered, lines, message_rows, source_name, summary
-from gcs_cli.tui.inspector_screen import InspectorScreen
-from gcs_cli.tui.order_form import OrderForm
+from gcs_cli.tui.fly.history import History
+from gcs_cli.tui.messages.inspector_lines import (
+    field_texts,
+    filtered,
+    lines,
+    message_rows,
+    source_name,
+    summary,
+)
+from gcs_cli.tui.messages.inspector_screen import InspectorScreen
+from gcs_cli.tui.orders.form import OrderForm
 from gcs_cli.tui.palette import DARK
 from tests.support.map_views import VIEW
 from tests.support.pictures import check_picture

@@ -11,9 +11,9 @@ from textual.pilot import Pilot
 from flightstack.plan import FenceCommand, MissionItem
 from gcs_cli.errors import FAILED, CliError
 from gcs_cli.tui.app import WatchApp
-from gcs_cli.tui.confirm import Confirm
-from gcs_cli.tui.map_scene import Place, place_of
-from gcs_cli.tui.map_screen import MapScreen
+from gcs_cli.tui.map.scene import Place, place_of
+from gcs_cli.tui.map.screen import MapScreen
+from gcs_cli.tui.orders.confirm import Confirm
 from tests.support.map_views import FRAME, VIEW, item
 from tests.support.pictures import check_picture
 from tests.support.pilots import run_story

@@ -14,11 +14,9 @@ from flightstack.plan import Command, Frame, Plan
 from gcs_cli.actions.in_mission import jump
 from gcs_cli.errors import FAILED, CliError
 from gcs_cli.tui.app import WatchApp
-from gcs_cli.tui.confirm import Confirm
-from gcs_cli.tui.entry_form import EntryForm
-from gcs_cli.tui.item_form import item_entries, item_of_texts
-from gcs_cli.tui.mission_draft import MissionDraft
-from gcs_cli.tui.mission_rows import (
+from gcs_cli.tui.mission.draft import MissionDraft
+from gcs_cli.tui.mission.item_form import item_entries, item_of_texts
+from gcs_cli.tui.mission.rows import (
     Progress,
     meaning,
     mission_columns,
@@ -27,7 +25,9 @@ from gcs_cli.tui.mission_rows import (
     summary,
     to_go,
 )
+from gcs_cli.tui.orders.confirm import Confirm
 from gcs_cli.tui.palette import DARK
+from gcs_cli.tui.widgets.entry_form import EntryForm
 from gcs_cli.vehicle.view_types import Identity
 from tests.support.map_views import item
 from tests.support.mission_stories import FLYING, ITEMS, TABLE, answer, drive, said

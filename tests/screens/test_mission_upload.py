@@ -6,7 +6,7 @@ import pytest
 
 from gcs_cli.errors import FAILED, CliError
 from gcs_cli.plans.check import Problem
-from gcs_cli.tui.mission_screen import Comparison
+from gcs_cli.tui.mission.screen import Comparison
 from gcs_cli.vehicle.view_types import Identity
 from tests.support.mission_stories import FLYING, answer, drive, said
 from tests.support.screens import shown

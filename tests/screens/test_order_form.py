@@ -7,7 +7,7 @@ from textual.pilot import Pilot
 
 from flightstack.mavlink.dialect import mavlink
 from gcs_cli.tui.app import WatchApp
-from gcs_cli.tui.orders import Field, FieldError
+from gcs_cli.tui.orders.orders import Field, FieldError
 from gcs_cli.vehicle.view_types import Identity
 from tests.support.pilots import type_ahead
 from tests.support.screens import shown

@@ -13,10 +13,9 @@ from flightstack.mavlink.param_values import Parameter
 from gcs_cli.errors import FAILED, CliError
 from gcs_cli.transfers.param_calls import Changes
 from gcs_cli.tui.app import WatchApp
-from gcs_cli.tui.confirm import Confirm
-from gcs_cli.tui.entry_form import EntryForm
+from gcs_cli.tui.orders.confirm import Confirm
 from gcs_cli.tui.palette import DARK
-from gcs_cli.tui.param_model import (
+from gcs_cli.tui.params.model import (
     ParamList,
     differences_text,
     param_columns,
@@ -24,7 +23,8 @@ from gcs_cli.tui.param_model import (
     param_row,
     parse_param,
 )
-from gcs_cli.tui.param_screen import ParamScreen
+from gcs_cli.tui.params.screen import ParamScreen
+from gcs_cli.tui.widgets.entry_form import EntryForm
 from gcs_cli.vehicle.param_info import ParamInfo
 from tests.support.map_views import VIEW
 from tests.support.pictures import check_picture

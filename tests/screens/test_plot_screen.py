@@ -13,9 +13,9 @@ from textual.widgets import Input, OptionList
 
 from flightstack.mavlink.dialect import mavlink
 from gcs_cli.tui.app import WatchApp
-from gcs_cli.tui.field_picker import FieldPicker
-from gcs_cli.tui.history import History
-from gcs_cli.tui.plot_screen import PlotScreen
+from gcs_cli.tui.fly.history import History
+from gcs_cli.tui.plot.field_picker import FieldPicker
+from gcs_cli.tui.plot.screen import PlotScreen
 from tests.support.map_views import VIEW
 from tests.support.pictures import check_picture
 from tests.support.pilots import run_story

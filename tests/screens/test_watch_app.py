@@ -13,7 +13,7 @@ from textual.pilot import Pilot
 from flightstack.core.enums import Severity
 from gcs_cli.tui.app import REDRAWS_HZ, WatchApp
 from gcs_cli.tui.feed import Notice
-from gcs_cli.tui.orders import ORDERS
+from gcs_cli.tui.orders.orders import ORDERS
 from gcs_cli.tui.palette import DARK, LIGHT
 from gcs_cli.tui.screens import SCREENS, ScreenEntry
 from gcs_cli.vehicle.view_types import Identity, VehicleView

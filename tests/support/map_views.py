@@ -5,7 +5,7 @@ from __future__ import annotations
 from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.plan import Frame, MissionItem
-from gcs_cli.tui.map_scene import (
+from gcs_cli.tui.map.scene import (
     Place,
 )
 from gcs_cli.vehicle.view_types import GeoPosition, Identity, Mission, Setpoint, Vector, VehicleView

@@ -8,9 +8,9 @@ from textual.pilot import Pilot
 
 from flightstack.plan import Command, Plan
 from gcs_cli.tui.app import WatchApp
-from gcs_cli.tui.map_scene import Place
-from gcs_cli.tui.mission_rows import mission_table
-from gcs_cli.tui.mission_screen import MissionScreen
+from gcs_cli.tui.map.scene import Place
+from gcs_cli.tui.mission.rows import mission_table
+from gcs_cli.tui.mission.screen import MissionScreen
 from gcs_cli.vehicle.view_types import GeoPosition, Mission
 from tests.support.map_views import HOME, VIEW, item
 from tests.support.pilots import run_story

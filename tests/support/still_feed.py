@@ -12,9 +12,9 @@ from flightstack.core.enums import Severity
 from gcs_cli.actions.action import Action
 from gcs_cli.link.connection import Connection
 from gcs_cli.tui.feed import Feed, Notice
-from gcs_cli.tui.history import History
-from gcs_cli.tui.message_log import MessageLog
-from gcs_cli.tui.traffic import Traffic
+from gcs_cli.tui.fly.history import History
+from gcs_cli.tui.map.traffic import Traffic
+from gcs_cli.tui.messages.message_log import MessageLog
 from gcs_cli.vehicle.view_types import VehicleView
 
 

@@ -67,6 +67,13 @@ class Terminal:
         return "\n".join(self._call("capture-pane", "-p"))
 
     @property
+    def sizes(self) -> str:
+        """Columns and lines of the pane, and lines and columns that its programs read."""
+        pane, tty = self._call("display-message", "-p", "#{pane_width}x#{pane_height} #{pane_tty}")[0].split()
+        told = subprocess.run(["stty", "size", "-F", tty], capture_output=True, text=True, check=False)
+        return f"{pane}, told {told.stdout.strip()}"
+
+    @property
     def coloured(self) -> str:
         """The text on the screen with the escape sequences of its colours."""
         return "\n".join(self._call("capture-pane", "-p", "-e"))
@@ -81,7 +88,7 @@ class Terminal:
         """Return the screen when ``holds`` is true of it; look at it after each output."""
         end_s = time.monotonic() + HANG_S
         while not holds(shown := self.screen):
-            assert time.monotonic() < end_s, f"never {what}:\n{shown}"
+            assert time.monotonic() < end_s, f"never {what} in {self.sizes}:\n{shown}"
             while not self._line().startswith("%output"):
                 assert not self.ended, f"ended without {what}"
         return shown

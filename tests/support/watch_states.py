@@ -6,7 +6,7 @@ import math
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
-from gcs_cli.tui.history import History
+from gcs_cli.tui.fly.history import History
 from gcs_cli.vehicle.view_types import (
     Battery,
     Estimator,

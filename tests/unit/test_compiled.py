@@ -181,6 +181,29 @@ def test_kernels_in_numba_cache_dir_are_keyed_by_their_sources(tmp_path: Path) -
     assert compiler in kernel_cache.sources(top, ["flightstack.control.mixer"])
 
 
+def test_copies_of_the_sources_share_their_kernels(tmp_path: Path) -> None:
+    """A clone and an installed wheel of the same sources need no compilation of their own."""
+    top = Path(module.__file__).parents[2]
+    copy = tmp_path / "copy"
+    for path in kernel_cache.sources(top, ["flightstack.core.geometry"]):
+        target = copy / path.relative_to(top)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(path.read_bytes())  # of another time
+    code = """if True:
+        from flightstack.core.geometry import Quaternion, quaternion_product
+        quaternion_product(Quaternion(1.0, 0.0, 0.0, 0.0), Quaternion(1.0, 0.0, 0.0, 0.0))
+        print(sum(quaternion_product.stats.cache_hits.values()))"""
+    hits = []
+    for place in (top, copy):
+        environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path), "PYTHONPATH": str(place)}
+        environment.pop("NUMBA_CACHE_DIR", None)
+        done = subprocess.run(
+            [sys.executable, "-P", "-c", code], env=environment, capture_output=True, text=True, check=True
+        )
+        hits.append(int(done.stdout))
+    assert hits == [0, 1]
+
+
 def test_cache_directory_of_other_numba_users_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(numba.config, "CACHE_DIR", "elsewhere")
     module._Kernel(quaternion_product.py_func, frozenset({geometry.__name__}))

@@ -128,7 +128,7 @@ def test_an_edit_is_noticed(site: Path) -> None:
     assert len(keys) == 4
     install(site)
     importlib.invalidate_caches()
-    alone = load_controller("lqr")
+    alone = load_controller("lqr").attitude
     key = alone.key
     (site / "neighbour.py").write_text("X = 1\n")  # another package in the same folder is no part of it
     assert alone.key == key
@@ -265,7 +265,10 @@ BROKEN = {
     ),
     "it exits": ("raise RuntimeError('many\\nlines')", "broken:CONTROLLER cannot be loaded: many"),
     "it has no such name": ("X = 1", "broken:CONTROLLER cannot be loaded: module 'broken' has no attribute"),
-    "it is something else": ("CONTROLLER = 3", "broken:CONTROLLER is not an AttitudeController"),
+    "it is something else": (
+        "CONTROLLER = 3",
+        "broken:CONTROLLER is neither a Controller nor an AttitudeController",
+    ),
     "it has another name": (
         MODULE,
         "broken:CONTROLLER calls itself 'lqr', and must bear the name of its entry point",

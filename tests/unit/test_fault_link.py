@@ -92,7 +92,7 @@ def test_the_battery_fails_by_command() -> None:
         ((101, 1, 5), mavlink.MAV_RESULT_DENIED), ((101, 1, -1), mavlink.MAV_RESULT_DENIED),
         ((101, 1, 1.5), mavlink.MAV_RESULT_DENIED), ((101, 1, math.nan), mavlink.MAV_RESULT_DENIED),
         ((101, 3, 1), mavlink.MAV_RESULT_UNSUPPORTED), ((101, math.nan, 1), mavlink.MAV_RESULT_UNSUPPORTED),
-        ((4, 1, 0), mavlink.MAV_RESULT_UNSUPPORTED), ((math.inf, 1, 0), mavlink.MAV_RESULT_UNSUPPORTED),
+        ((8, 1, 0), mavlink.MAV_RESULT_UNSUPPORTED), ((math.inf, 1, 0), mavlink.MAV_RESULT_UNSUPPORTED),
         ((100, 2, 0), mavlink.MAV_RESULT_UNSUPPORTED), ((100, 1, 7), mavlink.MAV_RESULT_DENIED),
     ],
 )  # fmt: skip
@@ -115,7 +115,8 @@ def test_third_parties_see_the_faults_too() -> None:
     send(link, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, HIL_STATE_QUATERNION_ID, 2000)
     rows = []
     for _ in range(15):
-        rows.append(list(Link(1, 1).decode(bytes(link.state())))[-1])
+        sent = {message.get_type(): message for message in Link(1, 1).decode(bytes(link.state()))}
+        rows.append(sent["HIL_STATE_QUATERNION"])
         link.simulator.apply(command(300.0))
     assert all(math.isnan(value) for value in rows[0].attitude_quaternion)
     assert len({row.alt for row in rows[5:10]}) == 1

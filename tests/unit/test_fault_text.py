@@ -26,6 +26,11 @@ from sim_bridge.plant.fault_table import TABLE, Row
         ("state:drop@5-6", Fault(Kind.STATE_DROP, -1, 0.0, 5_000_000, 6_000_000)),
         ("battery:level=0.1@20", Fault(Kind.BATTERY_LEVEL, -1, 0.1, 20_000_000)),
         ("rotor:4:off", Fault(Kind.ROTOR_OFF, 3)),
+        ("sensor:imu2:off@3", Fault(Kind.SENSOR_OFF, begin_us=3_000_000, sensor="imu2")),
+        ("sensor:gyro:bias=1,-2,3", Fault(Kind.SENSOR_BIAS, vector=Vector3(1.0, -2.0, 3.0), sensor="gyro")),
+        ("sensor:baro:drift=-0.1", Fault(Kind.SENSOR_DRIFT, vector=Vector3(-0.1, 0.0, 0.0), sensor="baro")),
+        ("sensor:gnss:jam=0.5", Fault(Kind.GNSS_JAM, value=0.5, sensor="gnss")),
+        ("sensor:mag:turn=90", Fault(Kind.MAG_TURN, value=90.0, sensor="mag")),
     ],
 )
 def test_fault_is_parsed(text: str, fault: Fault) -> None:
@@ -55,6 +60,16 @@ def test_fault_is_parsed(text: str, fault: Fault) -> None:
         ("ground effect maybe", "expected ground effect on or ground effect off"), ("gust -1", "M_S must be 0 to 100"),
         ("wind:step=1,2,x", "D 'x' is not a number"), ("rotor=1=off", "the part is not one of rotor, payload"),
         ("battery  level 2", "0 to 1"),
+        ("sensor:sonar:off", "'sonar' is not a sensor: imu, gyro, accel, mag, baro, gnss, range, flow; imu2, gyro2"),
+        ("sensor:mag2:off", "'mag2' is not a sensor"), ("sensor gyro0 off", "'gyro0' is not a sensor"),
+        ("sensor:imu:bias=1,2,3", "imu is gyro and accelerometer: name one of them"),
+        ("sensor:imu:noise=1", "imu is gyro and accelerometer"),
+        ("sensor:mag:noise=11", "SPREAD must be 0 to 10 gauss"),
+        ("sensor:gyro:bias=1", "VALUE of gyro must be 3 numbers separated by commas, each -2000 to 2000 °/s"),
+        ("sensor:baro:bias=1,2", "VALUE of baro must be one number, -1000 to 1000 hPa"),
+        ("sensor:mag:bias=0,0,11", "VALUE must be -10 to 10 gauss"), ("sensor baro bias x", "'x' is not a number"),
+        ("sensor:gyro:jam=0.5", "expected sensor:SENSOR:off, sensor:SENSOR:freeze"),
+        ("sensor:mag:loss=2", "SHARE must be 0 to 1"), ("sensor", "expected sensor SENSOR off, sensor SENSOR frozen"),
     ],
 )  # fmt: skip
 def test_a_bad_fault_is_named_in_one_sentence(text: str, said: str) -> None:
@@ -78,10 +93,27 @@ WORDS = {
     "battery sag 0.05": Fault(Kind.BATTERY_SAG, value=0.05), "battery cell dead": Fault(Kind.BATTERY_CELL),
     "state frozen": Fault(Kind.STATE_FREEZE), "state nan": Fault(Kind.STATE_NAN),
     "state dropped": Fault(Kind.STATE_DROP),
+    "sensor gyro2 off": Fault(Kind.SENSOR_OFF, sensor="gyro2"),
+    "sensor imu frozen": Fault(Kind.SENSOR_FREEZE, sensor="imu"),
+    "sensor mag bias 0.1, 0, 0": Fault(Kind.SENSOR_BIAS, vector=Vector3(0.1, 0.0, 0.0), sensor="mag"),
+    "sensor gnss drift 0.5,0,0": Fault(Kind.SENSOR_DRIFT, vector=Vector3(0.5, 0.0, 0.0), sensor="gnss"),
+    "sensor baro noise 2": Fault(Kind.SENSOR_NOISE, value=2.0, sensor="baro"),
+    "sensor flow late 0.2": Fault(Kind.SENSOR_LATE, value=0.2, sensor="flow"),
+    "sensor range loss 0.3": Fault(Kind.SENSOR_LOSS, value=0.3, sensor="range"),
+    "sensor gnss jammed 0.9": Fault(Kind.GNSS_JAM, value=0.9, sensor="gnss"),
+    "sensor mag turned 90": Fault(Kind.MAG_TURN, value=90.0, sensor="mag"),
+    "sensor imu vibration 10": Fault(Kind.VIBRATION, value=10.0, sensor="imu"),
     "state late 0.1": Fault(Kind.STATE_LATE, value=0.1), "clock stalled": Fault(Kind.CLOCK_STALL),
     "clock jump -0.5": Fault(Kind.CLOCK_JUMP, value=-0.5), "clear": Fault(Kind.CLEAR),
 }  # fmt: skip
-VALUES = {"N": "3", "SHARE": "0.25", "X,Y,Z": "0.1,0.2,-0.3", "N,E,D": "1,-2,3"}
+VALUES = {
+    "N": "3",
+    "SHARE": "0.25",
+    "X,Y,Z": "0.1,0.2,-0.3",
+    "N,E,D": "1,-2,3",
+    "SENSOR": "accel2",
+    "VALUE": "1,2,3",
+}
 
 
 @pytest.mark.parametrize("text", WORDS)
@@ -97,7 +129,7 @@ def test_words_of_this_test_are_the_whole_table() -> None:
 @pytest.mark.parametrize("row", TABLE, ids=lambda row: row.compact)
 def test_both_notations_of_a_row_are_the_same_fault(row: Row) -> None:
     compact, words = row.compact, row.words
-    for name in sorted(("N", *row.ranges), key=len, reverse=True):
+    for name in sorted(("N", "SENSOR", "VALUE", *row.ranges), key=len, reverse=True):
         value = VALUES.get(name, "0.5")
         compact, words = (re.sub(rf"\b{name}(?![\w,])", value, text) for text in (compact, words))
     fault = parse_fault(f"{compact}@7", 4)
@@ -110,7 +142,9 @@ def test_both_notations_of_a_row_are_the_same_fault(row: Row) -> None:
 @given(
     st.one_of(
         st.text(max_size=40),
-        st.from_regex(r"(rotor:\d*:|state:|battery:|payload[: ])\w*=?[\d.e,-]*@?[\d.e-]*"),
+        st.from_regex(
+            r"(rotor:\d*:|state:|battery:|payload[: ]|sensor:(gyro2|baro|mag|imu):)\w*=?[\d.e,-]*@?[\d.e-]*"
+        ),
     )
 )
 def test_any_fault_text_is_parsed_or_rejected(text: str) -> None:

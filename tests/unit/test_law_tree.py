@@ -41,7 +41,7 @@ def test_user_controller_gets_a_whole_firmware_once(lqr: AttitudeController) -> 
     assert tree.name.startswith("lqr-")
     assert generated_names(lqr) == {"lqr_controller.c", "lqr_controller.h"}
     assert {path.name for path in (tree / "core").iterdir()} >= generated_names(lqr) | {"fs_loops.c"}
-    assert "run_lqr" in (tree / "core" / "fs_controllers.c").read_text()
+    assert "run_attitude_lqr" in (tree / "core" / "fs_controllers.c").read_text()
     stamp = (tree / "core" / "lqr_controller.c").stat().st_mtime_ns
     assert law_tree(lqr) == tree
     assert (tree / "core" / "lqr_controller.c").stat().st_mtime_ns == stamp

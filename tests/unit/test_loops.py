@@ -10,11 +10,13 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 from flightstack.control.attitude_backstepping import CONTROLLER as BACKSTEPPING
-from flightstack.control.attitude_controller import AttitudeController
+from flightstack.control.attitude_controller import AttitudeController, AttitudeInputs
 from flightstack.control.attitude_pid import CONTROLLER as PID
+from flightstack.control.control_law import ControlLaw, NoMemory, NoParams
 from flightstack.control.loops import PythonLoops
 from flightstack.control.mixer import mixer_for
-from flightstack.core.contract import LoopRow, LoopStatus
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import LoopRow, LoopStatus, Vector3
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
 from tests.support.failing_controller import CONTROLLER as FAILING
@@ -35,6 +37,10 @@ def at_rest(position=(0.0, 0.0, 0.0), rates=(0.0, 0.0, 0.0)) -> np.ndarray:
 
 def setpoint(position=(0.0, 0.0, 0.0), yaw: float = 0.0) -> np.ndarray:
     return np.array([*position, *[0.0] * 6, yaw, 0.0])
+
+
+def memories(loops: PythonLoops) -> list[np.ndarray]:
+    return [loops._reference_memory, *loops._memories.values()]
 
 
 class Flight:
@@ -135,9 +141,8 @@ def test_a_state_that_is_not_finite_repeats_the_last_row_with_a_status_bit() -> 
         assert held[LoopRow.STATUS] == LoopStatus.INPUT_NOT_FINITE, (column, bad)
         assert held[: LoopRow.STATUS].tolist() == good[: LoopRow.STATUS].tolist(), (column, bad)
         # nothing was integrated meanwhile
-        for memory in ("_position_memory", "_reference_memory", "_controller_memory"):
-            kept, expected = getattr(flight.loops, memory), getattr(undisturbed.loops, memory)
-            assert kept.tolist() == expected.tolist(), (column, bad, memory)
+        for kept, expected in zip(memories(flight.loops), memories(undisturbed.loops), strict=True):
+            assert kept.tolist() == expected.tolist(), (column, bad)
         flight.state = at_rest()
         row = flight.tick()
         assert np.isfinite(row).all(), (column, bad)
@@ -205,11 +210,11 @@ def test_integral_of_a_saturated_axis_waits() -> None:
     flight.tick(40)
     saturated = [bool(int(row[LoopRow.STATUS]) & LoopStatus.YAW_SATURATED) for row in flight.rows]
     assert any(saturated)
-    before = flight.loops._controller_memory[2]
+    before = flight.loops._memories["attitude"][2]
     first = saturated.index(True)
     assert all(saturated[first:])
     flight.tick(40)
-    assert flight.loops._controller_memory[2] == before
+    assert flight.loops._memories["attitude"][2] == before
 
 
 def test_row_shows_what_the_rotors_make() -> None:
@@ -226,7 +231,7 @@ def test_an_attitude_given_from_outside_is_flown_in_a_straight_line_over_an_oute
     loops = make()
     flight = Flight(loops, at_rest(), setpoint())
     flight.tick(5)
-    integral = loops._position_memory.copy()
+    integral = loops._outer_memory.copy()
     pitch = 0.2
     target = np.array([math.cos(0.5 * pitch), 0.0, math.sin(0.5 * pitch), 0.0, 0.7 * PAPER.weight_n])
     references, thrusts = [], []
@@ -243,8 +248,36 @@ def test_an_attitude_given_from_outside_is_flown_in_a_straight_line_over_an_oute
     steps = np.diff(references)
     assert steps.min() >= -1e-9  # it comes from one side
     assert np.abs(np.diff(steps)).max() < 1e-3
-    assert loops._position_memory.tolist() == integral.tolist()
+    assert loops._outer_memory.tolist() == integral.tolist()
     before = loops.attitude_target.copy()
     row = np.zeros(LoopRow.SIZE)
     loops.step(flight.state, flight.wish, SPEEDS, True, row)
     assert loops._last_target.tolist() == before.tolist()  # the way back begins here
+
+
+def rate_damping(
+    memory: NoMemory, inputs: AttitudeInputs, params: NoParams, dt_s: float
+) -> tuple[NoMemory, Vector3]:
+    """A law that does not look at the reference."""
+    return memory, Vector3(-0.01 * inputs.rates_frd_rad_s.x, 0.0, 0.0)
+
+
+def test_a_reference_that_is_not_finite_is_not_kept_by_a_law_that_ignores_it() -> None:
+    law = ControlLaw(
+        "damping",
+        compiled(rate_damping),
+        NoMemory,
+        NoParams,
+        (0.0,),
+        lambda vehicle, gains: NoParams(0.0),
+        (),
+    )
+    flight = Flight(make(law), at_rest(), setpoint())
+    flight.tick(3)
+    flight.loops._memory[0]["reference_params"][3] = 1e308  # its largest acceleration
+    flight.loops._memory[0]["reference_params"][0] = 1e200  # and bandwidth
+    flight.state = at_rest(rates=(0.1, 0.0, 0.0))
+    flight.loops.set_attitude_target(np.array([0.0, 1.0, 0.0, 0.0, 4.0]))
+    held = flight.tick()
+    assert held[LoopRow.STATUS] == LoopStatus.OUTPUT_NOT_FINITE
+    assert np.isfinite(flight.loops._reference_memory).all()

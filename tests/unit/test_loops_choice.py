@@ -22,6 +22,10 @@ from flightstack.firmware.choice import LoopsChoice, parse_loops
             LoopsChoice("serial", "/dev/serial/by-path/usb-0:1.4:1.0"),
             True,
         ),
+        ("host,short", LoopsChoice("host", ending="short"), True),
+        ("emulated,short", LoopsChoice("emulated", ending="short"), True),
+        ("serial:/dev/ttyUSB1:921600,short", LoopsChoice("serial", "/dev/ttyUSB1", 921_600, "short"), True),
+        ("serial:a,b,short", LoopsChoice("serial", "a,b", 115_200, "short"), True),
         ("serial:x:1200", LoopsChoice("serial", "x", 1_200), True),
         ("serial:loop:name:2500000", LoopsChoice("serial", "loop:name", 2_500_000), True),
     ],
@@ -31,7 +35,10 @@ def test_a_word_is_read(word: str, choice: LoopsChoice, is_target: bool) -> None
     assert parse_loops(word).is_target is is_target
 
 
-NO_WORDS = "", "C", "python:", "host:/dev/pts/1", "serial", "serial:", "serial::9600", "serial:x:1199"
+NO_WORDS = (
+    *("", "C", "python:", "host:/dev/pts/1", "serial", "serial:", "serial::9600", "serial:x:1199"),
+    *("python,short", "c,short", "host,", "host,long", "host:,short"),
+)
 
 
 @pytest.mark.parametrize("word", [*NO_WORDS, "serial:x:20000001", "serial:x:" + "9" * 5000])

@@ -7,68 +7,29 @@ import sys
 from dataclasses import replace
 from itertools import pairwise
 
-import mujoco
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
-from flightstack.core.contract import MAX_ROTORS, Vector3
+from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import LocalFrame
 from flightstack.params.config import DEFAULT_HOME
-from flightstack.params.vehicle import Vehicle, load_vehicle
+from flightstack.params.vehicle import load_vehicle
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, ActuatorsFrame
 from sim_bridge import plants
 from sim_bridge.errors import PlantDivergedError, UsageProblemError
-from sim_bridge.multibody.frames import flip_quaternion, flip_vector
-from sim_bridge.multibody.mjcf import model_xml
 from sim_bridge.multibody.plant import MultibodyPlant
-from sim_bridge.plant.contact import FRICTION
-from sim_bridge.plant.disturbance import NO_DISTURBANCE, Disturbance
-from sim_bridge.plant.fault_effects import PlantFaults, RotorFault, plant_faults
+from sim_bridge.plant.disturbance import Disturbance
+from sim_bridge.plant.fault_effects import plant_faults
 from sim_bridge.plant.fault_schedule import parse_fault
-from sim_bridge.plant.layout import CONTACT, DIVERGED
-from sim_bridge.plant.plant import AT_REST, InitialState, Plant, PlantOptions
+from sim_bridge.plant.layout import DIVERGED
+from sim_bridge.plant.plant import InitialState, PlantOptions
 from sim_bridge.plants import PLANT_NAMES, make_plant
 from sim_bridge.server.hil import hil_state
 from sim_bridge.simulator import Simulator
+from tests.support.multibody_flights import BOTH_PLANTS, BOTH_VEHICLES, Flight, hover, model_state
 from tests.support.tools import NIGHTLY
 
-BOTH_PLANTS = pytest.mark.parametrize("name", ["rigid", "multibody"])
-BOTH_VEHICLES = pytest.mark.parametrize("vehicle", ["paper_quad", "x_quad"])
-STOPPED = np.zeros(8)
 TOLD = Disturbance(Vector3(2.0, 1.0, -0.5), 0.0, Vector3(0.1, 0.2, 0.3), Vector3(0.01, 0.02, -0.01))
-
-
-class Flight:
-    """A plant in the air, optionally without aerodynamic forces."""
-
-    def __init__(
-        self, name: str, vehicle: Vehicle, initial: InitialState = AT_REST, speeds: tuple[float, ...] = (),
-        disturbance: Disturbance = NO_DISTURBANCE, step_s: float = 1e-3, thrust: bool = True, ground: bool = False,
-    ) -> None:  # fmt: skip
-        options = PlantOptions(disturbance, 1, initial, ground, limits=False, battery=None)
-        self.plant: Plant = make_plant(vehicle, name, options)
-        self.plant.set_step(step_s)
-        self.step_s = step_s
-        self.command = np.zeros(8)
-        if speeds:
-            self.plant.set_rotor_speeds(speeds)
-            self.command[: len(speeds)] = speeds
-        if not thrust:
-            self.plant.set_faults(PlantFaults(rotors=[RotorFault(share=0.0)] * MAX_ROTORS))
-        self.result = self.plant.show()
-
-    def fly(self, seconds: float) -> Flight:
-        self.result = self.plant.advance(self.command, ARMED_FLAG, round(seconds / self.step_s))
-        return self
-
-    @property
-    def state(self) -> np.ndarray:
-        return self.plant.output[0]["state"].copy()
-
-
-def hover(vehicle: Vehicle) -> float:
-    return math.sqrt(vehicle.weight_n / sum(r.thrust_coefficient_n_s2 for r in vehicle.rotors))
 
 
 class Conditions:
@@ -106,21 +67,6 @@ def test_multibody_converges_to_the_rigid_plant(vehicle: str, seed: int) -> None
     assert min(orders) > 3.9  # measured: 3.97
     same_step = np.abs(conditions.end("multibody", 1e-3) - conditions.end("rigid", 1e-3)).max()
     assert same_step < 1e-9  # measured: at most 4e-11; the same equations, implemented twice
-
-
-def model_state(
-    vehicle: Vehicle, state: np.ndarray, speeds: list[float]
-) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """The exported model in this state: independent momentum and energy."""
-    model = mujoco.MjModel.from_xml_string(model_xml(vehicle))
-    data = mujoco.MjData(model)
-    data.qpos[:3], data.qvel[:3] = flip_vector(state[:3]), flip_vector(state[3:6])
-    data.qpos[3:7], data.qvel[3:6] = flip_quaternion(state[6:10]), flip_vector(state[10:13])
-    data.qvel[6:] = speeds
-    mujoco.mj_forward(model, data)
-    mujoco.mj_subtreeVel(model, data)
-    mujoco.mj_energyVel(model, data)  # of frame and rotors, to data.energy[1]
-    return model, data
 
 
 class TorqueFree:
@@ -287,86 +233,6 @@ def test_spin_up_turns_the_vehicle_the_other_way() -> None:
     assert yaw_rate == pytest.approx(expected, rel=1e-5)
 
 
-@BOTH_VEHICLES
-@pytest.mark.parametrize("step_s", [0.01, 0.002, 1e-3])
-def test_rests_at_the_origin(vehicle: str, step_s: float) -> None:
-    flight = Flight("multibody", load_vehicle(vehicle), step_s=step_s, ground=True)
-    assert flight.result == CONTACT
-    flight.plant.advance(STOPPED, 0, min(2000, round(5.0 / step_s)))
-    assert np.abs(flight.state - [0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0]).max() < 1e-12  # measured: 6e-14
-    assert flight.plant.penetration_m() < 1e-12
-
-
-@BOTH_VEHICLES
-def test_touchdown_has_a_small_bounce(vehicle: str) -> None:
-    start = InitialState(Vector3(0.0, 0.0, -0.02), Vector3(0.1, 0.0, 1.0))
-    flight = Flight("multibody", load_vehicle(vehicle), start, ground=True)
-    heights = []
-    for _ in range(1000):
-        flight.result = flight.plant.advance(STOPPED, 0, 1)
-        heights.append(-flight.state[2])
-    first = int(np.argmax(np.array(heights) < 0.0))
-    assert max(heights[first:]) < 0.002  # measured: 0.9 mm, as with the rigid plant
-    assert min(heights) > -0.006  # measured: 3.5 mm
-    assert flight.result == CONTACT
-    assert np.abs(flight.state[[2, 3, 4, 5]]).max() < 1e-6
-
-
-@BOTH_VEHICLES
-@pytest.mark.parametrize("sink_m_s", [2.0, 10.0, 30.0])
-def test_hard_landing_stays_finite_and_above_ground(vehicle: str, sink_m_s: float) -> None:
-    start = InitialState(
-        Vector3(0.0, 0.0, -1.0), Vector3(2.0, 1.0, sink_m_s), Vector3(0.4, -0.3, 1.0), Vector3(3.0, -2.0, 1.0)
-    )
-    flight = Flight("multibody", load_vehicle(vehicle), start, ground=True)
-    for _ in range(160):
-        result = flight.plant.advance(STOPPED, 0, 50)
-        assert np.isfinite(flight.state).all()
-        assert np.linalg.norm(flight.state[3:6]) < math.hypot(sink_m_s, 5.0) + 5.0
-    assert result == CONTACT
-    assert np.abs(flight.state[3:6]).max() < 1e-3
-    assert flight.state[2] < 0.25  # within legs and arms
-
-
-@pytest.mark.parametrize("euler_deg", [(180.0, 0.0, 0.0), (140.0, 20.0, 0.0)])
-def test_tumbled_vehicle_lies_still(euler_deg: tuple[float, ...]) -> None:
-    start = InitialState(Vector3(0.0, 0.0, -1.0), euler_rad=Vector3(*np.radians(euler_deg)))
-    flight = Flight("multibody", load_vehicle("paper_quad"), start, ground=True)
-    flight.plant.advance(STOPPED, 0, 9000)
-    before = flight.state
-    assert flight.plant.advance(STOPPED, 0, 1000) == CONTACT
-    assert np.abs(flight.state - before)[:6].max() < 1e-6
-
-
-@BOTH_VEHICLES
-def test_friction_holds_below_its_limit_and_slides_above(vehicle: str) -> None:
-    weight = load_vehicle(vehicle).weight_n
-
-    def pushed(share: float) -> Flight:
-        push = Disturbance(force_ned_n=Vector3(share * weight, 0.0, 0.0))
-        flight = Flight("multibody", load_vehicle(vehicle), disturbance=push, ground=True)
-        flight.plant.advance(STOPPED, 0, 1500)
-        return flight
-
-    held = pushed(0.3)
-    before = held.state
-    assert 0.0 < before[0] < 1e-3
-    held.plant.advance(STOPPED, 0, 2000)
-    assert np.abs(held.state - before)[:2].max() < 1e-6  # measured: 2e-8
-    assert pushed(FRICTION + 0.05).state[3] > 0.3
-
-
-@BOTH_VEHICLES
-def test_takes_off_when_thrust_exceeds_weight(vehicle: str) -> None:
-    flight = Flight("multibody", load_vehicle(vehicle), ground=True)
-    flight.command[:4] = 0.95 * hover(load_vehicle(vehicle))
-    assert flight.fly(2.0).result == CONTACT
-    flight.command[:4] = 1.1 * hover(load_vehicle(vehicle))
-    assert flight.fly(1.0).result == 0
-    assert flight.state[2] < -0.3
-    assert np.abs(flight.state[[0, 1, 7, 8, 9]]).max() < 1e-9
-
-
 def test_a_bad_command_is_counted_and_the_last_good_one_holds() -> None:
     vehicle = load_vehicle("paper_quad")
     flight = Flight("multibody", vehicle, InitialState(Vector3(0.0, 0.0, -9.0)), (hover(vehicle),) * 4)
@@ -376,108 +242,6 @@ def test_a_bad_command_is_counted_and_the_last_good_one_holds() -> None:
     assert flight.plant.bad_commands == 4
     assert flight.result == 0
     assert flight.plant.rotor_speeds_rad_s() == pytest.approx([hover(vehicle)] * 4)
-
-
-def test_ideal_rotors_are_at_their_speeds_at_once() -> None:
-    vehicle = load_vehicle("paper_quad").with_ideal_rotors()
-    flight = Flight("multibody", vehicle, InitialState(Vector3(0.0, 0.0, -9.0)))
-    flight.command[:4] = (100.0, 200.0, 300.0, 400.0)
-    flight.fly(1e-3)
-    assert flight.plant.rotor_speeds_rad_s() == [100.0, 200.0, 300.0, 400.0]
-    flight.plant.set_rotor_speeds((50.0,) * 4)  # not the commanded speeds
-    assert flight.plant.acceleration_ned_m_s2().z == pytest.approx(
-        9.81 - 4.0 * 2500.0 * 2.93e-5 / 0.55, rel=1e-3
-    )  # the frame is tilted a little
-
-
-@BOTH_PLANTS
-@pytest.mark.parametrize("lag_s", [0.0, 0.005])
-def test_rotors_without_lag_have_no_spin_up_torque(name: str, lag_s: float) -> None:
-    """A convention: without lag the speeds are imposed, without the reaction Σ s·J_r·ΔΩ on the frame.
-
-    The reaction to a jump of the speed would be an impulse of a motor of infinite torque in every tick, and no yaw
-    loop is stable with it. So momentum is not conserved, by exactly that sum; with a lag, however short, it is.
-    """
-    paper = load_vehicle("paper_quad")
-    vehicle = replace(paper, rotors=tuple(replace(rotor, lag_s=lag_s) for rotor in paper.rotors))
-    flight = Flight(name, vehicle, InitialState(Vector3(0.0, 0.0, -9.0)), (100.0,) * 4, thrust=False)
-
-    def momentum() -> float:
-        model, data = model_state(vehicle, flight.state, flight.plant.rotor_speeds_rad_s())
-        return -float(data.subtree_angmom[model.body("vehicle").id][2])  # about down
-
-    before = momentum()
-    flight.command[:4] = (200.0, 100.0, 200.0, 100.0)
-    flight.fly(0.2)
-    gained = sum(
-        rotor.spin * rotor.inertia_kg_m2 * (speed - 100.0)
-        for rotor, speed in zip(vehicle.rotors, flight.command[:4].tolist(), strict=True)
-    )
-    assert gained == pytest.approx(2.0 * 6.3e-5 * 100.0)
-    if lag_s:
-        assert abs(momentum() - before) < 1e-6 * gained
-    else:
-        assert abs(flight.state[12]) < 1e-30
-        assert momentum() - before == pytest.approx(gained, rel=1e-9)
-
-
-LARGEST_TORQUE = 0.2  # N m; a hover takes 0.033
-
-
-def with_weak_drives() -> Vehicle:
-    paper = load_vehicle("paper_quad")
-    rotors = tuple(replace(rotor, max_drive_torque_n_m=LARGEST_TORQUE) for rotor in paper.rotors)
-    return replace(paper, rotors=rotors)
-
-
-@BOTH_PLANTS
-def test_limited_drive_follows_its_equation(name: str) -> None:
-    """J·Ω̇ of the lag, limited so that its sum with the drag is within the torque, against SciPy."""
-    vehicle = with_weak_drives()
-    rotor = vehicle.rotors[0]
-    inertia, drag, lag = rotor.inertia_kg_m2, rotor.torque_coefficient_n_m_s2, rotor.lag_s
-    start, commands = np.full(4, 200.0), np.array([330.0, 205.0, 60.0, 120.0])
-
-    def slope(_: float, speed: np.ndarray) -> np.ndarray:
-        torque = inertia * (commands - speed) / lag + drag * speed * np.abs(speed)
-        clipped: np.ndarray = (
-            np.clip(torque, -LARGEST_TORQUE, LARGEST_TORQUE) - drag * speed * np.abs(speed)
-        ) / inertia
-        return clipped
-
-    flight = Flight(name, vehicle, InitialState(Vector3(0.0, 0.0, -50.0)), tuple(start.tolist()))
-    flight.command[:4] = commands
-    times = np.arange(1, 301) * 1e-3
-    truth = solve_ivp(slope, (0.0, 0.3), start, t_eval=times, max_step=1e-4, rtol=1e-10, atol=1e-8).y.T
-    speeds = []
-    for _ in times:
-        flight.fly(1e-3)
-        speeds.append(flight.plant.rotor_speeds_rad_s())
-    assert np.abs(np.array(speeds) - truth).max() < 0.05  # of 200 rad/s; measured: 0.011
-    assert speeds[-1] == pytest.approx(commands, abs=0.05)
-    unlimited = 330.0 - 130.0 * math.exp(-4.0)
-    assert speeds[19][0] < unlimited - 50.0  # an unlimited drive is nearly there after four lags
-
-
-def test_limited_drives_agree_on_both_plants_and_conserve_momentum() -> None:
-    ends = []
-    for name in ("rigid", "multibody"):
-        spin = InitialState(Vector3(0.0, 0.0, -50.0), rates_frd_rad_s=Vector3(1.0, -2.0, 0.5))
-        flight = Flight(name, with_weak_drives(), spin, (200.0,) * 4, thrust=False)
-        flight.command[:4] = (330.0, 205.0, 60.0, 120.0)
-
-        def momentum(flight: Flight = flight) -> np.ndarray:
-            speeds = flight.plant.rotor_speeds_rad_s()
-            model, data = model_state(load_vehicle("paper_quad"), flight.state, speeds)
-            return data.subtree_angmom[model.body("vehicle").id].copy()
-
-        before = momentum()
-        flight.fly(0.3)
-        assert np.abs(momentum() - before).max() < 1e-4 * np.linalg.norm(
-            before
-        )  # measured: 8e-6, where a limit begins or ends within a step
-        ends.append(flight.state)
-    assert np.abs(ends[0] - ends[1]).max() < 1e-9
 
 
 def test_divergence_ends_the_flight_with_one_sentence() -> None:

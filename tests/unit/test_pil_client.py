@@ -9,11 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from flightstack.core.contract import LoopFlags
 from flightstack.firmware.pil_client import PilClient, PilReport, PilTiming
-from flightstack.firmware.pil_operations import BAD_INPUT, OUT_OF_ORDER, REPEATED
+from flightstack.firmware.pil_steps import BAD_INPUT, OUT_OF_ORDER, REPEATED, WANT_REFERENCE, StepInput
 from flightstack.mavlink.dialect import mavlink
 
 REST = [0.0] * 13 + [1.0] * 11
+OUTER_DUE, SET_TARGET, RESET = LoopFlags.OUTER_DUE, LoopFlags.SET_TARGET, LoopFlags.RESET
 CODEC = mavlink.MAVLink(None, 1, 1)
 
 
@@ -49,9 +51,10 @@ def stepping(number: int = 0, timing: PilTiming = PilTiming(0.5, 3)) -> PilClien
 )
 def test_a_step_is_framed_as_pymavlink_does(flags: int, numbers: list[float], zeros: int) -> None:
     numbers[zeros:] = [0.0] * (24 - zeros)
+    sent = numbers if flags & 3 else [*numbers[:13], *[0.0] * 11]  # a setpoint that no loop reads stays here
     client = PilClient()
     client.start_step(flags, numbers)
-    message = mavlink.MAVLink_fs_pil_step_message(0, flags, numbers[:13], numbers[13:])
+    message = mavlink.MAVLink_fs_pil_step_message(0, flags, sent[:13], sent[13:])
     assert client.poll(0.0) == bytes(message.pack(mavlink.MAVLink(None, 1, 191)))
 
 
@@ -147,6 +150,82 @@ def test_bad_input_fails_at_once() -> None:
     client.receive(report(2, BAD_INPUT | 1), 0.1)
     assert client.failure == "stopped its rotors at step 2 because of invalid input"
     assert client.next_deadline() is None
+
+
+def test_short_steps_send_only_what_the_loops_read() -> None:
+    state, setpoint = [float(n) for n in range(1, 14)], [float(n) for n in range(20, 31)]
+    inner, outer = state[6:], state[:6]
+    for flags, wanted in (
+        (0, inner),
+        (RESET, inner),
+        (OUTER_DUE, [*inner, *outer, *setpoint]),
+        (SET_TARGET, [*inner, *setpoint[:5]]),
+    ):
+        client = PilClient()
+        client.start_step(flags, [*state, *setpoint], short_rotors=4)
+        message = mavlink.MAVLink_fs_pil_tick_message(0, flags, [*wanted, *[0.0] * 24][:24])
+        assert client.poll(0.0) == bytes(message.pack(mavlink.MAVLink(None, 1, 191)))
+
+
+def test_a_short_report_is_read_in_the_form_of_a_full_one() -> None:
+    client = PilClient()
+    client.start_step(OUTER_DUE | WANT_REFERENCE, REST, short_rotors=4)
+    client.poll(0.0)
+    values = [*[100.0, 101.0, 102.0, 103.0], *[1.0, 0.0, 0.0, 0.0, 9.0], *[0.5, 0.5, 0.5, 0.5], *[0.0] * 4]
+    client.receive(packed(mavlink.MAVLink_fs_pil_output_message(0, 2, 77, values)), 0.1)
+    result = client.result
+    assert isinstance(result, PilReport)
+    assert (result.step, result.status, result.cost) == (0, 2, (0, 0, 0, 77))
+    assert result.outputs[:9] == (1.0, 0.0, 0.0, 0.0, 9.0, 0.5, 0.5, 0.5, 0.5)
+    assert all(map(math.isnan, result.outputs[9:23]))
+    assert result.outputs[23:] == (100.0, 101.0, 102.0, 103.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def in_window(count: int = 3) -> PilClient:
+    """Return a client whose steps 0 to ``count`` - 1 were sent together at 0 s."""
+    client = PilClient(PilTiming(0.5, 3, step_s=0.1))
+    client.start_window([StepInput(RESET if at == 0 else 0, REST) for at in range(count)])
+    assert [m.step for m in mavlink.MAVLink(None, 1, 1).parse_buffer(client.poll(0.0))] == [*range(count)]
+    return client
+
+
+def test_window_ends_with_the_last_report() -> None:
+    client = in_window()
+    assert client.next_deadline() == pytest.approx(0.7)
+    client.receive(report(1) + report(0), 0.1)
+    assert client.result is None
+    client.receive(report(2), 0.2)
+    assert isinstance(client.result, tuple)
+    assert [each.step for each in client.result] == [0, 1, 2]  # type: ignore[union-attr]
+    client.start_step(0, REST)
+    assert client.step == 3
+
+
+def test_window_resends_unanswered_steps_after_the_timeout() -> None:
+    client = in_window()
+    client.receive(report(0) + report(1, OUT_OF_ORDER), 0.1)
+    assert client.poll(0.6) == b""
+    assert [m.step for m in mavlink.MAVLink(None, 1, 1).parse_buffer(client.poll(0.8))] == [1, 2]
+    client.receive(report(1) + report(2), 0.9)
+    assert client.result is not None
+    assert [step.attempts for step in client.steps] == [1, 2, 2]
+
+
+def test_window_without_progress_fails() -> None:
+    client = in_window()
+    for now_s in (1.0, 2.0):
+        assert client.poll(now_s)
+    client.receive(report(0), 2.1)  # progress: the count of attempts starts again
+    for now_s in (3.0, 4.0):
+        assert client.poll(now_s)
+    assert client.poll(5.0) == b""
+    assert client.failure == "did not answer step 1, sent 3 times"
+
+
+def test_bad_input_in_a_window_fails_at_once() -> None:
+    client = in_window()
+    client.receive(report(0) + report(1, BAD_INPUT), 0.1)
+    assert client.failure == "stopped its rotors at step 1 because of invalid input"
 
 
 def test_a_number_counts_when_it_is_read_back_bit_for_bit() -> None:

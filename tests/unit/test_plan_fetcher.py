@@ -10,7 +10,7 @@ import pytest
 
 from flightstack.plan import FenceCommand, MissionItem
 from gcs_cli.errors import FAILED, CliError
-from gcs_cli.tui.plan_fetcher import PlanFetcher
+from gcs_cli.tui.mission.plan_fetcher import PlanFetcher
 from gcs_cli.vehicle.view_types import Identity, Mission, VehicleView
 
 pytestmark = pytest.mark.unit

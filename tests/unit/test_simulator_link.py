@@ -43,10 +43,10 @@ class Client:
         return ack.result
 
     def state(self):
-        """The state; a due battery report precedes it."""
-        *before, message = self.codec.decode(bytes(self.sim.state()))
-        assert [one.get_type() for one in before] in ([], ["BATTERY_STATUS"])
-        return message
+        """The state; a due battery report precedes it, and sensors may follow."""
+        sent = {one.get_type(): one for one in self.codec.decode(bytes(self.sim.state()))}
+        (name,) = {"FS_PLANT_STATE", "HIL_STATE_QUATERNION"} & set(sent)
+        return sent[name]
 
 
 def actuators(

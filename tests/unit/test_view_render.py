@@ -10,18 +10,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.text import Text
 
-from gcs_cli.tui.compact import compact, waiting
-from gcs_cli.tui.drawing import Draw
-from gcs_cli.tui.flight_display import flight_display
-from gcs_cli.tui.health_panels import health_panel, link_panel
-from gcs_cli.tui.history import History
-from gcs_cli.tui.horizon import _SKY_CODE, _pixels, heading_tape
+from gcs_cli.tui.fly.compact import compact, waiting
+from gcs_cli.tui.fly.flight_display import flight_display
+from gcs_cli.tui.fly.health_panels import health_panel, link_panel
+from gcs_cli.tui.fly.history import History
+from gcs_cli.tui.fly.horizon import _SKY_CODE, _pixels, heading_tape
+from gcs_cli.tui.fly.panels import messages_panel, mission_panel, position_panel, power_panel
+from gcs_cli.tui.fly.timing_panels import timing_panel
+from gcs_cli.tui.fly.trends import trends_panel
 from gcs_cli.tui.palette import DARK
-from gcs_cli.tui.panels import messages_panel, mission_panel, position_panel, power_panel
 from gcs_cli.tui.status_line import status_line
-from gcs_cli.tui.timing_panels import timing_panel
-from gcs_cli.tui.trends import trends_panel
 from gcs_cli.tui.watch_lines import state_line, text_line
+from gcs_cli.tui.widgets.drawing import Draw
 from gcs_cli.vehicle.view_types import Battery, Euler, Mission, StatusText, Vector, VehicleView
 from tests.support.view_panels import PANELS
 from tests.support.watch_states import BARE, FAILING, FULL, TIMING, flown_history

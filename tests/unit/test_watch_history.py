@@ -8,7 +8,7 @@ import pytest
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
-from gcs_cli.tui.history import ROWS_KEPT, History
+from gcs_cli.tui.fly.history import ROWS_KEPT, History
 from tests.support.telemetry_frames import attitude, received
 
 

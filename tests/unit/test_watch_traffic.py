@@ -7,12 +7,12 @@ import pytest
 from flightstack.core.contract import Vector3
 from flightstack.mavlink.dialect import mavlink
 from flightstack.plan import Plan
-from gcs_cli.tui.history import History
-from gcs_cli.tui.map_drawing import draw_map
-from gcs_cli.tui.map_model import MapModel
+from gcs_cli.tui.fly.history import History
+from gcs_cli.tui.map.drawing import draw_map
+from gcs_cli.tui.map.model import MapModel
+from gcs_cli.tui.map.traffic import KEPT_S, Aircraft, Traffic
+from gcs_cli.tui.map.viewport import Viewport
 from gcs_cli.tui.palette import DARK
-from gcs_cli.tui.traffic import KEPT_S, Aircraft, Traffic
-from gcs_cli.tui.viewport import Viewport
 from tests.support.map_views import FRAME, VIEW
 
 NOW_S = 100.0

@@ -9,6 +9,7 @@
 #include <stdint.h>
 
 #define MPS2_CLOCK_HZ 25000000UL
+#define MPS2_BAUD 115200UL
 
 #define MPS2_REGISTER(address) (*(volatile uint32_t *)(address))
 
@@ -45,6 +46,8 @@ void mps2_uart_init(void);
 int mps2_uart_take(void);             /* next octet received, or -1 */
 uint16_t mps2_uart_room(void);        /* octets that mps2_uart_give can take now */
 void mps2_uart_give(uint16_t octet);  /* queue an octet; only while there is room */
+uint16_t mps2_uart_can_set_baud(uint32_t baud);
+uint16_t mps2_uart_set_baud(uint32_t baud); /* 0, and nothing happens, while octets are being sent */
 uint32_t mps2_uart_overruns(void);    /* octets lost: by the hardware or because the ring was full */
 void mps2_uart_receive_interrupt(void);
 void mps2_uart_send_interrupt(void);
@@ -54,6 +57,7 @@ void mps2_time_init(void);        /* the timer */
 void mps2_tick_init(void);        /* SysTick's interrupt, every millisecond */
 uint32_t mps2_now_ms(void);       /* by SysTick's interrupt */
 uint32_t mps2_instructions(void); /* under QEMU's -icount shift=10 only */
+uint32_t mps2_microseconds(void); /* of the emulated clock, modulo 2^32 */
 uint32_t mps2_nanoseconds(void);  /* of the emulated clock, modulo 2^32 */
 void mps2_tick_interrupt(void);
 

@@ -109,6 +109,9 @@ static void serve_uart(void)
 {
     fs_octet octets[CHUNK];
 
+    port.baud = MPS2_BAUD;
+    port.can_set_baud = mps2_uart_can_set_baud;
+    port.set_baud = mps2_uart_set_baud;
     begin(mps2_nanoseconds, FS_COST_NANOSECONDS);
     mps2_tick_init();
     mps2_uart_init();
@@ -116,6 +119,7 @@ static void serve_uart(void)
         int octet = mps2_uart_take();
         uint16_t room, count, i;
 
+        fs_app_run(&app, mps2_microseconds());
         for (; octet >= 0; octet = mps2_uart_take()) {
             fs_app_receive(&app, (fs_octet)octet);
         }

@@ -2,6 +2,7 @@
 #include "mps2_board.h"
 
 #define NANOSECONDS_PER_TICK 40U /* 25 MHz */
+#define TICKS_PER_MICROSECOND 25U
 
 static volatile uint32_t milliseconds;
 static uint32_t last_ticks;
@@ -41,6 +42,11 @@ static uint64_t ticks(void)
     }
     last_ticks = now;
     return ((uint64_t)wraps << 32) | now;
+}
+
+uint32_t mps2_microseconds(void)
+{
+    return (uint32_t)(ticks() / TICKS_PER_MICROSECOND);
 }
 
 uint32_t mps2_nanoseconds(void)

@@ -3,6 +3,7 @@
 
 #define RING 1024U /* octets, a power of two */
 #define MASK (RING - 1U)
+#define LEAST_DIVIDER 16U
 
 typedef struct {
     volatile uint32_t written, read; /* free-running: their difference is what the ring holds */
@@ -12,9 +13,26 @@ typedef struct {
 static ring received, to_send;
 static volatile uint32_t overruns;
 
+uint16_t mps2_uart_can_set_baud(uint32_t baud)
+{
+    const uint32_t divider = MPS2_CLOCK_HZ / baud;
+
+    /* rounded down, the line runs too fast: by 2 % at most */
+    return (divider >= LEAST_DIVIDER && MPS2_CLOCK_HZ - divider * baud <= divider * baud / 50U) ? 1U : 0U;
+}
+
+uint16_t mps2_uart_set_baud(uint32_t baud)
+{
+    if (to_send.written != to_send.read || (MPS2_UART0_STATE & MPS2_UART_STATE_SENDING) != 0U) {
+        return 0U;
+    }
+    MPS2_UART0_DIVIDER = MPS2_CLOCK_HZ / baud;
+    return 1U;
+}
+
 void mps2_uart_init(void)
 {
-    MPS2_UART0_DIVIDER = MPS2_CLOCK_HZ / 115200U;
+    MPS2_UART0_DIVIDER = MPS2_CLOCK_HZ / MPS2_BAUD;
     MPS2_UART0_CONTROL =
         MPS2_UART_SEND | MPS2_UART_RECEIVE | MPS2_UART_SEND_INTERRUPT | MPS2_UART_RECEIVE_INTERRUPT;
     MPS2_NVIC_ENABLE = (1UL << MPS2_UART0_RECEIVE_IRQ) | (1UL << MPS2_UART0_SEND_IRQ);

@@ -32,6 +32,9 @@ static void describe_port(uint16_t was_watchdog)
     port.source_hash = source_hash;
     port.stack_size = F28_STACK_WORDS;
     port.stack_high_water = &f28_stack_high_water;
+    port.baud = F28_BAUD;
+    port.can_set_baud = &f28_serial_can_set_baud;
+    port.set_baud = &f28_serial_set_baud;
 }
 
 void f28_start(void)
@@ -47,8 +50,8 @@ void f28_start(void)
     f28_serial_init();
     f28_time_init();
     describe_port(was_watchdog);
-    fs_app_init(&app, &port);
     (void)Interrupt_enableGlobal();
+    fs_app_init(&app, &port); /* measures the clock as steps read it */
     f28_watchdog_start(f28_now_ms());
 }
 
@@ -58,6 +61,7 @@ void f28_pass(void)
     uint16_t n, count;
 
     f28_serial_service();
+    fs_app_run(&app, f28_now_us());
     count = f28_serial_take(octets, F28_CHUNK);
     for (n = 0U; n < count; n++) {
         fs_app_receive(&app, octets[n]);

@@ -4,19 +4,21 @@
 #include "device.h"
 
 #include "f28_board.h"
-#include "f28_ring.h"
+#include "fs_ring.h"
 #include "f28_time.h"
 
 #define FIFO_DEPTH 16U
 #define DAMAGED (SCI_RXBUF_SCIFFFE | SCI_RXBUF_SCIFFPE) /* what the FIFO keeps beside an octet */
 #define LASTING (SCI_RXSTATUS_FRAMING | SCI_RXSTATUS_PARITY | SCI_RXSTATUS_OVERRUN) /* up until a software reset */
-#define SILENCE_MS (2UL + 20000UL / F28_BAUD)           /* two octets at least, whatever the millisecond's phase */
 
 static volatile fs_octet receive_octets[F28_RECEIVE_RING], send_octets[F28_SEND_RING];
-static f28_ring received, to_send;
+static fs_ring received, to_send;
 static volatile uint32_t overruns, errors;
 static volatile uint16_t heard; /* 1: octets came since the main loop last looked */
 static uint16_t flags_seen;     /* the LASTING ones that were up when the main loop last looked */
+static uint32_t silence_ms;     /* two octets at least, whatever the millisecond's phase */
+static uint16_t has_left;       /* 1: nothing was left to send when the main loop last looked */
+static uint32_t left_ms;        /* since then */
 static uint32_t active_ms;      /* when the line was last seen busy, while one of them is up */
 
 /* Empty the receive FIFO into the ring; called by its interrupt, or with interrupts off. */
@@ -33,7 +35,7 @@ static void fetch(void)
         if ((word & DAMAGED) != 0U) {
             errors = errors + 1UL;
         }
-        if (f28_ring_put(&received, word & 0xFFU) == 0U) {
+        if (fs_ring_put(&received, word & 0xFFU) == 0U) {
             overruns = overruns + 1UL;
         }
     }
@@ -50,14 +52,14 @@ static void feed(void)
     uint16_t n;
 
     for (n = 0U; n < FIFO_DEPTH && SCI_getTxFIFOStatus(SCIA_BASE) != SCI_FIFO_TX16; n++) {
-        if (f28_ring_take(&to_send, &octet) == 0U) {
+        if (fs_ring_take(&to_send, &octet) == 0U) {
             break;
         }
         SCI_writeCharNonBlocking(SCIA_BASE, octet);
     }
     /* cleared after the FIFO was filled: the flag rises again when it runs low, whether by level or by edge */
     SCI_clearInterruptStatus(SCIA_BASE, SCI_INT_TXFF);
-    if (f28_ring_held(&to_send) == 0U) {
+    if (fs_ring_held(&to_send) == 0U) {
         SCI_disableInterrupt(SCIA_BASE, SCI_INT_TXFF);
     } else {
         SCI_enableInterrupt(SCIA_BASE, SCI_INT_TXFF);
@@ -66,15 +68,21 @@ static void feed(void)
 
 static __interrupt void on_received(void)
 {
+    const uint32_t began = f28_interrupt_begins();
+
     fetch();
     SCI_clearInterruptStatus(SCIA_BASE, SCI_INT_RXFF);
     Interrupt_clearACKGroup(INTERRUPT_ACK_GROUP9);
+    f28_interrupt_ends(began);
 }
 
 static __interrupt void on_sent(void)
 {
+    const uint32_t began = f28_interrupt_begins();
+
     feed();
     Interrupt_clearACKGroup(INTERRUPT_ACK_GROUP9);
+    f28_interrupt_ends(began);
 }
 
 static void init_pins(void)
@@ -89,18 +97,26 @@ static void init_pins(void)
     GPIO_setQualificationMode(DEVICE_GPIO_PIN_SCITXDA, GPIO_QUAL_ASYNC);
 }
 
+static void set_rate(uint32_t baud)
+{
+    SCI_setConfig(SCIA_BASE, F28_LSPCLK_HZ, baud, SCI_CONFIG_WLEN_8); /* one stop bit, no parity: both are 0 */
+    silence_ms = 2UL + 20000UL / baud;
+}
+
 void f28_serial_init(void)
 {
-    f28_ring_init(&received, receive_octets, F28_RECEIVE_RING);
-    f28_ring_init(&to_send, send_octets, F28_SEND_RING);
+    fs_ring_init(&received, receive_octets, F28_RECEIVE_RING);
+    fs_ring_init(&to_send, send_octets, F28_SEND_RING);
     overruns = 0UL;
     errors = 0UL;
     heard = 0U;
     flags_seen = 0U;
     active_ms = 0UL;
+    has_left = 0U;
+    left_ms = 0UL;
     init_pins();
     SCI_performSoftwareReset(SCIA_BASE);
-    SCI_setConfig(SCIA_BASE, F28_LSPCLK_HZ, F28_BAUD, SCI_CONFIG_WLEN_8); /* one stop bit, no parity: both are 0 */
+    set_rate(F28_BAUD);
     SCI_resetChannels(SCIA_BASE);
     SCI_resetRxFIFO(SCIA_BASE);
     SCI_resetTxFIFO(SCIA_BASE);
@@ -130,11 +146,11 @@ static uint16_t flags_may_be_lowered(uint16_t status, uint32_t now_ms)
     if (flags_seen == 0U) {
         return 0U;
     }
-    if (heard != 0U || f28_ring_held(&to_send) != 0U || SCI_getTxFIFOStatus(SCIA_BASE) != SCI_FIFO_TX0) {
+    if (heard != 0U || fs_ring_held(&to_send) != 0U || SCI_getTxFIFOStatus(SCIA_BASE) != SCI_FIFO_TX0) {
         heard = 0U;
         active_ms = now_ms;
     }
-    return (now_ms - active_ms >= SILENCE_MS) ? 1U : 0U;
+    return (now_ms - active_ms >= silence_ms) ? 1U : 0U;
 }
 
 /*
@@ -166,7 +182,7 @@ uint16_t f28_serial_take(fs_octet *out, uint16_t room)
 {
     uint16_t n = 0U;
 
-    while (n < room && f28_ring_take(&received, &out[n]) != 0U) {
+    while (n < room && fs_ring_take(&received, &out[n]) != 0U) {
         n++;
     }
     return n;
@@ -174,22 +190,61 @@ uint16_t f28_serial_take(fs_octet *out, uint16_t room)
 
 uint16_t f28_serial_room(void)
 {
-    return f28_ring_room(&to_send);
+    return fs_ring_room(&to_send);
 }
 
 uint16_t f28_serial_give(const fs_octet *octets, uint16_t count)
 {
     uint16_t n = 0U;
 
-    while (n < count && f28_ring_put(&to_send, octets[n]) != 0U) {
+    while (n < count && fs_ring_put(&to_send, octets[n]) != 0U) {
         n++;
     }
-    if (f28_ring_held(&to_send) != 0U) { /* also when nothing was given: an interrupt that was missed costs one pass */
+    if (fs_ring_held(&to_send) != 0U) { /* also when nothing was given: an interrupt that was missed costs one pass */
         (void)Interrupt_disableGlobal();
         feed();
         (void)Interrupt_enableGlobal();
     }
     return n;
+}
+
+uint16_t f28_serial_can_set_baud(uint32_t baud)
+{
+    const uint32_t eighths = F28_LSPCLK_HZ / 8UL / baud;
+
+    /* rounded down, the line runs too fast: by 2 % at most */
+    return (eighths >= 2UL && F28_LSPCLK_HZ / 8UL - eighths * baud <= eighths * baud / 50UL) ? 1U : 0U;
+}
+
+/* The FIFO is empty when its last octet goes into the shift register, so the time of two octets is waited for. */
+static uint16_t everything_left(void)
+{
+    const uint32_t now_ms = f28_now_ms();
+
+    if (f28_ring_held(&to_send) != 0U || SCI_getTxFIFOStatus(SCIA_BASE) != SCI_FIFO_TX0) {
+        has_left = 0U;
+        return 0U;
+    }
+    if (has_left == 0U) {
+        has_left = 1U;
+        left_ms = now_ms;
+    }
+    return (now_ms - left_ms >= silence_ms) ? 1U : 0U;
+}
+
+uint16_t f28_serial_set_baud(uint32_t baud)
+{
+    if (everything_left() == 0U) {
+        return 0U;
+    }
+    has_left = 0U;
+    (void)Interrupt_disableGlobal();
+    set_rate(baud);
+    SCI_resetRxFIFO(SCIA_BASE); /* what came meanwhile came at the former rate */
+    SCI_performSoftwareReset(SCIA_BASE);
+    flags_seen = 0U;
+    (void)Interrupt_enableGlobal();
+    return 1U;
 }
 
 uint32_t f28_serial_overruns(void)

@@ -27,6 +27,12 @@ uint16_t f28_serial_room(void);
 /* Queue octets to be sent; returns how many were taken, the first ones, which is all while there is room. */
 uint16_t f28_serial_give(const fs_octet *octets, uint16_t count);
 
+/* Return 1 if the SCI makes this rate within 2 %. */
+uint16_t f28_serial_can_set_baud(uint32_t baud);
+
+/* Change the rate; 0, and nothing happens, until the last octet has left. To be called until it returns 1. */
+uint16_t f28_serial_set_baud(uint32_t baud);
+
 /* Totals since the start, modulo 2^32. */
 uint32_t f28_serial_overruns(void); /* octets lost because the ring was full, and times when the hardware told a loss */
 uint32_t f28_serial_errors(void);   /* octets with a framing error (parity has none here), and breaks */

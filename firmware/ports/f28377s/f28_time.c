@@ -7,10 +7,33 @@
 
 static volatile uint32_t milliseconds;
 
+#define CYCLES_PER_US ((uint32_t)(F28_SYSCLK_HZ / 1000000UL))
+
+static uint32_t taken, microseconds; /* cycles that are counted as microseconds */
+static volatile uint32_t interrupted; /* cycles that interrupts took */
+
+static uint32_t count_up(void)
+{
+    return 0xFFFFFFFFUL - CPUTimer_getTimerCount(CPUTIMER1_BASE);
+}
+
+uint32_t f28_interrupt_begins(void)
+{
+    return count_up();
+}
+
+void f28_interrupt_ends(uint32_t began)
+{
+    interrupted = interrupted + (count_up() - began);
+}
+
 static __interrupt void on_millisecond(void)
 {
+    const uint32_t began = f28_interrupt_begins();
+
     milliseconds = milliseconds + 1UL;
     Interrupt_clearACKGroup(INTERRUPT_ACK_GROUP1);
+    f28_interrupt_ends(began);
 }
 
 /* Let a timer count down from `last` to 0, over and over, at SYSCLK. */
@@ -26,6 +49,8 @@ static void start(uint32_t base, uint32_t last)
 void f28_time_init(void)
 {
     milliseconds = 0UL;
+    interrupted = 0UL;
+    microseconds = 0UL;
     start(CPUTIMER0_BASE, F28_SYSCLK_HZ / 1000UL - 1UL);
     start(CPUTIMER1_BASE, 0xFFFFFFFFUL);
     Interrupt_register(INT_TIMER0, &on_millisecond);
@@ -33,6 +58,7 @@ void f28_time_init(void)
     Interrupt_enable(INT_TIMER0);
     CPUTimer_startTimer(CPUTIMER0_BASE);
     CPUTimer_startTimer(CPUTIMER1_BASE);
+    taken = count_up();
 }
 
 uint32_t f28_now_ms(void)
@@ -46,7 +72,23 @@ uint32_t f28_now_ms(void)
     return first;
 }
 
+/* Whole microseconds are taken off the counter, whose wrap is no whole number of them. */
+uint32_t f28_now_us(void)
+{
+    const uint32_t passed = (count_up() - taken) / CYCLES_PER_US;
+
+    taken += passed * CYCLES_PER_US;
+    microseconds += passed;
+    return microseconds;
+}
+
 uint32_t f28_cycles(void)
 {
-    return 0xFFFFFFFFUL - CPUTimer_getTimerCount(CPUTIMER1_BASE);
+    const bool was_off = Interrupt_disableGlobal(); /* both counts are of the same moment */
+    const uint32_t cycles = count_up() - interrupted;
+
+    if (!was_off) {
+        (void)Interrupt_enableGlobal();
+    }
+    return cycles;
 }

@@ -8,6 +8,7 @@
 const fs_port *fs_host_port(void);
 
 uint32_t fs_host_nanoseconds(void); /* modulo 2^32 */
+uint32_t fs_host_microseconds(void);
 uint32_t fs_host_milliseconds(void);
 
 /* An application, on the host's port when port is NULL; NULL when there is no memory. The port must outlive it. */

@@ -6,7 +6,7 @@
  *
  * Exits 0 when the other end has closed, 1 when the system refuses something, 2 for a wrong argument.
  */
-#define _XOPEN_SOURCE 700
+#define _GNU_SOURCE /* ppoll */
 
 #include <errno.h>
 #include <fcntl.h>
@@ -16,6 +16,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <termios.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "fs_host.h"
@@ -121,13 +122,28 @@ static int receive_octets(line *ends, fs_app *app)
     return (count > 0) ? 0 : -1;
 }
 
+/* Return for how long nothing is due. */
+static struct timespec time_left(const fs_app *app)
+{
+    const uint32_t wait_ms = fs_app_wait_ms(app), run_us = fs_app_run_wait_us(app);
+    struct timespec wait = {.tv_sec = (time_t)(wait_ms / 1000U), .tv_nsec = (long)(wait_ms % 1000U) * 1000000L};
+
+    if (run_us / 1000U < wait_ms) {
+        wait.tv_sec = (time_t)(run_us / 1000000U);
+        wait.tv_nsec = (long)(run_us % 1000000U) * 1000L;
+    }
+    return wait;
+}
+
 /* Serve the line until its other end, or whoever started this process, is gone. */
 static int serve(line *ends, fs_app *app)
 {
     static pending waiting;
     const uint32_t began_ms = fs_host_milliseconds();
+    struct timespec wait;
     int is_open = 1;
 
+    fs_app_poll(app, 0U);
     while (is_open) {
         struct pollfd watched[3] = {
             {.fd = ends->in, .events = POLLIN},
@@ -135,14 +151,17 @@ static int serve(line *ends, fs_app *app)
             {.fd = ends->parent, .events = 0}, /* only its end is of interest */
         };
 
-        fs_app_poll(app, fs_host_milliseconds() - began_ms);
+        fs_app_run(app, fs_host_microseconds());
         if (send_octets(ends, app, &waiting) != 0) {
             break;
         }
         watched[1].fd = (waiting.first != waiting.end) ? ends->out : -1;
-        if (poll(watched, 3, (int)fs_app_wait_ms(app)) < 0 && errno != EINTR) {
+        wait = time_left(app);
+        if (ppoll(watched, 3, &wait, NULL) < 0 && errno != EINTR) {
             return fail("poll");
         }
+        fs_app_run(app, fs_host_microseconds()); /* before the octets: their time is now */
+        fs_app_poll(app, fs_host_milliseconds() - began_ms); /* what is received now came after the wait */
         if ((watched[0].revents & (POLLIN | POLLHUP | POLLERR)) != 0) {
             is_open = (receive_octets(ends, app) == 0);
         }

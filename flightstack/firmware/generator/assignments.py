@@ -20,6 +20,7 @@ from flightstack.firmware.generator.types import (
     Record,
     Several,
     c_type,
+    has_arrays,
     is_record,
 )
 from flightstack.firmware.generator.values import PRODUCT, SUM, Form, Value, as_real
@@ -159,13 +160,14 @@ class Assignments:
         """Assign a value to a name or to an item of an array."""
         if isinstance(target, ast.Subscript):
             place = self.expressions.value(target)
-            if place.type is not REAL:
+            if place.type not in (REAL, INT):
                 raise self.function.refusal(target, "array value")
             self.writer.write_to(target, place)
-            self.writer.store(
-                f"{place.text} = ",
-                as_real(value) if value.type in (INT, WHOLE) else self._real(target, value),
-            )
+            if place.type is REAL and value.type in (INT, WHOLE):
+                value = as_real(value)
+            if value.type is not place.type:
+                raise self.function.refusal(target, "values of different types")
+            self.writer.store(f"{place.text} = ", value)
             return
         if not isinstance(target, ast.Name):
             raise self.function.refusal(target, "assignment to an attribute")
@@ -175,21 +177,21 @@ class Assignments:
             self._alias_array(target, value)
             return
         variable, is_new = self.writer.declare(target, target.id, value.type)
-        self._store(variable, is_new, value)
+        self._store(target, variable, is_new, value)
 
-    def _real(self, node: ast.AST, value: Value) -> Value:
-        if value.type is not REAL:
-            raise self.function.refusal(node, "values of different types")
-        return value
-
-    def _store(self, variable: Variable, is_new: bool, value: Value) -> None:
+    def _store(self, node: ast.AST, variable: Variable, is_new: bool, value: Value) -> None:
         writer, kind = self.writer, c_type(variable.type)
         is_part = value.form in (Form.VALUE, Form.POINTER) and isinstance(value.type, Record)
         if is_new and is_part and variable.is_stable and writer.is_stable(value.root):
             variable.form, variable.root = Form.POINTER, value.root
             pointer = value.text if value.form is Form.POINTER else f"&{value.text}"
-            writer.line(f"const {kind} *{variable.name} = {pointer};")
+            if has_arrays(value.type):
+                writer.pointer(f"{kind} *{variable.name}", pointer, value.root)
+            else:
+                writer.line(f"const {kind} *{variable.name} = {pointer};")
             return
+        if has_arrays(value.type):
+            raise self.function.refusal(node, "array value", "copy of a NamedTuple with arrays")
         head = f"{'const ' if variable.is_stable else ''}{kind} " if is_new else ""
         writer.store(f"{head}{variable.name} = ", value)
 
@@ -197,11 +199,11 @@ class Assignments:
         """Give an array, or a row of one, a second name."""
         if len(self.writer.usage.stores[target.id]) > 1 or target.id in self.writer.variables:
             raise self.function.refusal(target, "array value", f"array {target.id} assigned twice")
-        root = self.writer.variables.get(value.root)
-        is_row = root is not None and isinstance(root.type, Array) and len(root.type.shape) > 1
         text = value.text
-        if is_row and isinstance(value.type, Array) and len(value.type.shape) == 1:
-            self.writer.line(f"fs_real *{identifier(target.id)} = {text};")
+        if text.endswith("]"):  # a row: its index may change
+            if not isinstance(value.type, Array) or len(value.type.shape) > 1:
+                raise self.function.refusal(target, "array value", f"part {target.id} of an array")
+            self.writer.pointer(f"{c_type(value.type)} *{identifier(target.id)}", text, value.root)
             text = identifier(target.id)
         self.writer.variables[target.id] = Variable(text, value.type, root=value.root, is_stable=True)
         self.writer.assigned.add(target.id)
@@ -218,10 +220,12 @@ class Assignments:
         if isinstance(target, ast.Name):
             variable, is_new = self.writer.declare(target, target.id, made.type)
             if is_new:
-                self._store(variable, is_new, made)
+                self._store(target, variable, is_new, made)
                 return False
         else:
             self.writer.write_to(target, old)
+            if made.type is not old.type:
+                raise self.function.refusal(target, "values of different types")
         place = variable.name if isinstance(target, ast.Name) else old.text
         number = value if made.type is INT else as_real(value)
         is_product = made.type is WHOLE and known[0] == "*"  # which has a sum behind it

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flightstack.core.contract import MAX_ROTORS
+from flightstack.core.contract import MAX_ROTORS, FloatArray
 from flightstack.firmware.generator.law import Function
 from flightstack.firmware.generator.types import (
     BOOL,
@@ -24,6 +24,8 @@ from flightstack.firmware.generator.types import (
     has_rotors,
 )
 
+ROTOR_COUNT = 4
+"""Rotors of random arrays."""
 EDGES = [0.0, -0.0, math.nan, math.inf, -math.inf, 5e-324, -1e-310, 1e308, -1e308, 1e-30, 1.0, -1.0]
 
 
@@ -38,7 +40,7 @@ class Difference(NamedTuple):
 def _layout(kind: Type) -> Any:
     """Return the ctypes type of a value in a library of double."""
     if isinstance(kind, Array):
-        made: Any = ctypes.c_double
+        made: Any = ctypes.c_int32 if kind.item is INT else ctypes.c_double
         for size in reversed(kind.shape):
             made = made * (MAX_ROTORS if size == ROTORS else int(size))
         return made
@@ -54,7 +56,7 @@ def _fill(kind: Type, place: Any, value: Any) -> None:
     if isinstance(kind, Array):
         for at, item in enumerate(value):
             if len(kind.shape) > 1:
-                _fill(Array(kind.shape[1:]), place[at], item)
+                _fill(Array(kind.shape[1:], kind.item), place[at], item)
             else:
                 place[at] = item
         return
@@ -66,11 +68,22 @@ def _fill(kind: Type, place: Any, value: Any) -> None:
             setattr(place, f"_{name}", item)
 
 
+def _read_back(kind: Type, place: Any, value: Any) -> None:
+    """Write C's arrays to Python's."""
+    if isinstance(kind, Array):
+        value[...] = np.ctypeslib.as_array(place)[tuple(slice(0, size) for size in value.shape)]
+    if isinstance(kind, Record):
+        for (name, inner), item in zip(kind.fields.items(), value, strict=True):
+            _read_back(inner, getattr(place, f"_{name}"), item)
+
+
 def _flat(kind: Type, value: Any) -> list[float]:
     """Return the numbers of a C value."""
     if isinstance(kind, Record):
         fields = kind.fields.items()
         return [number for name, inner in fields for number in _flat(inner, getattr(value, f"_{name}"))]
+    if isinstance(kind, Array):
+        return [float(number) for number in np.ctypeslib.as_array(value).ravel()]
     return [float(getattr(value, "value", value))]
 
 
@@ -85,7 +98,7 @@ class CFunction:
         result = function.result
         self._call.restype = None if isinstance(result, Several) else _layout(result)
 
-    def __call__(self, *values: Any, rotors: int = 0) -> list[float]:
+    def __call__(self, *values: Any, rotors: int = ROTOR_COUNT) -> list[float]:
         """Return the numbers of the results; arrays are written in place."""
         arguments: list[Any] = []
         held = []
@@ -103,8 +116,7 @@ class CFunction:
         outputs = [(kind, layout()) for kind, layout in self._outputs]
         returned = self._call(*arguments, *(ctypes.byref(place) for _, place in outputs))
         for kind, place, value in held:
-            if isinstance(kind, Array):
-                value[...] = np.ctypeslib.as_array(place)[tuple(slice(0, size) for size in value.shape)]
+            _read_back(kind, place, value)
         if outputs:
             return [number for kind, place in outputs for number in _flat(kind, place)]
         return [] if returned is None else _flat(self.function.result, returned)
@@ -122,8 +134,8 @@ class Vectors:
         if isinstance(kind, Record):
             return kind.kind(*(self.value(inner) for inner in kind.fields.values()))
         if isinstance(kind, Array):
-            sizes = [int(size) for size in kind.shape]
-            return np.array([self.value(REAL) for _ in range(math.prod(sizes))]).reshape(sizes)
+            sizes = [ROTOR_COUNT if size == ROTORS else int(size) for size in kind.shape]
+            return np.array([self.value(kind.item) for _ in range(math.prod(sizes))]).reshape(sizes)
         if kind is INT:
             return int(self._random.integers(-3, 4))
         if kind is BOOL:
@@ -141,7 +153,30 @@ def flattened(value: Any) -> list[float]:
     """Return the numbers of nested tuples."""
     if isinstance(value, tuple):
         return [number for item in value for number in flattened(item)]
+    if isinstance(value, np.ndarray):
+        return [float(number) for number in value.ravel()]
     return [] if value is None else [float(value)]
+
+
+def _outcome(function: Callable[..., Any], values: Sequence[Any]) -> FloatArray:
+    """Return the numbers of the results, and of the arrays that were given, after a call with copies of them."""
+    given = [_copied(value) for value in values]
+    result = function(*given)
+    numbers = result if isinstance(result, list) else flattened(result)
+    arrays = [array.ravel() for value in given for array in _arrays(value)]
+    return np.concatenate([np.array(numbers, dtype=np.float64), *arrays])
+
+
+def _copied(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return type(value)(*(_copied(item) for item in value))
+    return value.copy() if isinstance(value, np.ndarray) else value
+
+
+def _arrays(value: Any) -> list[FloatArray]:
+    if isinstance(value, tuple):
+        return [array for item in value for array in _arrays(item)]
+    return [value] if isinstance(value, np.ndarray) else []
 
 
 def differences(
@@ -151,7 +186,7 @@ def differences(
     found = []
     with np.errstate(all="ignore"):
         for values in vectors:
-            wanted, made = np.array(flattened(python(*values))), np.array(c(*values))
+            wanted, made = _outcome(python, values), _outcome(c, values)
             equal = (wanted.view(np.int64) == made.view(np.int64)) | (np.isnan(wanted) & np.isnan(made))
             if not equal.all():
                 found.append(Difference(values, wanted.tolist(), made.tolist()))

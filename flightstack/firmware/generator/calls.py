@@ -96,12 +96,25 @@ class Calls:
                 held = value if value.form in (Form.VALUE, Form.POINTER) else self.writer.hoist(value, name)
                 texts.append(address(held))
             else:
-                texts.append(value.text)
+                texts.append(_array_argument(kind, value, name in callee.written))
             if name in callee.written:
                 self.writer.write_to(node, value)
+            if name in callee.bounds:
+                self._check_bound(node, name, value)
         if callee.needs_rotors:
             texts.append(self.writer.rotors())
         return texts
+
+    def _check_bound(self, node: ast.Call, name: str, value: Value) -> None:
+        """Accept a constant, a loop's variable, or a parameter that bounds a loop too."""
+        if value.literal is not None or value.is_constant:
+            return
+        if value.text in self.writer.loops:
+            return
+        if self.writer.is_whole_parameter(value.text):
+            self.function.bounds.add(value.text)
+            return
+        raise self.function.refusal(node, "loop bound", f"loop bound {name} of {ast.unparse(node.func)}")
 
     def bound(
         self,
@@ -157,7 +170,8 @@ class Calls:
         if kind is REAL and value.type in (INT, WHOLE):
             raise self.function.refusal(node, "integer for a float")
         if isinstance(kind, Array) and isinstance(value.type, Array):
-            if kind.shape != value.type.shape and ("",) not in (kind.shape, value.type.shape):
+            is_known = ("",) not in (kind.shape, value.type.shape)
+            if kind.item is not value.type.item or (is_known and kind.shape != value.type.shape):
                 raise self.function.refusal(node, "values of different types", "array of another shape")
             return value
         if value.type != kind:
@@ -219,6 +233,14 @@ class Calls:
         raise self.function.refusal(node, "function call", f"call of {ast.unparse(node.func)}")
 
 
+def _array_argument(kind: Type, value: Value, is_written: bool) -> str:
+    """Return an argument; C converts no pointer to rows to one of constant rows by itself."""
+    if is_written or not isinstance(kind, Array) or len(kind.shape) == 1:
+        return value.text
+    sizes = "".join(f"[{c_size(size)}]" for size in kind.shape[1:])
+    return f"(const {c_type(kind)}(*){sizes}){value.within(UNARY)}"
+
+
 def _is_literal(node: ast.expr | None) -> bool:
     """Return True for a number in the source, with or without a sign."""
     if isinstance(node, ast.UnaryOp):
@@ -231,12 +253,12 @@ def c_prototype(function: Function, is_inline: bool = False) -> str:
     parts = []
     for parameter in function.parameters:
         name, kind = identifier(parameter.name), parameter.type
+        const = "" if parameter.name in function.written else "const "
         if isinstance(kind, Record):
-            parts.append(f"const {c_type(kind)} *{name}")
+            parts.append(f"{const}{c_type(kind)} *{name}")
         elif isinstance(kind, Array):
             sizes = "".join(f"[{c_size(size)}]" for size in kind.shape)
-            is_const = parameter.name not in function.written and len(kind.shape) == 1
-            parts.append(f"{'const ' if is_const else ''}fs_real {name}{sizes}")
+            parts.append(f"{const}{c_type(kind)} {name}{sizes}")
         else:
             parts.append(f"{c_type(kind)} {name}")
     if function.needs_rotors:

@@ -1,4 +1,4 @@
-"""Generated files of the firmware's core: types, numbers, parameter table, laws, and the table of attitude laws."""
+"""Generated files of the firmware's core: types, numbers, parameter table, laws, and the tables of laws by role."""
 
 from __future__ import annotations
 
@@ -6,19 +6,20 @@ from collections.abc import Sequence
 from typing import Any
 
 from flightstack.control import mixer
-from flightstack.control.attitude_controller import AttitudeController, AttitudeInputs
+from flightstack.control.attitude_controller import AttitudeInputs
 from flightstack.control.attitude_reference import (
     ReferenceMemory,
     ReferenceParams,
     attitude_reference_step,
     in_body_frame,
 )
-from flightstack.control.position_pid import PositionMemory, PositionParams, position_pid_step
+from flightstack.control.control_law import ControlLaw, CStep
+from flightstack.control.controller import BUILT_IN
 from flightstack.core import contract, geometry
-from flightstack.firmware.generator.text import fold, identifier, indented
+from flightstack.firmware.generator.law_tables import TABLES, controllers_header, controllers_source
 from flightstack.firmware.generator.types import REAL, Record, record_name
 from flightstack.firmware.generator.unit import Program, structure
-from flightstack.firmware.numbers import TargetNumber, declared, default_numbers, law_name
+from flightstack.firmware.numbers import Laws, TargetNumber, declared, default_numbers, law_name
 
 NOTICE = "/* Generated from Python by flightstack.firmware.generator: do not edit. */\n"
 DIGITS = 12
@@ -33,12 +34,10 @@ CONTRACT_TYPES = (
     contract.Wrench,
     AttitudeInputs,
 )
-LOOP_TYPES = (PositionMemory, PositionParams, ReferenceMemory, ReferenceParams)
-LAWS: tuple[Any, ...] = (
-    position_pid_step,
+LOOP_TYPES = (ReferenceMemory, ReferenceParams)
+FUNCTIONS: tuple[Any, ...] = (
     attitude_reference_step,
     in_body_frame,
-    mixer.mix,
     mixer.relative_rotor_speed,
     geometry.blend,
     geometry.conjugate,
@@ -49,7 +48,10 @@ LAWS: tuple[Any, ...] = (
 INLINE = (geometry.__name__,)
 """Modules of short functions, which stand in a header so that they cost no call."""
 SETUP = {
-    "controller": "index of the attitude law: one of FS_CONTROLLER_*",
+    "guidance": "indices of the laws",
+    "position": "",
+    "controller": "of the attitude law: one of FS_CONTROLLER_*",
+    "mixing": "",
     "rotors": "4 to FS_MAX_ROTORS",
     "inner_hz": "rate of the inner loop",
     "outer_divisor": "the outer loop runs in every so many inner ticks",
@@ -58,26 +60,25 @@ SETUP = {
     "iy_kg_m2": "",
     "iz_kg_m2": "",
 }
-_STEP = (
-    "(const fs_controller_memory *memory, const fs_attitude_inputs *inputs, const fs_controller_params *params, "
-    "fs_real dt_s, fs_controller_memory *memory_out, fs_vector3 *torque_out)"
-)
 
 
-def core_files(controllers: Sequence[AttitudeController]) -> dict[str, str]:
+def core_files(laws: Laws) -> dict[str, str]:
     """Return the text of every generated file of ``core`` by name; raise OutsideSubsetError, ConfigError."""
-    for controller in controllers:
-        check_floats(controller)
-    numbers = declared(controllers)
+    for law in every(laws):
+        check_floats(law)
+    numbers = declared(laws)
     check_names(numbers)
-    program = law_program(controllers)
+    program = law_program(laws)
     texts = {
         "fs_types.h": types(),
-        "fs_numbers.h": numbers_header(controllers, len(numbers)),
-        "fs_param_table.c": table(numbers, default_numbers(controllers)),
+        "fs_numbers.h": numbers_header(laws, len(numbers)),
+        "fs_param_table.c": table(numbers, default_numbers(laws)),
         "fs_controllers.h": controllers_header(),
-        "fs_controllers.c": controllers_source(controllers, program),
+        "fs_controllers.c": controllers_source(laws, program),
     }
+    for law in every(laws):
+        if isinstance(law.step, CStep):
+            texts |= hand_written(law, law.step)
     for unit in program.written():
         if unit.module in INLINE:
             texts[f"{unit.name}.h"] = unit.inline()
@@ -86,17 +87,47 @@ def core_files(controllers: Sequence[AttitudeController]) -> dict[str, str]:
     return texts
 
 
-def law_program(controllers: Sequence[AttitudeController]) -> Program:
-    """Translate the laws of the loops and the steps of the controllers; raise OutsideSubsetError."""
-    program = Program(types=dict.fromkeys(_law_types(controllers), "fs_numbers"))
-    for law in (*LAWS, *(controller.step for controller in controllers)):
-        program.add(law)
+def every(laws: Laws) -> list[ControlLaw]:
+    """Return the laws of all roles."""
+    return [law for of_role in laws.values() for law in of_role]
+
+
+def law_program(laws: Laws = BUILT_IN) -> Program:
+    """Translate the functions of the loops and the steps of the laws; raise OutsideSubsetError, ValueError."""
+    program = Program(types=dict.fromkeys(_law_types(laws), "fs_numbers"))
+    steps = [law.step for law in every(laws) if not isinstance(law.step, CStep)]
+    for function in (*FUNCTIONS, *steps):
+        program.add(function)
     return program
 
 
-def _law_types(controllers: Sequence[AttitudeController]) -> list[type]:
-    kinds = [kind for controller in controllers for kind in (controller.memory_type, controller.params_type)]
-    return list(dict.fromkeys([*LOOP_TYPES, *kinds]))
+def hand_written(law: ControlLaw, step: CStep) -> dict[str, str]:
+    """Return the files of a law in C by name, and the header with its parameters; raise ValueError."""
+    name = f"{law_name(law)}_params"
+    texts = {f"{name}.h": header(f"{name.upper()}_H", '"fs_types.h"', _structures([law.params_type]))}
+    for path in (step.header, *step.sources):
+        try:
+            texts[path.name] = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise ValueError(f"{path} cannot be read: {error}") from None
+        if path.name.startswith("fs_"):
+            raise ValueError(f"{path.name} needs another name: those with fs_ belong to the firmware")
+    return texts
+
+
+def _structures(kinds: Sequence[type]) -> str:
+    return "\n".join("\n".join([*structure(kind), ""]) for kind in kinds)
+
+
+def _law_types(laws: Laws) -> list[type]:
+    generated = [law for law in every(laws) if not isinstance(law.step, CStep)]
+    kinds = [kind for law in generated for kind in (law.memory_type, law.params_type)]
+    different = list(dict.fromkeys([*LOOP_TYPES, *kinds]))
+    names = [record_name(kind) for kind in different]
+    double = next((name for name in names if names.count(name) > 1), None)
+    if double is not None:
+        raise ValueError(f"two NamedTuples have the name {double} in C: rename one")
+    return different
 
 
 def header(guard: str, include: str, body: str) -> str:
@@ -117,18 +148,19 @@ def types() -> str:
     return header("FS_TYPES_H", '"fs_real.h"', "\n".join(parts))
 
 
-def numbers_header(controllers: Sequence[AttitudeController], count: int) -> str:
+def numbers_header(laws: Laws, count: int) -> str:
     """Return fs_numbers.h: parameters and memories of the laws, the setup, and the size of the table."""
-    names = [law_name(controller) for controller in controllers]
     parts = [f"#define FS_PARAM_COUNT {count}U\n"]
-    parts += [f"#define FS_CONTROLLER_{name.upper()} {index}U" for index, name in enumerate(names)]
-    parts += [f"#define FS_CONTROLLERS {len(names)}U\n"]
-    parts += ["\n".join([*structure(kind), ""]) for kind in _law_types(controllers)]
-    for what in ("params", "memory"):
-        kinds = [record_name(getattr(controller, f"{what}_type")) for controller in controllers]
-        fields = [f"    {kind} {name};" for kind, name in zip(kinds, names, strict=True)]
-        parts += [f"/* {what.capitalize()} of every attitude law. */", "typedef struct {", *fields]
-        parts += [f"}} fs_controller_{what};\n"]
+    for role, role_table in TABLES.items():
+        stem = role_table.stem.upper()
+        parts += [f"#define {stem}_{law_name(law).upper()} {index}U" for index, law in enumerate(laws[role])]
+        parts += [f"#define {stem}S {len(laws[role])}U\n"]
+    parts += ["\n".join([*structure(kind), ""]) for kind in _law_types(laws)]
+    for role, role_table in TABLES.items():
+        for what in ("params", "memory"):
+            fields = [f"    {_record_of(law, what)} {law_name(law)};" for law in laws[role]]
+            parts += [f"/* {what.capitalize()} of every law of {role}. */", "typedef struct {", *fields]
+            parts += [f"}} {role_table.stem}_{what};\n"]
     fields = [f"    fs_real {name};{f' /* {text} */' if text else ''}" for name, text in SETUP.items()]
     parts += [
         "/* What several structures are made of, as it was set. */",
@@ -136,70 +168,16 @@ def numbers_header(controllers: Sequence[AttitudeController], count: int) -> str
         *fields,
         "} fs_setup;\n",
     ]
-    return header("FS_NUMBERS_H", '"fs_types.h"', "\n".join(parts))
+    headers = [law.step.header.name for law in every(laws) if isinstance(law.step, CStep)]
+    includes = "\n#include ".join(f'"{name}"' for name in ("fs_types.h", *headers))
+    return header("FS_NUMBERS_H", includes, "\n".join(parts))
 
 
-# ------------------------------------------------------------------ attitude laws by index
-
-
-def controllers_header() -> str:
-    """Return fs_controllers.h."""
-    body = [
-        "/* Set the memories of all attitude laws to their initial values. */",
-        "void fs_controllers_reset(fs_controller_memory *memory);\n",
-        "/*",
-        " * Run the attitude law of this index, one of FS_CONTROLLER_*: torque [N m, FRD] and the next memory.",
-        " * Return 0 if the next memory is not finite.",
-        " */",
-        *fold(f"uint16_t fs_controllers_step{_STEP.replace('(', '(uint16_t controller, ', 1)};"),
-        "",
-    ]
-    return header("FS_CONTROLLERS_H", '"fs_numbers.h"', "\n".join(body))
-
-
-def controllers_source(controllers: Sequence[AttitudeController], program: Program) -> str:
-    """Return fs_controllers.c: a table of the attitude laws."""
-    headers = {f"{program.header_of(program.add(controller.step))}.h" for controller in controllers}
-    parts = [NOTICE.strip(), '#include "fs_controllers.h"', ""]
-    parts += [*(f'#include "{name}"' for name in sorted({*headers, "fs_math.h"})), ""]
-    resets = [line for controller in controllers for line in _reset_lines(controller)]
-    parts += ["void fs_controllers_reset(fs_controller_memory *memory)", "{", *indented(resets), "}", ""]
-    for controller in controllers:
-        parts += _law(controller, program.add(controller.step).c_name)
-    names = ", ".join(f"run_{law_name(controller)}" for controller in controllers)
-    calls = "laws[controller](memory, inputs, params, dt_s, memory_out, torque_out)"
-    parts += [
-        *fold(f"typedef uint16_t (*fs_law){_STEP};"),
-        "",
-        f"static const fs_law laws[FS_CONTROLLERS] = {{{names}}};",
-        "",
-        *fold(f"uint16_t fs_controllers_step{_STEP.replace('(', '(uint16_t controller, ', 1)}"),
-        "{",
-        "    *memory_out = *memory;",
-        f"    return {calls};",
-        "}",
-        "",
-    ]
-    return "\n".join(parts)
-
-
-def _reset_lines(controller: AttitudeController) -> list[str]:
-    fields, values = controller.memory_type._fields, controller.initial_memory  # type: ignore[attr-defined]
-    name = law_name(controller)
-    return [
-        f"memory->{name}.{identifier(field)} = {literal(value)};"
-        for field, value in zip(fields, values, strict=True)
-    ]
-
-
-def _law(controller: AttitudeController, step: str) -> list[str]:
-    """Return the entry of a law in the table: its step, and whether its memory is finite."""
-    name, fields = law_name(controller), controller.memory_type._fields  # type: ignore[attr-defined]
-    call = f"{step}(&memory->{name}, inputs, &params->{name}, dt_s, &memory_out->{name}, torque_out);"
-    finite = [f"fs_is_finite(memory_out->{name}.{identifier(field)})" for field in fields]
-    result = finite[0] if len(finite) == 1 else f"(uint16_t)({' & '.join(finite)})"
-    lines = [*fold(call, "    "), *fold(f"return {result};", "    ")]
-    return [*fold(f"static uint16_t run_{name}{_STEP}"), "{", *lines, "}", ""]
+def _record_of(law: ControlLaw, what: str) -> str:
+    """Return the C type of a law's params or memory."""
+    if what == "memory" and isinstance(law.step, CStep):
+        return law.step.memory
+    return record_name(law.params_type if what == "params" else law.memory_type)
 
 
 # ------------------------------------------------------------------ parameter table
@@ -251,10 +229,25 @@ def table(numbers: Sequence[TargetNumber], defaults: dict[str, float]) -> str:
                 "fs_real fs_param_value(const fs_loops *loops, uint16_t index)", places, "", literal(0.0)
             ),
             "",
+            *_consistency(numbers),
+            "",
             _switch("fs_real *fs_param_integral(fs_loops *loops, uint16_t index)", integrals, "&", "NULL"),
             "",
         ]
     )
+
+
+def _consistency(numbers: Sequence[TargetNumber]) -> list[str]:
+    """Return a function that compares the numbers of each pair."""
+    places = {number.name: number.place for number in numbers}
+    pairs = [(places[number.at_least], number.place) for number in numbers if number.at_least]
+    tests = " && ".join(f"loops->{least} <= loops->{largest}" for least, largest in pairs)
+    return [
+        "uint16_t fs_param_is_consistent(const fs_loops *loops)",
+        "{",
+        f"    return ({tests}) ? 1U : 0U;",
+        "}",
+    ]
 
 
 def _switch(signature: str, places: dict[int, str], prefix: str, otherwise: str) -> str:
@@ -265,9 +258,9 @@ def _switch(signature: str, places: dict[int, str], prefix: str, otherwise: str)
     )
 
 
-def check_floats(controller: AttitudeController) -> None:
-    """Raise ValueError if memory or parameters of a controller have other fields than floats."""
-    for kind in (controller.memory_type, controller.params_type):
+def check_floats(law: ControlLaw) -> None:
+    """Raise ValueError if memory or parameters of a law have other fields than floats."""
+    for kind in (law.memory_type, law.params_type):
         for field, inner in Record(kind).fields.items():
             if inner is not REAL:
                 raise ValueError(f"field {field} of {kind.__name__} is no float")

@@ -22,6 +22,7 @@ from flightstack.firmware.generator.types import (
     Array,
     Record,
     c_type,
+    has_arrays,
 )
 from flightstack.firmware.generator.values import (
     AND,
@@ -143,7 +144,7 @@ class Expressions:
             return bool_literal(value)
         if isinstance(value, int | float):
             literal = self.literal(node, value)
-            return Value(literal.type, self.writer.unit.constant(name, literal.text), literal=None)
+            return Value(literal.type, self.writer.unit.constant(name, literal.text), is_constant=True)
         shape = array_shape(value)
         if shape is not None:
             return Value(Array(shape), self.writer.unit.table(name, value, shape))
@@ -202,7 +203,7 @@ class Expressions:
             if isinstance(place.literal, int) and place.literal < 0:
                 raise self.function.refusal(node, "index", "negative index")
             text, _ = f"{text}[{place.text}]", left.pop(0)
-        return Value(Array(tuple(left)) if left else REAL, text, root=array.root)
+        return Value(Array(tuple(left), kind.item) if left else kind.item, text, root=array.root)
 
     # ------------------------------------------------------------------ operators
 
@@ -240,7 +241,8 @@ class Expressions:
         text = f"{left.within(rank)} {sign} {right.within(rank + 1)}"
         if left.type is WHOLE and sign == "*":  # an integer has no negative zero
             return Value(WHOLE, f"{text} + FS_LIT(0.0)", SUM)
-        return Value(left.type, text, rank)
+        is_constant = all(value.is_constant or value.literal is not None for value in (left, right))
+        return Value(left.type, text, rank, is_constant=is_constant)
 
     def _boolop(self, node: ast.BoolOp) -> Value:
         is_and = isinstance(node.op, ast.And)
@@ -289,7 +291,9 @@ class Expressions:
         if yes.type != no.type and {yes.type, no.type} <= NUMBERS:
             change = as_real if REAL in (yes.type, no.type) else as_whole
             yes, no = change(yes), change(no)
-        if yes.type != no.type or yes.type is NOTHING or isinstance(yes.type, Array):
+        if has_arrays(yes.type) or isinstance(yes.type, Array):
+            raise self.function.refusal(node, "array value", "choice between arrays")
+        if yes.type != no.type or yes.type is NOTHING:
             raise self.function.refusal(node, "values of different types")
         if isinstance(yes.type, Record) or yes_lines or no_lines:
             return self.writer.choice(test, (yes_lines, yes), (no_lines, no))
@@ -306,6 +310,8 @@ class Expressions:
             fields = record.fields
         except TypeError as error:
             raise self.function.refusal(node, "annotation", str(error)) from None
+        if has_arrays(record):
+            raise self.function.refusal(node, "array value", "NamedTuple made of arrays")
         values = self.calls.bound(node, list(fields.items()), {})
         return Value(record, c_type(record), ATOM, Form.FIELDS, tuple(values))
 

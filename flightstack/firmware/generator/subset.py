@@ -17,7 +17,7 @@ class OutsideSubsetError(Exception):
 ADVICE: dict[str, str] = {
     "while loop": "use `for i in range(N)` with a constant N, and `break`",
     "for loop over values": "use `for i in range(N)` and an index",
-    "loop bound": "use a constant, the size of an array, or another loop's variable",
+    "loop bound": "use a constant, the size of an array, another loop's variable, or an integer parameter",
     "loop variable": "copy it to another variable inside the loop",
     "else of a loop": "set a flag in the loop and test it afterwards",
     "try statement": "test the value with `math.isfinite` or a comparison",
@@ -57,7 +57,7 @@ ADVICE: dict[str, str] = {
     "variable without a value": "assign it before the `if` or the loop",
     "annotation": "annotate it: float, int, bool, a NamedTuple, tuple[…] or Annotated[FloatArray, N]",
     "array of unknown shape": "annotate it: `Annotated[FloatArray, N]` with the constant size",
-    "array value": "use its items: `a[i]`",
+    "array value": "use its items, `a[i]`, and write to arrays in place",
     "name": "define it as a constant of the module, or as a @compiled function",
     "libm function": "use flightstack.core.portable_math, whose bits are the same on every processor",
     "function call": "call functions marked @compiled, NamedTuples, min, max, abs, float, int, and functions of math",

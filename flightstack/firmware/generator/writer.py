@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from flightstack.firmware.generator.law import Function
 from flightstack.firmware.generator.text import WIDTH, comment, fold, identifier
-from flightstack.firmware.generator.types import Array, Record, Scalar, Type, c_size, c_type, has_rotors
+from flightstack.firmware.generator.types import INT, Array, Record, Scalar, Type, c_size, c_type, has_rotors
 from flightstack.firmware.generator.usage import Path, Usage
 from flightstack.firmware.generator.values import Form, Value
 
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 Line = tuple[int, str]
 """Depth of indentation and text."""
 _ONE_LINE = 90
+_CONST, _END = "\x01", "\x02"
+_MARK = re.compile(f"{_CONST}(.*?){_END}")
+"""Mark of a pointer that is const unless the function writes to the variable named between both signs."""
 
 
 @dataclass
@@ -47,6 +50,8 @@ class Writer:
         self.path: Path = ()
         self.variables: dict[str, Variable] = {}
         self.assigned: set[str] = set()
+        self.loops: list[str] = []
+        """Variables of the loops around the statement in progress."""
         self.pending: dict[Path, list[Variable]] = {}
         """Variables to declare before the compound statement in progress, by block."""
         names = {parameter.name for parameter in function.parameters}
@@ -71,6 +76,16 @@ class Writer:
         if variable is None or node.id not in self.assigned:
             raise self.function.refusal(node, "variable without a value", f"variable {node.id}")
         return Value(variable.type, variable.name, form=variable.form, root=variable.root)
+
+    def is_whole_parameter(self, name: str) -> bool:
+        """Return True for an integer parameter that the function does not assign."""
+        variable = self.variables.get(name)
+        return (
+            name in self._parameters()
+            and variable is not None
+            and variable.type is INT
+            and not self.usage.stores.get(name)
+        )
 
     def is_stable(self, root: str) -> bool:
         """Return True if pointers into a variable stay valid."""
@@ -140,12 +155,16 @@ class Writer:
         return "rotors"
 
     def write_to(self, node: ast.AST, value: Value) -> None:
-        """Note that the function writes to an array."""
-        variable = self.variables.get(value.root)
-        if variable is None or not isinstance(variable.type, Array):
+        """Note that the function writes to an array: a variable, a parameter, or a field of a parameter."""
+        variable, is_parameter = self.variables.get(value.root), value.root in self._parameters()
+        if variable is None or not (isinstance(variable.type, Array) or is_parameter):
             raise self.function.refusal(node, "assignment to an attribute", "write to a constant array")
-        if value.root in self._parameters():
+        if is_parameter:
             self.function.written.add(value.root)
+
+    def pointer(self, target: str, value: str, root: str) -> None:
+        """Declare a pointer into ``root``; it is const if ``root`` is a parameter that the function does not write."""
+        self.line(f"{_CONST}{root}{_END}{target} = {value};")
 
     # ------------------------------------------------------------------ temporaries
 
@@ -232,6 +251,7 @@ class Writer:
 
     def text(self) -> list[str]:
         """Return the folded lines; a variable that is never read is marked, for compilers that warn."""
+        self.lines = [(depth, self._qualified(line)) for depth, line in self.lines]
         for name in sorted(self._taken):
             self._mark_unused(name)
         whole = "\n".join(re.sub(r"/\*.*?\*/", "", text) for _, text in self.lines)
@@ -239,6 +259,11 @@ class Writer:
         unread = [name for name in parameters if not re.search(rf"(?<![.\w]){name}\b", whole)]
         self.lines[:0] = [(1, f"(void){name};") for name in unread]
         return [folded for depth, text in self.lines for folded in fold(text, "    " * depth)]
+
+    def _qualified(self, line: str) -> str:
+        """Return a line with ``const`` in place of its mark, if that is so; known when the whole function is."""
+        unwritten = self._parameters() - self.function.written
+        return _MARK.sub(lambda mark: "const " if mark[1] in unwritten else "", line)
 
     def _mark_unused(self, name: str) -> None:
         declared = re.compile(rf"(?!return )(const )?\w+ \*?{name}(?P<value> = .*)?;?$")

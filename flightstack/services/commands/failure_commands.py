@@ -20,7 +20,7 @@ LONGEST_WAIT_S = 1.5
 """Timeout of the simulator's answer, which takes one step. MAVSDK waits 2 s for the acknowledgement."""
 _HIGHEST = 255.0
 _REASONS = {
-    DENIED: "the simulator has no such motor or battery",
+    DENIED: "the simulator has no such motor, battery or sensor",
     UNSUPPORTED: "the simulator cannot do this failure",
 }
 

@@ -1,0 +1,101 @@
+"""Interface of control laws: of attitude, position, guidance and mixer (``controller``)."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from flightstack.core.kernel_cache import is_own
+from flightstack.params.toml_file import Table
+from flightstack.params.tunable import Tunable
+from flightstack.params.vehicle import Vehicle
+
+
+class CStep(NamedTuple):
+    """A step written in C by hand, for loops in C and targets.
+
+    ``header`` declares the type ``memory``, ``void <init>(memory *)`` and ``void <step>(memory *, inputs, const
+    params *, fs_real dt_s, outputs)``, with the inputs and outputs of the law's role. The step changes the memory in
+    place, a copy that is dropped if the output is not finite. The header includes ``<name>_params.h``, generated, with
+    the structure of ``params_type``, and ``fs_types.h``.
+    """
+
+    header: Path
+    sources: tuple[Path, ...]
+    memory: str
+    init: str
+    step: str
+
+
+class ControlLaw(NamedTuple):
+    """A control law: a pure step function and the types of its memory and parameters.
+
+    ``step(memory, …, params, dt_s, …) -> (memory, output)`` is marked ``@compiled``; the rest of its signature is that
+    of its role in ``Controller``. ``memory_type`` and ``params_type`` are NamedTuples of at least one field, floats
+    only; a reset restores ``initial_memory``. ``read_params(vehicle, gains)`` returns the parameters from the vehicle
+    and the table ``[<role>_<name>]`` of the gains file, which is empty if the file has none.
+
+    ``tunables`` declares the fields of ``params_type`` that are vehicle parameters, readable and writable in flight.
+    Without it, all fields are, with names derived from law and field.
+    """
+
+    name: str
+    step: Callable[..., Any] | CStep
+    memory_type: type
+    params_type: type
+    initial_memory: tuple[float, ...]
+    read_params: Callable[[Vehicle, Table], tuple[float, ...]]
+    tunables: tuple[Tunable, ...] | None = None
+
+    @property
+    def key(self) -> str:
+        """Name and source hash, so that a change of the law invalidates its cached kernel."""
+        digest = hashlib.sha256()
+        for source in self.sources:
+            digest.update(source.read_bytes())
+        return f"{re.sub(r'[^0-9A-Za-z]', '_', self.name)}_{digest.hexdigest()[:12]}"
+
+    @property
+    def sources(self) -> list[Path]:
+        """The source files of the law."""
+        if isinstance(self.step, CStep):
+            return [self.step.header, *self.step.sources]
+        return _sources(self.step.__module__)
+
+
+class NoMemory(NamedTuple):
+    """Placeholder: a law without state; a memory type needs at least one field."""
+
+    unused: float
+
+
+class NoParams(NamedTuple):
+    """Placeholder: a law without parameters; a type of parameters needs at least one field."""
+
+    unused: float
+
+
+def c_law(
+    name: str,
+    step: CStep,
+    params_type: type,
+    read_params: Callable[[Vehicle, Table], tuple[float, ...]],
+    tunables: tuple[Tunable, ...] | None = None,
+) -> ControlLaw:
+    """Return a law written in C; see ``CStep`` and ``ControlLaw``."""
+    return ControlLaw(name, step, NoMemory, params_type, (0.0,), read_params, tunables)
+
+
+def _sources(module_name: str) -> list[Path]:
+    """Return the module's file and, in a package, all files of its directory tree, which the law may use."""
+    module = sys.modules[module_name]
+    if module.__file__ is None:
+        return []
+    path = Path(module.__file__)
+    if not module.__package__ or is_own(module_name):  # the key of the cache directory covers its imports
+        return [path]
+    return sorted(path.parent.rglob("*.py"))

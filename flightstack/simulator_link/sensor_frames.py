@@ -1,0 +1,202 @@
+"""Fast codecs of the sensor messages that simulators send to PX4: HIL_SENSOR and HIL_GPS.
+
+HIL_SENSOR goes out in every step and keeps its frame in one buffer, like the messages of ``hot_frames``. Units are
+PX4's: m/s², rad/s, gauss, hPa, m, °C in body axes FRD; ``eph`` and ``epv`` of HIL_GPS are metres times 100.
+Tests compare the bytes with pymavlink's.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from typing import NamedTuple
+
+import numpy as np
+from fastcrc import crc16
+
+from flightstack.core.portable_math import atan2, distance
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.fields import int16, int32, whole
+from flightstack.mavlink.frames import CHECKSUM_SIZE, HEADER, HEADER_V2, MAGIC_V2, checksum, pack_frame
+from flightstack.mavlink.link import Message
+
+HIL_SENSOR_ID: int = mavlink.MAVLINK_MSG_ID_HIL_SENSOR
+HIL_GPS_ID: int = mavlink.MAVLINK_MSG_ID_HIL_GPS
+
+ACCEL = mavlink.HIL_SENSOR_UPDATED_XACC | mavlink.HIL_SENSOR_UPDATED_YACC | mavlink.HIL_SENSOR_UPDATED_ZACC
+GYRO = mavlink.HIL_SENSOR_UPDATED_XGYRO | mavlink.HIL_SENSOR_UPDATED_YGYRO | mavlink.HIL_SENSOR_UPDATED_ZGYRO
+MAG = mavlink.HIL_SENSOR_UPDATED_XMAG | mavlink.HIL_SENSOR_UPDATED_YMAG | mavlink.HIL_SENSOR_UPDATED_ZMAG
+BARO = (
+    mavlink.HIL_SENSOR_UPDATED_ABS_PRESSURE
+    | mavlink.HIL_SENSOR_UPDATED_PRESSURE_ALT
+    | mavlink.HIL_SENSOR_UPDATED_TEMPERATURE
+)
+"""Bits of ``fields_updated`` that PX4 needs, all of a group, to take a sensor from the message."""
+
+VALUES = 13
+ACCEL_AT, GYRO_AT, MAG_AT = slice(0, 3), slice(3, 6), slice(6, 9)
+PRESSURE_AT, ALTITUDE_AT, TEMPERATURE_AT = 9, 11, 12
+"""Places of the groups in ``HilSensorFrame.values``; between pressure and altitude is the differential pressure."""
+
+_ALIGNMENT = 6  # puts the payload at offset 16 of the buffer
+_PAYLOAD = struct.Struct("<Q13fIB")
+_TIME, _FIELDS = struct.Struct("<Q"), struct.Struct("<IB")
+_FIELDS_AT = _PAYLOAD.size - _FIELDS.size
+_CRC = struct.Struct("<H")
+_SENSOR_EXTRA: int = mavlink.MAVLink_hil_sensor_message.crc_extra
+_SENSOR_EXTRA_BYTE = bytes([_SENSOR_EXTRA])
+_crc16 = crc16.mcrf4xx
+
+
+class HilSensorFrame:
+    """HIL_SENSOR; ``values`` are its 13 measurements in the order of the message."""
+
+    def __init__(self, system_id: int = 1, component_id: int = 1) -> None:
+        self._buffer = bytearray(_ALIGNMENT + HEADER_V2 + _PAYLOAD.size + CHECKSUM_SIZE)
+        self._frame = memoryview(self._buffer)[_ALIGNMENT:]
+        HEADER.pack_into(
+            self._frame, 0, MAGIC_V2, _PAYLOAD.size, 0, 0, 0, system_id, component_id, HIL_SENSOR_ID, 0
+        )
+        self._head, self._message = bytes(self._frame[:1]), bytes(self._frame[7:HEADER_V2])
+        self.values = np.frombuffer(self._buffer, "<f4", VALUES, _ALIGNMENT + HEADER_V2 + 8)
+        """Measurements, float32, shape (13,)."""
+        self.time_us = 0
+        self.fields = 0
+        """Bits of ``fields_updated``."""
+        self.number = 0
+        """Number of the sensor, from 0."""
+        self._seq = 0
+
+    def seal(self, time_us: int, fields: int, number: int) -> memoryview:
+        """Complete the frame around the values; return its bytes without trailing zeros, valid until the next call."""
+        frame = self._frame
+        self.time_us, self.fields, self.number = time_us, fields, number
+        frame[4] = self._seq
+        self._seq = (self._seq + 1) & 255
+        _TIME.pack_into(frame, HEADER_V2, time_us)
+        _FIELDS.pack_into(frame, HEADER_V2 + _FIELDS_AT, fields, number)
+        size = _PAYLOAD.size if number else _FIELDS_AT + ((fields.bit_length() + 7) >> 3)
+        end = HEADER_V2 + size
+        while size > 1 and not frame[end - 1]:  # without fields the last values may be zero
+            size, end = size - 1, end - 1
+        frame[1] = size
+        _CRC.pack_into(frame, end, _crc16(_SENSOR_EXTRA_BYTE, _crc16(frame[1:end])))
+        return frame[: end + CHECKSUM_SIZE]
+
+    def open(self, data: bytes | bytearray | memoryview) -> bool:
+        """Copy ``data`` if it is exactly one intact, unsigned HIL_SENSOR of MAVLink 2; else change nothing."""
+        end = len(data) - CHECKSUM_SIZE
+        size = end - HEADER_V2
+        if not 0 < size <= _PAYLOAD.size or data[0] != MAGIC_V2 or data[1] != size or data[2]:
+            return False
+        if data[7:HEADER_V2] != self._message:
+            return False
+        if _CRC.unpack_from(data, end)[0] != _crc16(_SENSOR_EXTRA_BYTE, _crc16(data[1:end])):
+            return False
+        payload = self._frame[HEADER_V2 : HEADER_V2 + _PAYLOAD.size]
+        payload[:size] = data[HEADER_V2:end]
+        payload[size:] = bytes(_PAYLOAD.size - size)
+        (self.time_us,) = _TIME.unpack_from(payload)
+        self.fields, self.number = _FIELDS.unpack_from(payload, _FIELDS_AT)
+        return True
+
+    def take(self, message: Message) -> None:
+        """Copy a message of the general decoder: its frame may be signed, or of MAVLink 1."""
+        self.values[:] = (
+            message.xacc, message.yacc, message.zacc, message.xgyro, message.ygyro, message.zgyro,
+            message.xmag, message.ymag, message.zmag,
+            message.abs_pressure, message.diff_pressure, message.pressure_alt, message.temperature,
+        )  # fmt: skip
+        self.time_us, self.fields, self.number = message.time_usec, message.fields_updated, message.id
+
+
+class HilGps(NamedTuple):
+    """HIL_GPS in SI units and degrees. A speed or an accuracy that is not known is NaN."""
+
+    time_us: int
+    latitude_deg: float
+    longitude_deg: float
+    altitude_m: float
+    eph_m: float
+    epv_m: float
+    velocity_ned_m_s: tuple[float, float, float]
+    fix_type: int
+    satellites: int
+    number: int = 0
+
+
+_GPS = struct.Struct("<QiiiHHHhhhHBBBH")
+_GPS_EXTRA: int = mavlink.MAVLink_hil_gps_message.crc_extra
+_GPS_MESSAGE = HIL_GPS_ID.to_bytes(3, "little")
+UNKNOWN = 0xFFFF
+
+
+def encode_gps(gps: HilGps, seq: int, system_id: int, component_id: int) -> bytes:
+    """Return the frame of a fix; values beyond the fields are limited."""
+    north, east, down = gps.velocity_ned_m_s
+    course_deg = math.degrees(atan2(east, north)) % 360.0
+    payload = (
+        _GPS.pack(
+            gps.time_us,
+            int32(gps.latitude_deg * 1e7),
+            int32(gps.longitude_deg * 1e7),
+            int32(gps.altitude_m * 1e3),
+            whole(gps.eph_m * 100.0, 0, UNKNOWN - 1),
+            whole(gps.epv_m * 100.0, 0, UNKNOWN - 1),
+            whole(distance(north, east) * 100.0, 0, UNKNOWN - 1),
+            int16(north * 100.0),
+            int16(east * 100.0),
+            int16(down * 100.0),
+            whole(course_deg * 100.0, 0, UNKNOWN - 1) % 36000,
+            gps.fix_type,
+            gps.satellites,
+            gps.number,
+            0,  # yaw is not available
+        ).rstrip(b"\x00")
+        or b"\x00"
+    )
+    return pack_frame(HIL_GPS_ID, payload, _GPS_EXTRA, seq, system_id, component_id)
+
+
+def decode_gps(frame: bytes | memoryview) -> HilGps | None:
+    """Return the fix in ``frame`` if it is exactly one intact, unsigned HIL_GPS of MAVLink 2, else None."""
+    data = bytes(frame)
+    end = len(data) - CHECKSUM_SIZE
+    size = end - HEADER_V2
+    if not 0 < size <= _GPS.size or data[0] != MAGIC_V2 or data[1] != size or data[2]:
+        return None
+    if data[7:HEADER_V2] != _GPS_MESSAGE or checksum(data[1:end], _GPS_EXTRA) != data[end:]:
+        return None
+    values = _GPS.unpack(data[HEADER_V2:end].ljust(_GPS.size, b"\x00"))
+    return _gps(*values)
+
+
+def gps_of(message: Message) -> HilGps:
+    """Return the fix in a message of the general decoder."""
+    m = message
+    return _gps(
+        m.time_usec, m.lat, m.lon, m.alt, m.eph, m.epv, m.vel, m.vn, m.ve, m.vd, m.cog,
+        m.fix_type, m.satellites_visible, m.id, m.yaw,
+    )  # fmt: skip
+
+
+def _gps(
+    time_us: int, lat: int, lon: int, alt: int, eph: int, epv: int, _vel: int, vn: int, ve: int, vd: int,
+    _cog: int, fix_type: int, satellites: int, number: int, _yaw: int,
+) -> HilGps:  # fmt: skip
+    return HilGps(
+        time_us,
+        lat * 1e-7,
+        lon * 1e-7,
+        alt * 1e-3,
+        _accuracy(eph),
+        _accuracy(epv),
+        (vn * 0.01, ve * 0.01, vd * 0.01),
+        fix_type,
+        satellites,
+        number,
+    )
+
+
+def _accuracy(centimetres: int) -> float:
+    return math.nan if centimetres == UNKNOWN else centimetres * 0.01

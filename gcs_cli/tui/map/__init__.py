@@ -1,0 +1,1 @@
+"""The screen Map: plan, track and vehicles from above."""

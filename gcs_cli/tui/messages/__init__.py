@@ -1,0 +1,1 @@
+"""The screens Messages and Inspector: texts and MAVLink messages of the vehicle."""

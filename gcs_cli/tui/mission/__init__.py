@@ -1,0 +1,1 @@
+"""The screen Mission: items, edits, upload and progress."""

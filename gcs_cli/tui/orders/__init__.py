@@ -1,0 +1,1 @@
+"""What the user orders the vehicle to do: values, question, and the choice of the vehicle."""

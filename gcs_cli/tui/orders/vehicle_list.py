@@ -1,0 +1,61 @@
+"""A list over a screen: the vehicles on the link."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.screen import ModalScreen
+from textual.widgets import OptionList
+from textual.widgets.option_list import Option
+
+from gcs_cli.tui.fly.panels import height_m
+from gcs_cli.vehicle.numbers import UNKNOWN, number
+from gcs_cli.vehicle.view_types import VehicleView
+
+ALL = 0
+"""Result if the orders go to all vehicles; no system has this id."""
+
+
+class VehicleList(ModalScreen[int | None]):
+    """Asks for a vehicle; the result is its system id, ``ALL``, or None."""
+
+    DEFAULT_CSS = """
+    VehicleList { align: center middle; }
+    VehicleList OptionList { width: 64; max-width: 90%; height: auto; max-height: 80%; border: round $accent; }
+    """
+    AUTO_FOCUS = "OptionList"
+    BINDINGS: ClassVar = [Binding("escape", "cancel", "Cancel")]
+
+    def __init__(self, views: tuple[VehicleView, ...], now_s: float) -> None:
+        super().__init__()
+        self._views, self._now_s = views, now_s
+
+    def compose(self) -> ComposeResult:
+        """Yield the list."""
+        options = [Option(vehicle_line(view, self._now_s), id=str(_system_id(view))) for view in self._views]
+        if len(options) > 1:
+            options.append(Option("all of them: actions go to every vehicle", id=str(ALL)))
+        listed = OptionList(*options, markup=False)
+        listed.border_title = "Vehicles"
+        yield listed
+
+    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        """End with the vehicle."""
+        self.dismiss(int(event.option_id or ALL))
+
+    def action_cancel(self) -> None:
+        """End without a choice."""
+        self.dismiss(None)
+
+
+def vehicle_line(view: VehicleView, now_s: float) -> str:
+    """Return a vehicle's state in one line."""
+    kind = "vehicle" if view.identity is None else view.identity.kind
+    state = "lost" if view.lost(now_s) else "armed" if view.armed else "disarmed"
+    return f"{_system_id(view):>3}  {kind:<10} {view.mode or UNKNOWN:<10} {state:<9}{number(height_m(view), 1):>7} m"
+
+
+def _system_id(view: VehicleView) -> int:
+    return 0 if view.identity is None else view.identity.system_id

@@ -1,0 +1,1 @@
+"""The screen Parameters: search, edit, compare and save."""

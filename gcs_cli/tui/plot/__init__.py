@@ -1,0 +1,1 @@
+"""The screen Plot: telemetry fields over time."""

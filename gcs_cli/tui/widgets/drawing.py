@@ -1,0 +1,113 @@
+"""A widget that shows lines drawn by a pure function of the vehicle's state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from itertools import pairwise, zip_longest
+from typing import TYPE_CHECKING, TypeAlias, cast
+
+from rich.segment import Segment
+from rich.style import Style
+from rich.text import Text
+from textual.events import Resize
+from textual.geometry import Region
+from textual.strip import Strip
+from textual.widget import Widget
+
+from gcs_cli.tui.palette import Palette
+from gcs_cli.tui.widgets.runs import Runs
+from gcs_cli.vehicle.view_types import VehicleView
+
+if TYPE_CHECKING:
+    from gcs_cli.tui.app import WatchApp
+
+Draw: TypeAlias = Callable[[VehicleView, float, int, int, Palette], Sequence[Text | Runs]]
+"""Draws a vehicle's state as of a time [s] in a number of columns and rows."""
+
+
+class Drawing(Widget):
+    """Shows the lines of ``draw``; a line is sent to the terminal only if it changed.
+
+    ``every``: draw in one of so many redraws of the screen; figures that change faster cannot be read.
+    """
+
+    ALLOW_SELECT = False
+
+    def __init__(self, draw: Draw, title: str = "", *, every: int = 2, id: str | None = None) -> None:
+        super().__init__(id=id)
+        self.every = every
+        self._draw = draw
+        self._lines: Sequence[Text | Runs] = []
+        self._strips: list[Strip] = []
+        self._background = Style()
+        self._palette: Palette | None = None
+        """The palette of ``_background``; None if the style has changed since."""
+        self.border_title = title or None
+
+    def show(self, view: VehicleView, now_s: float) -> None:
+        """Draw ``view``."""
+        width, height = self.content_size
+        if width <= 0 or height <= 0:
+            return
+        colours = watch_app(self).palette
+        lines = self._draw(view, now_s, width, height, colours)
+        if colours is not self._palette:  # rich_style collects the styles of all ancestors
+            self._palette, background = colours, self.rich_style
+            if background != self._background:
+                self._background, self._lines, self._strips = background, [], []
+        background = self._background
+        strips = []
+        changed = []
+        for y, (new, old) in enumerate(zip_longest(lines, self._lines)):
+            if new is not None and new == old and self._strips[y].cell_length == width:
+                strips.append(self._strips[y])
+                continue
+            changed.append(Region(0, y, width, 1))
+            if new is not None:
+                strips.append(strip_of(new, background).adjust_cell_length(width, background))
+        self._lines, self._strips = lines, strips
+        if changed:
+            self.refresh(*changed)
+
+    def notify_style_update(self) -> None:
+        """Read the style again at the next drawing."""
+        self._palette = None
+        super().notify_style_update()
+
+    def on_resize(self, _event: Resize) -> None:
+        """Draw in the new size."""
+        feed = watch_app(self).feed
+        self.show(feed.view, feed.now_s)
+
+    def render_line(self, y: int) -> Strip:
+        """Return a line of the content."""
+        return (
+            self._strips[y]
+            if y < len(self._strips)
+            else Strip.blank(self.content_size.width, self.rich_style)
+        )
+
+
+def strip_of(line: Text | Runs, base: Style) -> Strip:
+    """Return the segments of a line over the style ``base``; a later span covers an earlier one."""
+    if isinstance(line, Runs):
+        return Strip([Segment(text, _combined(base, style)) for text, style in line if text])
+    plain, spans = line.plain, line.spans
+    edges = sorted({0, len(plain), *(span.start for span in spans), *(span.end for span in spans)})
+    segments = []
+    for start, end in pairwise(edge for edge in edges if edge <= len(plain)):
+        styles = [span.style for span in spans if span.start <= start and span.end >= end]
+        segments.append(Segment(plain[start:end], _combined(base, line.style, *styles)))
+    return Strip(segments)
+
+
+@cache
+def _combined(base: Style, *styles: str | Style) -> Style:
+    parsed = (Style.parse(style) if isinstance(style, str) else style for style in styles)
+    return sum(parsed, start=base)
+
+
+def watch_app(node: Widget) -> WatchApp:
+    """Return the application of a widget."""
+    return cast("WatchApp", node.app)
