@@ -21,7 +21,6 @@ from flightstack.estimation.error_state import (
     GYRO_BIAS,
     POSITION,
     VELOCITY,
-    WIND,
 )
 from tools.generated import ROOT, write_or_check
 
@@ -136,23 +135,11 @@ def covariance_prediction() -> list[tuple[str, Any]]:
 
 def measurements() -> dict[str, tuple[list[tuple[str, str]], Any, dict[int, Any]]]:
     """Return name → arguments, predicted measurement, and errors by their first index."""
-    earth, body, velocity = vector("earth"), vector("body"), vector("velocity")
+    earth, body = vector("earth"), vector("body")
     field = in_body(earth) + body
-    wind = sp.Matrix([sp.Symbol("wind_n"), sp.Symbol("wind_e"), 0])
-    air = in_body(velocity - wind)
-    q = [("q", "Quaternion")]
-    magnetic = [*q, ("earth", "Vector3"), ("body", "Vector3")]
-    of_field = {ATTITUDE: THETA, EARTH_FIELD: earth, BODY_FIELD: body}
-    of_air = {ATTITUDE: THETA, VELOCITY: velocity, WIND: wind[:2, 0]}
-    airspeed = [*q, ("velocity", "Vector3"), ("wind_n", "float"), ("wind_e", "float")]
-    found: dict[str, tuple[list[tuple[str, str]], Any, dict[int, Any]]] = {}
-    for i, axis in enumerate("xyz"):
-        found[f"field_{axis}"] = (magnetic, field[i], of_field)
-    for i, axis in enumerate("xy"):
-        found[f"airspeed_{axis}"] = (airspeed, air[i], of_air)
-    forward = rotated(sp.Matrix([1, 0, 0]))
-    found["yaw"] = (q, sp.atan2(forward[1], forward[0]), {ATTITUDE: THETA})
-    return found
+    arguments = [("q", "Quaternion"), ("earth", "Vector3"), ("body", "Vector3")]
+    errors = {ATTITUDE: THETA, EARTH_FIELD: earth, BODY_FIELD: body}
+    return {f"field_{axis}": (arguments, field[i], errors) for i, axis in enumerate("xyz")}
 
 
 def _code(expression: Any) -> str:
@@ -194,20 +181,14 @@ def _measurement(
     zero = dict.fromkeys(THETA, 0)
     declared = ", ".join(f"{argument}: {kind}" for argument, kind in arguments)
     yield "\n\n@compiled"
-    yield f"def {name}_jacobian({declared}, h: ErrorVector) -> {'float' if name != 'yaw' else 'None'}:"
-    if name == "yaw":
-        yield '    """Write the derivative of the yaw (3-2-1) to ``h``, which is zero."""'
-    else:
-        yield f'    """Write the derivative of {name} to ``h``, which is zero; return the predicted value."""'
+    yield f"def {name}_jacobian({declared}, h: ErrorVector) -> float:"
+    yield f'    """Write the derivative of {name} to ``h``, which is zero; return the predicted value."""'
     elements = []
     for at, symbols in errors.items():
         for offset, symbol in enumerate(symbols):
             elements.append((f"h[{at + offset}]", sp.simplify(sp.diff(predicted, symbol).subs(zero))))
     elements = [(target, value) for target, value in elements if value != 0]
     value = sp.simplify(predicted.subs(zero))
-    if name == "yaw":
-        yield from _assignments(elements)
-        return
     yield from _assignments([*elements, ("predicted", value)])
     yield "    return predicted"
 

@@ -102,6 +102,8 @@ _LATE_S = 0.3
 """Measurements that are older than the horizon by this much are dropped."""
 _STEPS = 4
 """Most predictions in one sample."""
+_MEASURED = 7
+"""Time, position and velocity of a GNSS measurement; other measurements are shorter."""
 _GNSS_LOST_S = 1.0
 _HOLD_PERIOD_S = 0.2
 _STILL_RATE_RAD_S, _STILL_FORCE_M_S2 = 0.08, 0.4
@@ -150,7 +152,13 @@ def rings_of(m: Record) -> Rings:
 
 @compiled
 def push_kernel(memory: RecordArray, ring: int, row: FloatArray) -> None:
-    """Store a measurement of a ring (``GNSS_RING``, …) until the horizon reaches its time."""
+    """Store a measurement of a ring (``GNSS_RING``, …) until the horizon reaches its time.
+
+    A measurement that is not finite is dropped; only the accuracies of GNSS, behind its velocity, may be missing.
+    """
+    for i in range(min(row.size, _MEASURED)):
+        if not math.isfinite(row[i]):
+            return
     m = memory[0]
     r = rings_of(m)
     if ring == GNSS_RING:
@@ -169,7 +177,15 @@ def push_kernel(memory: RecordArray, ring: int, row: FloatArray) -> None:
 
 @compiled
 def imu_kernel(memory: RecordArray, sample: FloatArray) -> None:
-    """Take an IMU sample, shape (8,): move the output, and the filter when a step is complete."""
+    """Take an IMU sample, shape (8,): move the output, and the filter when a step is complete.
+
+    A sample that is not finite, or without a step in time, is dropped.
+    """
+    for i in range(IMU_SIZE):
+        if not math.isfinite(sample[i]):
+            return
+    if sample[1] <= 0.0:
+        return
     m = memory[0]
     params = EstimatorParams(*as_tuple(m["params"], PARAMS_SIZE))
     f, r, sums, output = filter_of(m), rings_of(m), m["sums"], m["output"]

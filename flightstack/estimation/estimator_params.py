@@ -26,7 +26,7 @@ class EstimatorParams(NamedTuple):
     earth_field_gauss: float = 0.005
     field_scale: float = 0.1
     """Error of the magnetometer's scale, which the filter counts as an error of the Earth's field along itself."""
-    body_field_gauss: float = 0.015
+    body_field_gauss: float = 0.01
     # GNSS
     gnss_delay_s: float = 0.11
     gnss_velocity_noise_m_s: float = 0.05
@@ -38,7 +38,7 @@ class EstimatorParams(NamedTuple):
     gnss_velocity_gate: float = 5.0
     gnss_position_gate: float = 5.0
     # without GNSS
-    hold_noise_m: float = 10.0
+    hold_noise_m: float = 5.0
     hold_velocity_m_s: float = 3.0
     """Uncertainty of the horizontal velocity above which the filter holds its position."""
     # barometer, range finder

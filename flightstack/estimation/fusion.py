@@ -7,13 +7,10 @@ from typing import Annotated, TypeAlias
 
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Vector3
-from flightstack.core.geometry import heading, rotate, wrap_pi
-from flightstack.core.portable_math import atan2
 from flightstack.estimation.derived_generated import (
     field_x_jacobian,
     field_y_jacobian,
     field_z_jacobian,
-    yaw_jacobian,
 )
 from flightstack.estimation.error_state import (
     BARO_BIAS,
@@ -35,7 +32,6 @@ from flightstack.estimation.kalman import (
     RANGE,
     REST_RATE,
     REST_VELOCITY,
-    YAW,
     Filter,
     Noise,
     clear,
@@ -155,17 +151,6 @@ def fuse_field(f: Filter, measured: Vector3, params: EstimatorParams) -> None:
 
 
 @compiled
-def fuse_yaw(f: Filter, yaw_rad: float, noise_rad: float, gate: float) -> None:
-    """Fuse a measured yaw (3-2-1)."""
-    n = read_nominal(f.nominal)
-    clear(f.h)
-    yaw_jacobian(n.attitude, f.h)
-    fuse(
-        f, YAW, wrap_pi(yaw_rad - heading(n.attitude)), Noise(noise_rad, noise_rad, noise_rad, gate, 0.0), 1.0
-    )
-
-
-@compiled
 def fuse_rest(f: Filter, sample: DeltaSample, params: EstimatorParams) -> None:
     """Fuse zero velocity and zero rate of a vehicle that stands."""
     measured = Vector3(
@@ -188,14 +173,6 @@ def fuse_rest(f: Filter, sample: DeltaSample, params: EstimatorParams) -> None:
         f.h[GYRO_BIAS + axis] = 1.0
         value = innovation.x if axis == 0 else innovation.y if axis == 1 else innovation.z
         fuse(f, REST_RATE + axis, value, rate, 0.0)
-
-
-@compiled
-def yaw_of_field(f: Filter, measured: Vector3, declination_rad: float) -> float:
-    """Return the yaw [rad] at which the horizontal field points to magnetic north."""
-    n = read_nominal(f.nominal)
-    level = rotate(n.attitude, measured)
-    return wrap_pi(heading(n.attitude) - atan2(level.y, level.x) + declination_rad)
 
 
 @compiled

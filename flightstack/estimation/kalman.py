@@ -16,19 +16,9 @@ from flightstack.estimation.error_state import (
     write_nominal,
 )
 
-OBSERVATIONS = 22
-GNSS_VELOCITY, GNSS_POSITION, BARO, MAG, YAW, RANGE, REST_VELOCITY, REST_RATE, DRAG = (
-    0,
-    3,
-    6,
-    7,
-    10,
-    11,
-    12,
-    15,
-    18,
-)
-HOLD_POSITION = 20
+OBSERVATIONS = 19
+GNSS_VELOCITY, GNSS_POSITION, BARO, MAG, RANGE = 0, 3, 6, 7, 10
+REST_VELOCITY, REST_RATE, HOLD_POSITION = 11, 14, 17
 """First row of each sensor in ``Filter.observations``."""
 
 INNOVATION, INNOVATION_VARIANCE, TEST_RATIO, FUSED_S, NOISE, LAGGED = 0, 1, 2, 3, 4, 5

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from flightstack.core.contract import FloatArray
+from flightstack.core.earth_field import FIELD_YEAR, earth_field_ned_gauss
 from flightstack.estimation.error_state import ERROR_STATES, NOMINAL_SIZE
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.kalman import OBSERVATION_COLUMNS, OBSERVATIONS
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, ImuSample, MagSample, RangeSample
 from gcs_cli.errors import CliError
-from gcs_cli.estimate.earth_field import field_at
 from gcs_cli.estimate.log_samples import Landed, params_of, samples_of
 from gcs_cli.estimate.track import Track
 from gcs_cli.logs.recording import Recording
@@ -44,7 +44,7 @@ def run(log: Recording) -> Estimate:
     estimator = Estimator(params, limits)
     estimator.set_declination(declination_rad)
     keeper = _Keeper(estimator)
-    year = log.year
+    year = log.year or FIELD_YEAR
     for sample in samples_of(log):
         keeper.count(sample)
         if isinstance(sample, ImuSample):
@@ -58,7 +58,7 @@ def run(log: Recording) -> Estimate:
             was_known = estimator.frame is not None
             estimator.gnss(sample)
             if not was_known and estimator.frame is not None:
-                estimator.set_earth_field(field_at(estimator.frame.origin, year))
+                estimator.set_earth_field(earth_field_ned_gauss(estimator.frame.origin, year))
         elif isinstance(sample, RangeSample):
             estimator.range(sample)
         elif isinstance(sample, Landed):

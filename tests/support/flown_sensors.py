@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,7 @@ def _eased(share: float) -> float:
     return s * s * s * (10.0 + s * (-15.0 + 6.0 * s))
 
 
+@cache
 def position(time_s: float) -> Any:
     """Return the position [m, NED]."""
     height = HEIGHT_M * _eased((time_s - STANDS_S) / CLIMBS_S)
@@ -45,11 +47,13 @@ def position(time_s: float) -> Any:
     return np.array([grown * math.cos(angle), grown * math.sin(angle), -height])
 
 
+@cache
 def velocity(time_s: float) -> Any:
     """Return the velocity [m/s, NED]."""
     return (position(time_s + 1e-3) - position(time_s - 1e-3)) / 2e-3
 
 
+@cache
 def attitude(time_s: float) -> Quaternion:
     """Return the attitude whose thrust axis accelerates the vehicle, with a yaw that turns in the air."""
     acceleration = (position(time_s + 0.01) - 2.0 * position(time_s) + position(time_s - 0.01)) / 1e-4

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import json
 import lzma
+import math
 import os
 from pathlib import Path
 
 import pytest
 
+from flightstack.core.earth_field import earth_field_ned_gauss
 from flightstack.core.geodesy import GeoPoint
 from flightstack.estimation.sensor_samples import GnssSample
 from gcs_cli.__main__ import main
 from gcs_cli.errors import USAGE
-from gcs_cli.estimate.earth_field import field_at
 from gcs_cli.estimate.log_samples import params_of, pressure_altitude_m, samples_of
 from gcs_cli.estimate.track import differences, flight_span, logged_track, summary_of
 from gcs_cli.logs.reader import read_log
@@ -116,9 +117,12 @@ def test_pressure_altitude_is_that_of_the_standard_atmosphere() -> None:
     assert pressure_altitude_m(898.746) == pytest.approx(1000.0, abs=0.1)  # ISO 2533
 
 
-def test_earth_field_has_the_declination_of_the_model() -> None:
-    north, east, down = field_at(GeoPoint(80.0, 0.0, 0.0), 2025.0)  # test value of the WMM 2025 report
-    assert (north, east, down) == pytest.approx((0.065218, 0.001459, 0.547910), abs=2e-5)
+@pytest.mark.parametrize(
+    ("year", "declination_deg"), [(2012.0, 1.6), (2017.0, 2.4), (2022.0, 3.2), (2027.0, 3.8)]
+)
+def test_earth_field_is_that_of_the_year(year: float, declination_deg: float) -> None:
+    north, east, _ = earth_field_ned_gauss(GeoPoint(47.4, 8.5, 500.0), year)  # Zurich: 0.15° a year
+    assert math.degrees(math.atan2(east, north)) == pytest.approx(declination_deg, abs=0.3)
 
 
 @pytest.mark.parametrize("name", ["px4_sih_calm", "px4_world_windy", "px4_world_outage"])

@@ -9,14 +9,14 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from flightstack.core.contract import FloatArray
+from flightstack.core.contract import FloatArray, Vector3
 from flightstack.core.geodesy import LocalFrame
 from flightstack.core.geometry import conjugate, quaternion_product, rotation_vector
 from flightstack.estimation.error_state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY
 from flightstack.estimation.estimator import POSITION_RESET, VELOCITY_RESET, Estimator
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import GNSS_VELOCITY, INNOVATION, INNOVATION_VARIANCE
-from flightstack.estimation.sensor_samples import GnssSample, ImuSample
+from flightstack.estimation.sensor_samples import GnssSample, ImuSample, MagSample
 from tests.support import flown_sensors as flown
 from tests.support.flown_sensors import Faults
 
@@ -140,3 +140,21 @@ def test_equal_samples_give_equal_bytes() -> None:
         flown.feed(first, sample)
         flown.feed(second, sample)
     assert first.memory.tobytes() == second.memory.tobytes()
+
+
+def test_samples_that_are_not_finite_are_dropped() -> None:
+    estimator, nan = Estimator(PARAMS), Vector3(math.nan, 0.0, 0.0)
+    for sample in flown.samples(5.0, NO_FAULTS):
+        flown.feed(estimator, sample)
+        if isinstance(sample, ImuSample):
+            estimator.imu(sample._replace(accel_frd_m_s2=nan))
+        elif isinstance(sample, MagSample):
+            estimator.mag(sample._replace(field_frd_gauss=nan))
+        elif isinstance(sample, GnssSample):
+            estimator.gnss(sample._replace(velocity_ned_m_s=nan))
+        else:
+            estimator.baro(sample._replace(pressure_altitude_m=math.inf))
+    expected = Estimator(PARAMS)
+    for sample in flown.samples(5.0, NO_FAULTS):
+        flown.feed(expected, sample)
+    assert estimator.memory.tobytes() == expected.memory.tobytes()

@@ -10,7 +10,6 @@ import pytest
 from flightstack.core.contract import Quaternion, Vector3
 from flightstack.core.geometry import (
     conjugate,
-    heading,
     quaternion_from_euler,
     quaternion_product,
     rotate,
@@ -87,16 +86,6 @@ def test_field_jacobian_is_the_derivative_of_the_field(axis: int) -> None:
         for i in range(ERROR_STATES)
     ]
     assert predicted == pytest.approx(field(n), abs=1e-14)
-    assert h == pytest.approx(numeric, abs=1e-9)
-
-
-def test_yaw_jacobian_is_the_derivative_of_the_yaw() -> None:
-    n, h = nominal(), np.zeros(ERROR_STATES)
-    derived.yaw_jacobian(n.attitude, h)
-    numeric = [
-        (heading(perturbed(n, i, STEP).attitude) - heading(perturbed(n, i, -STEP).attitude)) / (2.0 * STEP)
-        for i in range(ERROR_STATES)
-    ]
     assert h == pytest.approx(numeric, abs=1e-9)
 
 
