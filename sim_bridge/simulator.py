@@ -174,8 +174,9 @@ class Simulator:
         """
         check_faults(faults, self._flight._replace(faults=self.faults))
         for fault in faults:
-            late = ROWS[fault.kind].is_event and fault.begin_us < self.time_us
-            self._schedule.faults.append(fault._replace(begin_us=self.time_us) if late else fault)
+            counts = ROWS[fault.kind].is_event or fault.kind is Kind.SENSOR_DRIFT  # from its begin
+            is_late = counts and fault.begin_us < self.time_us
+            self._schedule.faults.append(fault._replace(begin_us=self.time_us) if is_late else fault)
         self._update_faults()
 
     def check(self, fault: Fault) -> None:

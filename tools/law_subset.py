@@ -78,7 +78,9 @@ void my_add_noise(my_filter *filter, const fs_real variance[24], fs_real dt_s)
 
 * Shapes are numbers or constants of the module, in the annotation. Arrays are `float64` in Python; compiled code may
   pass those of a record, `Filter(record["x"], record["covariance"])`.
-* Loops run over constants, sizes and variables of outer loops, such as `range(row + 1)` for a triangle.
+* Loops run over constants, sizes and variables of outer loops, such as `range(row + 1)` for a triangle, and over
+  integer parameters for which every caller gives such a number, `range(at, at + count)`.
+* Integers stand in `Annotated[np.ndarray[tuple[int], np.dtype[np.int64]], N]`; C has 32 bits of each.
 * A parameter is `const` in C unless the function, or one that it calls, writes to its arrays.
 * `p = filter.covariance` and `row = p[i]` are names of the same array, `np.zeros((3, 3))` and `np.empty(3)` new ones.
 * Slices, whole-array arithmetic, and NamedTuples made of arrays are refused: sums have a written order, and so

@@ -21,70 +21,50 @@ static uint32_t now(fs_clock clock)
     return clock != NULL ? clock() : 0UL;
 }
 
-static fs_real vector_sum(const fs_vector3 *v)
-{
-    return v->x + v->y + v->z;
-}
-
-static fs_real quaternion_sum(const fs_quaternion *q)
-{
-    return q->w + q->x + q->y + q->z;
-}
-
+/*
+ * Every number is compared by itself: a sum would show an infinity only on a processor that makes NaN of the difference
+ * of two.
+ */
 static uint16_t vector_is_finite(const fs_vector3 *v)
 {
-    return fs_is_finite(fs_add_part(fs_add_part(fs_add_part(FS_LIT(0.0), v->x), v->y), v->z));
+    return (uint16_t)(fs_is_finite(v->x) & fs_is_finite(v->y) & fs_is_finite(v->z));
 }
 
 static uint16_t quaternion_is_finite(const fs_quaternion *q)
 {
-    const fs_real half = fs_add_part(fs_add_part(FS_LIT(0.0), q->w), q->x);
-
-    return fs_is_finite(fs_add_part(fs_add_part(half, q->y), q->z));
+    return (uint16_t)(fs_is_finite(q->w) & fs_is_finite(q->x) & fs_is_finite(q->y) & fs_is_finite(q->z));
 }
 
-/*
- * Whether all numbers are finite. A finite sum of them says yes at once, because nothing that is not finite can be
- * made up for; one that is not finite may come of numbers that are only large, and is looked into.
- */
 static uint16_t state_is_finite(const fs_vehicle_state *state)
 {
-    const fs_real sum = vector_sum(&state->position_ned_m) + vector_sum(&state->velocity_ned_m_s) +
-                        quaternion_sum(&state->attitude) + vector_sum(&state->rates_frd_rad_s);
-
-    if (fs_is_finite(sum)) {
-        return 1U;
-    }
-    return (vector_is_finite(&state->position_ned_m) && vector_is_finite(&state->velocity_ned_m_s) &&
-            quaternion_is_finite(&state->attitude) && vector_is_finite(&state->rates_frd_rad_s))
-               ? 1U
-               : 0U;
+    return (uint16_t)(vector_is_finite(&state->position_ned_m) & vector_is_finite(&state->velocity_ned_m_s) &
+                      quaternion_is_finite(&state->attitude) & vector_is_finite(&state->rates_frd_rad_s));
 }
 
 /* Finite, and a yaw that has a sine: a processor without NaN may make a number of what fs_sin_cos gives beyond. */
 static uint16_t setpoint_is_sound(const fs_position_setpoint *setpoint)
 {
-    const fs_real sum = vector_sum(&setpoint->position_ned_m) + vector_sum(&setpoint->velocity_ned_m_s) +
-                        vector_sum(&setpoint->acceleration_ned_m_s2) + setpoint->yaw_rate_rad_s;
+    const uint16_t has_sine = fs_abs(setpoint->yaw_rad) <= FS_LARGEST_ANGLE_RAD ? 1U : 0U;
 
-    if (!(fs_abs(setpoint->yaw_rad) <= FS_LARGEST_ANGLE_RAD)) {
-        return 0U;
-    }
-    if (fs_is_finite(sum)) {
-        return 1U;
-    }
-    return (vector_is_finite(&setpoint->position_ned_m) && vector_is_finite(&setpoint->velocity_ned_m_s) &&
-            vector_is_finite(&setpoint->acceleration_ned_m_s2) && fs_is_finite(setpoint->yaw_rate_rad_s))
-               ? 1U
-               : 0U;
+    return (uint16_t)(has_sine & vector_is_finite(&setpoint->position_ned_m) &
+                      vector_is_finite(&setpoint->velocity_ned_m_s) &
+                      vector_is_finite(&setpoint->acceleration_ned_m_s2) & fs_is_finite(setpoint->yaw_rate_rad_s));
 }
 
 static uint16_t target_is_finite(const fs_attitude_target *target)
 {
-    if (fs_is_finite(quaternion_sum(&target->attitude) + target->thrust_n)) {
-        return 1U;
-    }
-    return (quaternion_is_finite(&target->attitude) && fs_is_finite(target->thrust_n)) ? 1U : 0U;
+    return (uint16_t)(quaternion_is_finite(&target->attitude) & fs_is_finite(target->thrust_n));
+}
+
+static uint16_t reference_is_finite(const fs_attitude_reference *reference)
+{
+    return (uint16_t)(quaternion_is_finite(&reference->attitude) & vector_is_finite(&reference->rates_frd_rad_s) &
+                      vector_is_finite(&reference->acceleration_frd_rad_s2));
+}
+
+static uint16_t wrench_is_finite(const fs_wrench *wrench)
+{
+    return (uint16_t)(fs_is_finite(wrench->thrust_n) & vector_is_finite(&wrench->torque_frd_n_m));
 }
 
 void fs_loops_init(fs_loops *loops)
@@ -216,46 +196,44 @@ static void gather(const fs_loops *loops, const fs_vehicle_state *state, const f
     inputs->saturation.z = direction(lag->z);
 }
 
-/* Reference filter and attitude controller, into tick and output. Nonzero: torque and memory are finite. */
+/* Reference filter and attitude controller, into tick and output. Nonzero: reference, torque and memory are finite. */
 static uint16_t attitude_loop(const fs_loops *loops, const fs_vehicle_state *state, fs_tick *tick,
                               fs_loop_output *output)
 {
     const fs_quaternion aim = fs_blend(&loops->last_target.attitude, &loops->target.attitude, loops->fraction);
     fs_attitude_reference filtered;
     fs_attitude_inputs inputs;
-    uint16_t is_memory_finite;
+    uint16_t is_sound;
 
     fs_attitude_reference_step(&loops->reference_memory, &aim, &loops->reference, loops->rates.inner_dt_s,
                                &tick->reference, &filtered);
     output->reference = fs_in_body_frame(&filtered, &state->attitude);
+    is_sound = (uint16_t)(reference_is_finite(&filtered) & reference_is_finite(&output->reference));
     gather(loops, state, &output->reference, &inputs);
-    is_memory_finite =
-        fs_controllers_step(loops->rates.controller, &loops->controller_memory, &inputs, &loops->controller,
-                            loops->rates.inner_dt_s, &tick->controller, &output->wrench.torque_frd_n_m);
+    is_sound &= fs_controllers_step(loops->rates.controller, &loops->controller_memory, &inputs, &loops->controller,
+                                    loops->rates.inner_dt_s, &tick->controller, &output->wrench.torque_frd_n_m);
     output->wrench.thrust_n = loops->target.thrust_n;
-    return (uint16_t)(vector_is_finite(&output->wrench.torque_frd_n_m) & is_memory_finite);
+    return (uint16_t)(is_sound & wrench_is_finite(&output->wrench));
 }
 
 /* Share the wrench out to the rotors; those that the vehicle has not stand still. Nonzero: no sum overflowed. */
 static uint16_t mix(const fs_loops *loops, fs_tick *tick, fs_loop_output *output)
 {
-    fs_real work[3][FS_MAX_ROTORS], sum;
+    fs_real work[3][FS_MAX_ROTORS];
     const fs_wrench *achieved = &output->wrench_achieved;
-    uint16_t i, is_memory_finite;
+    uint16_t i, is_sound;
 
     for (i = loops->rates.rotors; i < FS_MAX_ROTORS; i++) {
         output->rotor_command_rad_s[i] = FS_LIT(0.0);
     }
-    is_memory_finite =
-        fs_mixer_laws_step(loops->rates.mixing, &loops->mixing_memory, &output->wrench, &loops->mixer, &loops->mixing,
-                           loops->rates.inner_dt_s, output->rotor_command_rad_s, work, &tick->mixing,
-                           &output->wrench_achieved);
+    is_sound = fs_mixer_laws_step(loops->rates.mixing, &loops->mixing_memory, &output->wrench, &loops->mixer,
+                                  &loops->mixing, loops->rates.inner_dt_s, output->rotor_command_rad_s, work,
+                                  &tick->mixing, &output->wrench_achieved);
     output->status = fs_saturation_of(&output->wrench, achieved, &loops->resolution, &tick->saturation);
-    sum = fs_add_part(FS_LIT(0.0), achieved->thrust_n);
     for (i = 0U; i < loops->rates.rotors; i++) {
-        sum = fs_add_part(sum, output->rotor_command_rad_s[i]);
+        is_sound &= fs_is_finite(output->rotor_command_rad_s[i]);
     }
-    return (uint16_t)(fs_is_finite(sum) & vector_is_finite(&achieved->torque_frd_n_m) & is_memory_finite);
+    return (uint16_t)(is_sound & wrench_is_finite(achieved));
 }
 
 /* Run inner loop and mixer; return 0 and keep the tick, or the status bit that tells why the output is not sound. */

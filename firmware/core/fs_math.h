@@ -52,16 +52,6 @@ static inline uint16_t fs_is_finite(fs_real value)
     return fs_abs(value) <= FS_REAL_MAX ? 1U : 0U;
 }
 
-/*
- * Part of a sum that tells whether any of up to 64 numbers is not finite, for less than a comparison of each would
- * cost: begin with 0, add them, and look whether the sum is finite. A number counts a 64th, so that large ones do not
- * make it infinite; infinities of both signs make it NaN.
- */
-static inline fs_real fs_add_part(fs_real sum, fs_real value)
-{
-    return sum + FS_LIT(0.015625) * value;
-}
-
 /* Python's max and min: the first argument unless the second is beyond it, also when one is NaN. */
 static inline fs_real fs_max(fs_real first, fs_real second)
 {

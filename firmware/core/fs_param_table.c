@@ -9,8 +9,8 @@ static const fs_param_spec specs[FS_PARAM_COUNT] = {
     {"POS_Z_I", FS_LIT(0.0), FS_LIT(1000000.0), FS_LIT(4.5), 0U},
     {"POS_Z_D", FS_LIT(0.0), FS_LIT(1000000.0), FS_LIT(6.5), 0U},
     {"POS_I_MAX", FS_LIT(0.0), FS_LIT(20.0), FS_LIT(4.0), 0U},
-    {"POS_THR_MIN", FS_LIT(0.0), FS_LIT(1000000.0), FS_LIT(0.43164), 0U},
     {"POS_THR_MAX", FS_LIT(0.0), FS_LIT(1000000.0), FS_LIT(10.25145), 0U},
+    {"POS_THR_MIN", FS_LIT(0.0), FS_LIT(1000000.0), FS_LIT(0.43164), 0U},
     {"ATT_REF_BW", FS_LIT(0.0), FS_LIT(1000.0), FS_LIT(60.0), 0U},
     {"ATT_REF_DAMP", FS_LIT(0.1), FS_LIT(5.0), FS_LIT(1.0), 0U},
     {"ATT_REF_RATE", FS_LIT(0.1), FS_LIT(100.0), FS_LIT(8.0), 0U},
@@ -150,8 +150,8 @@ fs_real *fs_param_place(fs_loops *loops, uint16_t index)
     case 4U: return &loops->position.pid.ki_z;
     case 5U: return &loops->position.pid.kd_z;
     case 6U: return &loops->position.pid.max_integral_m_s2;
-    case 7U: return &loops->position.pid.min_thrust_n;
-    case 8U: return &loops->position.pid.max_thrust_n;
+    case 7U: return &loops->position.pid.max_thrust_n;
+    case 8U: return &loops->position.pid.min_thrust_n;
     case 9U: return &loops->reference.bandwidth_rad_s;
     case 10U: return &loops->reference.damping;
     case 11U: return &loops->reference.max_rate_rad_s;
@@ -288,8 +288,8 @@ fs_real fs_param_value(const fs_loops *loops, uint16_t index)
     case 4U: return loops->position.pid.ki_z;
     case 5U: return loops->position.pid.kd_z;
     case 6U: return loops->position.pid.max_integral_m_s2;
-    case 7U: return loops->position.pid.min_thrust_n;
-    case 8U: return loops->position.pid.max_thrust_n;
+    case 7U: return loops->position.pid.max_thrust_n;
+    case 8U: return loops->position.pid.min_thrust_n;
     case 9U: return loops->reference.bandwidth_rad_s;
     case 10U: return loops->reference.damping;
     case 11U: return loops->reference.max_rate_rad_s;
@@ -414,6 +414,11 @@ fs_real fs_param_value(const fs_loops *loops, uint16_t index)
     case 130U: return loops->mixer.spin[7];
     default: return FS_LIT(0.0);
     }
+}
+
+uint16_t fs_param_is_consistent(const fs_loops *loops)
+{
+    return (loops->position.pid.min_thrust_n <= loops->position.pid.max_thrust_n) ? 1U : 0U;
 }
 
 fs_real *fs_param_integral(fs_loops *loops, uint16_t index)

@@ -19,6 +19,9 @@ fs_real *fs_param_place(fs_loops *loops, uint16_t index);
 /* The number itself; 0 for an index beyond the table. */
 fs_real fs_param_value(const fs_loops *loops, uint16_t index);
 
+/* Whether each pair of numbers is in order: 1 or 0. */
+uint16_t fs_param_is_consistent(const fs_loops *loops);
+
 /* The memory that a gain multiplies; NULL when it multiplies none. */
 fs_real *fs_param_integral(fs_loops *loops, uint16_t index);
 

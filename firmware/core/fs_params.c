@@ -99,6 +99,7 @@ uint16_t fs_param_set(fs_loops *loops, uint16_t index, fs_real value)
 {
     fs_real *place = fs_param_place(loops, index), *integral = fs_param_integral(loops, index);
     const fs_param_spec *spec;
+    fs_real before;
 
     if (place == NULL) {
         return FS_PARAM_REFUSED;
@@ -110,10 +111,15 @@ uint16_t fs_param_set(fs_loops *loops, uint16_t index, fs_real value)
     if (spec->is_whole && value != (fs_real)(uint16_t)value) {
         return FS_PARAM_REFUSED;
     }
-    if (integral != NULL && (value < *place || value > *place)) { /* x * gain / gain may differ from x */
-        *integral = carried_over(*integral, *place, value);
-    }
+    before = *place;
     *place = value; /* also 0 in place of -0, which are equal: what is read back shall be what was set */
+    if (!fs_param_is_consistent(loops)) {
+        *place = before;
+        return FS_PARAM_REFUSED;
+    }
+    if (integral != NULL && (value < before || value > before)) { /* x * gain / gain may differ from x */
+        *integral = carried_over(*integral, before, value);
+    }
     derive(loops);
     return FS_PARAM_DONE;
 }

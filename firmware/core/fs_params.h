@@ -24,7 +24,8 @@ fs_real fs_param_get(const fs_loops *loops, uint16_t index);
 
 /*
  * Change a parameter from the next tick on. FS_PARAM_REFUSED, and nothing is changed, for a value that is out of
- * range, not finite, or not whole where it must be.
+ * range, not finite, not whole where it must be, or on the wrong side of another parameter: the least thrust must not be
+ * above the largest one.
  *
  * An integral that the gain multiplies is scaled, so that the product stays. Another attitude law starts without
  * memory.

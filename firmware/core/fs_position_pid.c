@@ -8,7 +8,7 @@
 #include "fs_math.h"
 #include "fs_portable_math.h"
 
-/* position_pid.py:57 */
+/* position_pid.py:60 */
 static void horizontal_demand(const fs_position_memory *memory, const fs_vehicle_state *state,
                               const fs_position_setpoint *setpoint, const fs_position_params *params,
                               fs_real *north_out, fs_real *east_out)
@@ -31,7 +31,7 @@ static void horizontal_demand(const fs_position_memory *memory, const fs_vehicle
  * tangents of the half angles are -forward / (level + upward) and right / (whole + level), without cancellation. One
  * common scale converts them to sines and cosines.
  *
- * position_pid.py:122
+ * position_pid.py:125
  */
 static fs_quaternion attitude_along(fs_real forward, fs_real right, fs_real upward, fs_real half_yaw_sine,
                                     fs_real half_yaw_cosine)
@@ -57,7 +57,7 @@ static fs_quaternion attitude_along(fs_real forward, fs_real right, fs_real upwa
     };
 }
 
-/* position_pid.py:147 */
+/* position_pid.py:150 */
 static fs_attitude_target target_for(fs_real north, fs_real east, fs_real lift, fs_real yaw_rad,
                                      const fs_vehicle_state *state, const fs_position_params *params)
 {
@@ -79,13 +79,13 @@ static fs_attitude_target target_for(fs_real north, fs_real east, fs_real lift, 
     };
 }
 
-/* position_pid.py:68 */
+/* position_pid.py:71 */
 static fs_real bounded(fs_real value, fs_real limit)
 {
     return fs_min(fs_max(value, -limit), limit);
 }
 
-/* position_pid.py:73 */
+/* position_pid.py:76 */
 void fs_position_pid_step(const fs_position_memory *memory, const fs_vehicle_state *state,
                           const fs_position_setpoint *setpoint, const fs_position_params *params, fs_real dt_s,
                           fs_real thrust_saturation, fs_position_memory *memory_out, fs_attitude_target *target_out)

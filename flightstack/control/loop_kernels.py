@@ -157,10 +157,8 @@ def outer_kernel(
         is_valid = is_valid and math.isfinite(value)
     if not is_valid:
         return
-    for index in range(POSITION_MEMORY_SIZE):
-        memory[index] = advanced[index]
-    for index in range(GUIDANCE_MEMORY_SIZE):
-        memory[POSITION_MEMORY_SIZE + index] = guided[index]
+    store(memory, advanced)
+    store(memory[POSITION_MEMORY_SIZE:], guided)
     store_attitude_target(target, new_target)
 
 
@@ -205,7 +203,11 @@ def _status(row: FloatArray) -> int:
 
 
 def inner_layout(rotors: int, attitude: ControlLaw, mixer: ControlLaw) -> np.dtype[np.void]:
-    """Return the layout of the inner loop's memory: one record, because each array argument costs time."""
+    """Return the layout of the inner loop's memory: one record, because each array argument costs time.
+
+    ``last`` is the row of the previous tick: it provides saturation and Ω_r, and is repeated with a status bit if an
+    input or a result is not finite.
+    """
     return np.dtype(
         [
             # state
@@ -278,6 +280,16 @@ def _attitude_inputs(
 
 
 @compiled
+def _is_reference_finite(memory: ReferenceMemory, reference: AttitudeReference) -> bool:
+    return (
+        all_finite(memory)
+        and all_finite(reference.attitude)
+        and _is_finite(reference.rates_frd_rad_s)
+        and _is_finite(reference.acceleration_frd_rad_s2)
+    )
+
+
+@compiled
 def _repeat(row: FloatArray, last: FloatArray, status: int) -> None:
     store(row, last)
     store_status(row, status)
@@ -305,11 +317,9 @@ def _store_row(
 def inner_kernel(
     state: FloatArray, fraction: float, rotor_speed_rad_s: FloatArray, memory: RecordArray, row: FloatArray
 ) -> None:
-    """Run reference filter, attitude law and mixer; write ``row`` (48,) and update ``memory`` (1,).
+    """Run reference filter, attitude law and mixer; write ``row`` (48,) and update ``memory`` of ``inner_layout``.
 
-    ``memory`` has the layout of ``inner_layout``. Its ``last`` is the row of the previous tick: it provides saturation
-    and Ω_r, and is repeated with a status bit if an input or a result is not finite. ``fraction`` is the elapsed part
-    of the outer period.
+    ``fraction`` is the elapsed part of the outer period.
     """
     m = memory[0]
     target, last, work, dt_s = m["target"], m["last"], m["work"], m["dt_s"]
@@ -326,7 +336,7 @@ def inner_kernel(
     controller_memory = ControllerMemory(*as_tuple(m["attitude"], CONTROLLER_MEMORY_SIZE))
     controller_params = ControllerParams(*as_tuple(m["attitude_params"], CONTROLLER_PARAMS_SIZE))
     advanced, torque = controller_step(controller_memory, inputs, controller_params, dt_s)
-    is_valid = _is_finite(torque)
+    is_valid = _is_reference_finite(filtered, inputs.reference) and _is_finite(torque)
     for value in advanced:
         is_valid = is_valid and math.isfinite(value)
     if not is_valid:
@@ -343,9 +353,7 @@ def inner_kernel(
         _repeat(row, last, OUTPUT_NOT_FINITE)
         return
     store(m["reference"], filtered)
-    for index in range(CONTROLLER_MEMORY_SIZE):
-        m["attitude"][index] = advanced[index]
-    for index in range(MIXER_MEMORY_SIZE):
-        m["mixer"][index] = mixed[index]
+    store(m["attitude"], advanced)
+    store(m["mixer"], mixed)
     _store_row(row, state, inputs.reference, demanded, achieved, mixer.spin.size, rotor_speed_rad_s)
     store(last, row)

@@ -47,8 +47,11 @@ POSITION_TUNABLES = (
     Tunable("ki_z", "POS_Z_I", 0.0, 1e3, "1/s^3", "Vertical acceleration per integral of the altitude error"),
     Tunable("kd_z", "POS_Z_D", 0.0, 1e3, "1/s", "Vertical acceleration per climb rate error"),
     Tunable("max_integral_m_s2", "POS_I_MAX", 0.0, 20.0, "m/s^2", "Largest acceleration by an integral, per axis"),
+    Tunable(
+        "max_thrust_n", "POS_THR_MAX", 0.0, 1e3, "N", "Largest thrust that the position loop asks for",
+        at_least="POS_THR_MIN",
+    ),
     Tunable("min_thrust_n", "POS_THR_MIN", 0.0, 1e3, "N", "Least thrust that the position loop asks for"),
-    Tunable("max_thrust_n", "POS_THR_MAX", 0.0, 1e3, "N", "Largest thrust that the position loop asks for"),
 )  # fmt: skip
 """Tunable fields of ``PositionParams``; the largest tilt is MPC_TILTMAX_AIR, in degrees."""
 

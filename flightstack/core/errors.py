@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 # the packages of the extras by name: ``pip install 'flightstack[…]'`` needs a release on PyPI
 INSTALL_MULTIBODY = "pip install mujoco pillow imageio-ffmpeg"
-INSTALL_FIRMWARE = "pip install ziglang unicorn"
+INSTALL_FIRMWARE = "pip install ziglang unicorn pyelftools"
 
 
 class ConfigError(Exception):

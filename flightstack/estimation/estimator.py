@@ -115,7 +115,7 @@ MEMORY = np.dtype(
         ("h", "f8", (ERROR_STATES,)),
         ("ph", "f8", (ERROR_STATES,)),
         ("gain", "f8", (ERROR_STATES,)),
-        ("time_s", "f8", (1,)),
+        ("clock", "f8", (2,)),
         ("gnss", "f8", (GNSS_ROWS, GNSS_SIZE)),
         ("mag", "f8", (MAG_ROWS, 4)),
         ("baro", "f8", (BARO_ROWS, 2)),
@@ -139,7 +139,7 @@ MEMORY = np.dtype(
 @compiled
 def filter_of(m: Record) -> Filter:
     """Return the filter's arrays of a record of ``MEMORY``."""
-    return Filter(m["nominal"], m["covariance"], m["observations"], m["h"], m["ph"], m["gain"], m["time_s"])
+    return Filter(m["nominal"], m["covariance"], m["observations"], m["h"], m["ph"], m["gain"], m["clock"])
 
 
 @compiled
@@ -218,7 +218,7 @@ def _collect(m: Record, accel: Vector3, time_s: float, dt_s: float, params: Esti
         return
     f, earth = filter_of(m), m["earth"]
     align(f, sums, read_vector(earth, 0), earth[3], params)
-    f.time_s[0] = time_s
+    f.clock[0] = time_s
     take_step(m["sums"], time_s)
     write_motion(m["output"], time_s, motion_of(read_nominal(f.nominal)))
     m["flags"][ALIGNED] = 1
@@ -251,7 +251,7 @@ def _advance(m: Record, f: Filter, r: Rings, horizon_s: float, params: Estimator
 @compiled
 def _hold_position(m: Record, f: Filter, params: EstimatorParams) -> None:
     """Hold the horizontal position while the velocity is not measured."""
-    hold, now_s = m["hold"], f.time_s[0]
+    hold, now_s = m["hold"], f.clock[0]
     is_known = now_s - f.observations[GNSS_VELOCITY, FUSED_S] < _GNSS_LOST_S
     if is_known or (m["flags"][HAS_GNSS] == 1 and deviation(f, VELOCITY, 2) < params.hold_velocity_m_s):
         hold[2] = 0.0
@@ -275,7 +275,7 @@ def _stands(m: Record, params: EstimatorParams) -> bool:
 @compiled
 def _fuse_waiting(m: Record, f: Filter, r: Rings, params: EstimatorParams) -> None:
     """Fuse all measurements that are due; drop those that are too late."""
-    now_s = f.time_s[0]
+    now_s = f.clock[0]
     for _ in range(MAG_ROWS):
         row = r.mag[slot_of(r, MAG_RING, MAG_ROWS, 0)]
         if not is_due(r, MAG_RING, row[0], now_s):
@@ -310,14 +310,14 @@ def _fuse_waiting(m: Record, f: Filter, r: Rings, params: EstimatorParams) -> No
 def _take_baro(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
     if m["flags"][HAS_BARO] == 0:
         _start_baro(m, f, row[1], params)
-    fuse_baro(f, row[1], f.time_s[0] - row[0], params)
+    fuse_baro(f, row[1], f.clock[0] - row[0], params)
 
 
 @compiled
 def _take_range(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
     if m["flags"][HAS_RANGE] == 0:
         m["ground_m"][0], m["flags"][HAS_RANGE] = f.nominal[9] + row[1], 1
-    fuse_range(f, row[1], m["ground_m"][0], f.time_s[0] - row[0], params)
+    fuse_range(f, row[1], m["ground_m"][0], f.clock[0] - row[0], params)
 
 
 @compiled
@@ -336,7 +336,7 @@ def _start_baro(m: Record, f: Filter, altitude_m: float, params: EstimatorParams
 @compiled
 def _take_gnss(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
     """Fuse a GNSS measurement; reset to it after a long time without an accepted one."""
-    now_s, o = f.time_s[0], f.observations
+    now_s, o = f.clock[0], f.observations
     if m["flags"][HAS_GNSS] == 0:
         _start_gnss(m, f, row, params)
     elapsed_s = max(0.0, row[0] - m["last_gnss_s"][0])
@@ -373,7 +373,7 @@ def _start_gnss(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) 
             p[BARO_BIAS, BARO_BIAS] += variance
         reset_variance(p, GNSS_BIAS + axis, 1, share * share * variance)
     for row_number in range(6):
-        f.observations[row_number, FUSED_S] = f.time_s[0]
+        f.observations[row_number, FUSED_S] = f.clock[0]
     m["last_gnss_s"][0] = row[0]
     m["flags"][HAS_GNSS] = 1
 
@@ -386,7 +386,7 @@ def _reset_to(m: Record, f: Filter, row: FloatArray, with_velocity: bool) -> Non
     for axis in range(2):
         resets[POSITION_RESET + 1 + axis] = row[1 + axis] - f.nominal[7 + axis]
         f.nominal[7 + axis], f.nominal[25 + axis] = row[1 + axis], 0.0
-        f.observations[GNSS_POSITION + axis, FUSED_S] = f.time_s[0]
+        f.observations[GNSS_POSITION + axis, FUSED_S] = f.clock[0]
     resets[POSITION_RESET + 3] = 0.0
     reset_variance(f.covariance, POSITION, 2, accuracy_m * accuracy_m)
     reset_variance(f.covariance, GNSS_BIAS, 2, 1e-4)
@@ -395,7 +395,7 @@ def _reset_to(m: Record, f: Filter, row: FloatArray, with_velocity: bool) -> Non
         for axis in range(3):
             resets[VELOCITY_RESET + 1 + axis] = row[4 + axis] - f.nominal[4 + axis]
             f.nominal[4 + axis] = row[4 + axis]
-            f.observations[GNSS_VELOCITY + axis, FUSED_S] = f.time_s[0]
+            f.observations[GNSS_VELOCITY + axis, FUSED_S] = f.clock[0]
         reset_variance(f.covariance, VELOCITY, 3, max(row[9], 0.3) * max(row[9], 0.3))
 
 
@@ -408,7 +408,7 @@ def _reset_height(m: Record, f: Filter, row: FloatArray) -> None:
     f.nominal[9], f.nominal[27] = row[3], 0.0
     reset_variance(f.covariance, POSITION + 2, 1, accuracy_m * accuracy_m)
     reset_variance(f.covariance, GNSS_BIAS + 2, 1, 1e-4)
-    f.observations[GNSS_POSITION + 2, FUSED_S] = f.time_s[0]
+    f.observations[GNSS_POSITION + 2, FUSED_S] = f.clock[0]
     m["flags"][HAS_BARO] = 0
 
 
@@ -436,6 +436,7 @@ class Estimator:
         record: Any = self.memory[0]
         record["params"] = self.params
         record["sums"][1] = 1.0
+        record["clock"][1] = self.params.imu_noise_share
         self.frame: LocalFrame | None = None
         self._record = record
         self._imu = np.zeros(IMU_SIZE)
@@ -451,6 +452,10 @@ class Estimator:
     def set_landed(self, landed: bool) -> None:
         """Tell the filter whether the vehicle stands on the ground."""
         self._record["flags"][LANDED] = landed
+
+    def set_declination(self, declination_rad: float) -> None:
+        """Set the magnetic declination, which holds until the Earth's field is known."""
+        self._record["earth"][3] = declination_rad
 
     def set_earth_field(self, field_ned_gauss: Vector3) -> None:
         """Set the Earth's magnetic field at the place of the vehicle, from the World Magnetic Model."""

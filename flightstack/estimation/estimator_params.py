@@ -11,10 +11,12 @@ class EstimatorParams(NamedTuple):
     # process
     gyro_noise: float = 0.0008  # rad/s/√Hz
     accel_noise: float = 0.012  # m/s²/√Hz
+    imu_noise_share: float = 0.1
+    """Share of the measured noise of the IMU that counts at the start."""
     gyro_bias_walk: float = 3e-4  # rad/s/√s
     accel_bias_walk: float = 1e-3  # m/s²/√s
     earth_field_walk: float = 1e-4  # gauss/√s
-    body_field_walk: float = 2e-4  # gauss/√s
+    body_field_walk: float = 2e-3  # gauss/√s
     wind_walk: float = 0.05  # m/s/√s
     baro_walk: float = 0.03  # m/√s
     # initial uncertainty
@@ -24,7 +26,7 @@ class EstimatorParams(NamedTuple):
     earth_field_gauss: float = 0.005
     field_scale: float = 0.1
     """Error of the magnetometer's scale, which the filter counts as an error of the Earth's field along itself."""
-    body_field_gauss: float = 0.03
+    body_field_gauss: float = 0.015
     # GNSS
     gnss_delay_s: float = 0.11
     gnss_velocity_noise_m_s: float = 0.05

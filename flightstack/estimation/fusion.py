@@ -29,8 +29,9 @@ from flightstack.estimation.kalman import (
     GNSS_POSITION,
     GNSS_VELOCITY,
     HOLD_POSITION,
+    INNOVATION,
+    INNOVATION_VARIANCE,
     MAG,
-    NOISE,
     RANGE,
     REST_RATE,
     REST_VELOCITY,
@@ -44,6 +45,8 @@ from flightstack.estimation.prediction import DeltaSample
 
 GNSS_SIZE = 10
 """Array form of a GNSS measurement: time, position NED, velocity NED, eph, epv, speed accuracy."""
+_CONFIRMATION, _LEAST_SHARE = 0.02, 0.01
+
 GnssRow: TypeAlias = Annotated[FloatArray, GNSS_SIZE]
 
 
@@ -69,28 +72,34 @@ def _drift_gnss_bias(
 
 
 @compiled
+def _confirm_imu_noise(f: Filter, row: int) -> None:
+    """Adapt the share of the measured IMU noise that counts, so that innovations have their predicted variance.
+
+    Fast motion and vibration look like noise of the IMU, but do not add up to an error of the velocity.
+    """
+    o = f.observations
+    ratio = min(o[row, INNOVATION] * o[row, INNOVATION] / o[row, INNOVATION_VARIANCE], 6.0)
+    f.clock[1] = min(max(f.clock[1] * (1.0 + _CONFIRMATION * (ratio - 1.0)), _LEAST_SHARE), 1.0)
+
+
+@compiled
 def fuse_gnss(f: Filter, row: GnssRow, age_s: float, elapsed_s: float, params: EstimatorParams) -> None:
     """Fuse position and velocity, measured ``age_s`` before the time of the state."""
     eph_m, epv_m = _accuracy(row[7], 5.0), _accuracy(row[8], 8.0)
     speed_m_s = _accuracy(row[9], 0.5)
     _drift_gnss_bias(f, elapsed_s, eph_m, epv_m, params)
-    o = f.observations
     for axis in range(3):
-        noise = Noise(
-            params.gnss_velocity_noise_m_s,
-            max(2.0 * speed_m_s, params.gnss_velocity_noise_m_s),
-            params.gnss_velocity_gate,
-        )
-        if o[GNSS_VELOCITY + axis, NOISE] == 0.0:
-            o[GNSS_VELOCITY + axis, NOISE] = speed_m_s * speed_m_s
+        least = params.gnss_velocity_noise_m_s
+        noise = Noise(least, speed_m_s, max(2.0 * speed_m_s, least), params.gnss_velocity_gate, 0.0)
         clear(f.h)
         f.h[VELOCITY + axis] = 1.0
-        fuse(f, GNSS_VELOCITY + axis, row[4 + axis] - f.nominal[4 + axis], noise, 0.0)
+        if fuse(f, GNSS_VELOCITY + axis, row[4 + axis] - f.nominal[4 + axis], noise, 0.0):
+            _confirm_imu_noise(f, GNSS_VELOCITY + axis)
     for axis in range(3):
         accuracy_m = epv_m if axis == 2 else eph_m
-        noise = Noise(params.gnss_position_noise_m, 2.0 * accuracy_m, params.gnss_position_gate)
-        if o[GNSS_POSITION + axis, NOISE] == 0.0:
-            o[GNSS_POSITION + axis, NOISE] = accuracy_m * accuracy_m
+        noise = Noise(
+            params.gnss_position_noise_m, accuracy_m, 2.0 * accuracy_m, params.gnss_position_gate, 0.0
+        )
         clear(f.h)
         f.h[POSITION + axis] = 1.0
         f.h[GNSS_BIAS + axis] = 1.0
@@ -105,7 +114,7 @@ def fuse_baro(f: Filter, altitude_m: float, age_s: float, params: EstimatorParam
     f.h[POSITION + 2] = -1.0
     f.h[BARO_BIAS] = 1.0
     predicted_m = -(f.nominal[9] - age_s * f.nominal[6]) + f.nominal[24]
-    noise = Noise(params.baro_noise_m, params.baro_largest_noise_m, params.baro_gate)
+    noise = Noise(params.baro_noise_m, 1.0, params.baro_largest_noise_m, params.baro_gate, 0.0)
     fuse(f, BARO, altitude_m - predicted_m, noise, 0.0)
 
 
@@ -119,14 +128,15 @@ def fuse_range(f: Filter, distance_m: float, ground_m: float, age_s: float, para
     clear(f.h)
     f.h[POSITION + 2] = -1.0
     height_m = ground_m - (n.position_ned_m.z - age_s * n.velocity_ned_m_s.z)
-    noise = Noise(params.range_noise_m, 1.0, params.range_gate)
+    noise = Noise(params.range_noise_m, params.range_noise_m, 1.0, params.range_gate, 0.0)
     fuse(f, RANGE, distance_m * cos_tilt - height_m, noise, 0.0)
 
 
 @compiled
 def fuse_field(f: Filter, measured: Vector3, params: EstimatorParams) -> None:
     """Fuse the magnetic field in the body frame, axis by axis."""
-    noise = Noise(params.mag_noise_gauss, params.mag_largest_noise_gauss, params.mag_gate)
+    largest = params.mag_largest_noise_gauss
+    noise = Noise(params.mag_noise_gauss, largest, largest, params.mag_gate, 1.0)
     holds = 1.0 - params.mag_corrects_tilt
     for axis in range(3):
         n = read_nominal(f.nominal)
@@ -147,7 +157,9 @@ def fuse_yaw(f: Filter, yaw_rad: float, noise_rad: float, gate: float) -> None:
     n = read_nominal(f.nominal)
     clear(f.h)
     yaw_jacobian(n.attitude, f.h)
-    fuse(f, YAW, wrap_pi(yaw_rad - heading(n.attitude)), Noise(noise_rad, noise_rad, gate), 1.0)
+    fuse(
+        f, YAW, wrap_pi(yaw_rad - heading(n.attitude)), Noise(noise_rad, noise_rad, noise_rad, gate, 0.0), 1.0
+    )
 
 
 @compiled
@@ -160,10 +172,11 @@ def fuse_rest(f: Filter, sample: DeltaSample, params: EstimatorParams) -> None:
     innovation = Vector3(
         measured.x - n.gyro_bias_rad_s.x, measured.y - n.gyro_bias_rad_s.y, measured.z - n.gyro_bias_rad_s.z
     )
-    still = Noise(params.rest_velocity_noise_m_s, params.rest_velocity_noise_m_s, 5.0)
+    velocity = params.rest_velocity_noise_m_s
+    still = Noise(velocity, velocity, velocity, 5.0, 0.0)
     density = max(sample.gyro_density.x, sample.gyro_density.y, sample.gyro_density.z)
     deviation = params.rest_rate_noise_rad_s + math.sqrt(density / sample.dt_s)
-    rate = Noise(deviation, deviation, 3.0)
+    rate = Noise(deviation, deviation, deviation, 3.0, 0.0)
     for axis in range(3):
         clear(f.h)
         f.h[VELOCITY + axis] = 1.0
@@ -185,7 +198,7 @@ def yaw_of_field(f: Filter, measured: Vector3, declination_rad: float) -> float:
 @compiled
 def fuse_hold(f: Filter, north_m: float, east_m: float, params: EstimatorParams) -> None:
     """Fuse a horizontal position that is held without a measurement of it, which bounds velocity and tilt."""
-    noise = Noise(params.hold_noise_m, params.hold_noise_m, 100.0)
+    noise = Noise(params.hold_noise_m, params.hold_noise_m, params.hold_noise_m, 100.0, 0.0)
     for axis in range(2):
         clear(f.h)
         f.h[POSITION + axis] = 1.0

@@ -31,12 +31,15 @@ GNSS_VELOCITY, GNSS_POSITION, BARO, MAG, YAW, RANGE, REST_VELOCITY, REST_RATE, D
 HOLD_POSITION = 20
 """First row of each sensor in ``Filter.observations``."""
 
-INNOVATION, INNOVATION_VARIANCE, TEST_RATIO, FUSED_S, NOISE = 0, 1, 2, 3, 4
-OBSERVATION_COLUMNS = 5
-"""Columns: innovation, its variance, squared ratio to the gate, time of the last accepted one, noise variance."""
+INNOVATION, INNOVATION_VARIANCE, TEST_RATIO, FUSED_S, NOISE, LAGGED = 0, 1, 2, 3, 4, 5
+OBSERVATION_COLUMNS = 6
+"""Columns: innovation, its variance, squared ratio to the gate, time of the last accepted one, noise variance, mean
+product of successive innovations."""
 
 _ADAPTATION = 0.01
 """Share of an innovation in the estimate of the noise variance."""
+
+_LARGEST_CORRELATION = 0.95
 
 Observations: TypeAlias = Annotated[FloatArray, OBSERVATIONS, OBSERVATION_COLUMNS]
 
@@ -51,16 +54,19 @@ class Filter(NamedTuple):
     """Jacobian of the measurement at hand."""
     ph: ErrorVector
     gain: ErrorVector
-    time_s: Annotated[FloatArray, 1]
-    """Time of the state, at the delayed horizon."""
+    clock: Annotated[FloatArray, 2]
+    """Time of the state, at the delayed horizon; share of the measured IMU noise that innovations of GNSS confirm."""
 
 
 class Noise(NamedTuple):
     """Range of a measurement's noise [1σ]. The filter estimates the noise within it from its innovations."""
 
     least: float
+    start: float
     largest: float
     gate: float
+    is_slow: float
+    """1 if the errors of successive measurements may be alike: then correlated innovations count for less."""
 
 
 @compiled
@@ -115,14 +121,19 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
     """
     o = f.observations
     least, largest = noise.least * noise.least, noise.largest * noise.largest
-    r = min(max(o[row, NOISE], least), largest)
+    r = min(max(o[row, NOISE] if o[row, NOISE] > 0.0 else noise.start * noise.start, least), largest)
     projected = _project(f)
     variance = projected + r
+    if noise.is_slow > 0.0:
+        correlation = min(max(o[row, LAGGED] / variance, 0.0), _LARGEST_CORRELATION)
+        variance = projected + r * (1.0 + correlation) / (1.0 - correlation)
+    last = o[row, INNOVATION]
     ratio = innovation * innovation / (noise.gate * noise.gate * variance)
     o[row, INNOVATION], o[row, INNOVATION_VARIANCE], o[row, TEST_RATIO] = innovation, variance, ratio
     if not ratio <= 1.0:
         return False
     estimate = innovation * innovation - projected
+    o[row, LAGGED] += _ADAPTATION * (innovation * last - o[row, LAGGED])
     o[row, NOISE] = min(max(r + _ADAPTATION * (estimate - r), least), largest)
     for i in range(ERROR_STATES):
         f.gain[i] = f.ph[i] / variance
@@ -133,7 +144,7 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
         for i in range(12, 15):
             f.gain[i] = 0.0
     _correct(f, innovation, variance)
-    o[row, FUSED_S] = f.time_s[0]
+    o[row, FUSED_S] = f.clock[0]
     return True
 
 

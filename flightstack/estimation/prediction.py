@@ -111,17 +111,18 @@ def _add_body_noise(p: Covariance, at: int, axis: Vector3, variance: float) -> N
 
 
 @compiled
-def _add_process_noise(p: Covariance, q: Quaternion, sample: DeltaSample, params: EstimatorParams) -> None:
+def _add_process_noise(f: Filter, q: Quaternion, sample: DeltaSample, params: EstimatorParams) -> None:
+    p, share = f.covariance, f.clock[1]
     dt_s, gyro, accel = sample.dt_s, params.gyro_noise, params.accel_noise
     x = rotate(q, Vector3(1.0, 0.0, 0.0))
     y = rotate(q, Vector3(0.0, 1.0, 0.0))
     z = cross(x, y)
-    _add_body_noise(p, ATTITUDE, x, max(gyro * gyro, sample.gyro_density.x) * dt_s)
-    _add_body_noise(p, ATTITUDE, y, max(gyro * gyro, sample.gyro_density.y) * dt_s)
-    _add_body_noise(p, ATTITUDE, z, max(gyro * gyro, sample.gyro_density.z) * dt_s)
-    _add_body_noise(p, VELOCITY, x, max(accel * accel, sample.accel_density.x) * dt_s)
-    _add_body_noise(p, VELOCITY, y, max(accel * accel, sample.accel_density.y) * dt_s)
-    _add_body_noise(p, VELOCITY, z, max(accel * accel, sample.accel_density.z) * dt_s)
+    _add_body_noise(p, ATTITUDE, x, max(gyro * gyro, share * sample.gyro_density.x) * dt_s)
+    _add_body_noise(p, ATTITUDE, y, max(gyro * gyro, share * sample.gyro_density.y) * dt_s)
+    _add_body_noise(p, ATTITUDE, z, max(gyro * gyro, share * sample.gyro_density.z) * dt_s)
+    _add_body_noise(p, VELOCITY, x, max(accel * accel, share * sample.accel_density.x) * dt_s)
+    _add_body_noise(p, VELOCITY, y, max(accel * accel, share * sample.accel_density.y) * dt_s)
+    _add_body_noise(p, VELOCITY, z, max(accel * accel, share * sample.accel_density.z) * dt_s)
     _add(p, POSITION, 3, 1e-8 * dt_s)
     _add(p, GYRO_BIAS, 3, params.gyro_bias_walk * params.gyro_bias_walk * dt_s)
     _add(p, ACCEL_BIAS, 3, params.accel_bias_walk * params.accel_bias_walk * dt_s)
@@ -140,7 +141,7 @@ def predict(f: Filter, sample: DeltaSample, params: EstimatorParams) -> None:
     middle = quaternion_product(n.attitude, rotation_over(angle, 0.5))
     after = moved(motion_of(n), angle, delta_velocity, sample.dt_s, params.gravity_m_s2)
     predict_covariance(f.covariance, middle, delta_velocity, sample.dt_s)
-    _add_process_noise(f.covariance, middle, sample, params)
+    _add_process_noise(f, middle, sample, params)
     mirror(f.covariance)
     write_nominal(f.nominal, with_motion(n, after))
-    f.time_s[0] = sample.time_s
+    f.clock[0] = sample.time_s

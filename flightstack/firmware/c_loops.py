@@ -20,7 +20,7 @@ from flightstack.core.contract import (
     LoopRow,
     LoopStatus,
 )
-from flightstack.firmware.numbers import target_numbers
+from flightstack.firmware.numbers import FIRST_NUMBERS, target_numbers
 from flightstack.firmware.sources import source_hash
 from flightstack.params.spec import ParamSpec
 from flightstack.params.toml_file import Table
@@ -208,7 +208,7 @@ class HostLoops:
         real = "double" if functions.fs_sil_real_size() == 8 else "float"
         self.version = f"C, {real}, sources {source_hash().hex()}"
         functions.fs_sil_init(self._loops)
-        for name, value in numbers.items():
+        for name, value in (*FIRST_NUMBERS.items(), *numbers.items()):
             self.set(name, value)
 
     def step(self, flags: int) -> None:

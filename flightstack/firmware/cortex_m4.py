@@ -25,9 +25,9 @@ CPU = ("-target", "thumb-freestanding-eabihf", "-mcpu=cortex_m4+vfp4d16sp")
 """Target flags of zig's clang: hardware single precision; the sources use no doubles."""
 BARE = (
     "-fno-sanitize=all", "-fno-unwind-tables", "-fno-asynchronous-unwind-tables", "-ffunction-sections", "-flto",
-    "-nostdlib", "-Wl,--gc-sections", "-Wl,--build-id=none", "-Wl,-e,fs_emulated_exchange",
+    "-g", "-nostdlib", "-Wl,--gc-sections", "-Wl,--build-id=none", "-Wl,-e,fs_emulated_exchange",
 )  # fmt: skip
-"""Freestanding build with link-time optimisation."""
+"""Freestanding build with link-time optimisation, and a line table for the coverage."""
 _IMPLIED = ("__aeabi_memcpy", "__aeabi_memcpy4", "__aeabi_memclr", "__aeabi_memclr4", "__aeabi_memset4")
 """Calls added after link-time optimisation, so that their functions must be kept."""
 _PORT = "ports/cortex_m4"

@@ -12,10 +12,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import ClassVar
 
+import numpy as np
 from unicorn import Uc, UcError, arm_const, unicorn_const
 from unicorn.unicorn_py3.unicorn import uclib
 
+from flightstack.firmware.coverage import merged
 from flightstack.firmware.elf import Elf, ElfError
+from flightstack.firmware.pil_record import Trace
 
 FLASH_AT, FLASH_SIZE = 0x0000_0000, 512 * 1024
 RAM_AT, RAM_SIZE = 0x2000_0000, 128 * 1024
@@ -60,6 +63,10 @@ class _Counter(ctypes.Structure):
         ("limit", ctypes.c_uint32),
         ("reserved", ctypes.c_uint32),
     ]
+
+
+_BLOCK = np.dtype([("size", "u4"), ("instructions", "u4")])
+"""One entry of the table of blocks in ``fs_counter``, for each half-word of code; size 0: never run."""
 
 
 class Emulator:
@@ -155,6 +162,13 @@ class Emulator:
         uclib.uc_hook_del(self._engine._uch, self._hook)  # unicorn's wrapper only removes its own hooks
 
     @property
+    def executed(self) -> list[tuple[int, int]]:
+        """Addresses of the code that ran: first and end of each range."""
+        blocks = np.frombuffer(memoryview(self._table), _BLOCK, offset=ctypes.sizeof(_Counter))
+        places = np.flatnonzero(blocks["size"])
+        return merged(2 * places, blocks["size"][places])
+
+    @property
     def stack_high_water(self) -> int:
         """Maximum stack use [bytes]."""
         bottom, top = self._stack.start - RAM_AT, self._stack.stop - RAM_AT
@@ -173,6 +187,7 @@ class EmulatedTarget:
 
     def __init__(self, image: Path, counter: Path, now_s: Callable[[], float] | None = None) -> None:
         """Load the image; ``counter`` is the instruction counter's library. Raise EmulationError."""
+        self._image = image
         self._emulator = Emulator(image, counter)
         self._now_s = now_s
         self._waited_s = 0.0
@@ -202,6 +217,11 @@ class EmulatedTarget:
     def instructions(self) -> int:
         """Instructions executed since the start, modulo 2**32."""
         return int(self._emulator.mailbox.instructions)
+
+    @property
+    def trace(self) -> Trace:
+        """The image, and its code that ran until now."""
+        return Trace(str(self._image), self._emulator.executed)
 
     @property
     def stack_high_water(self) -> int:

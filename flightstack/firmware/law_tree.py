@@ -18,9 +18,10 @@ from pathlib import Path
 
 from flightstack.control.controller import AnyController, Controller, controller_of, laws_with
 from flightstack.control.controller_loading import fields_of, load_controller
-from flightstack.control.loop_parameters import LawValues
+from flightstack.control.loop_parameters import LawValues, loop_numbers, own_values
 from flightstack.core.errors import ConfigError
 from flightstack.firmware.build import COMPILE_LIMIT_S, EXACT, BuildError, cache_root, host_compiler
+from flightstack.firmware.c_loops import LoopsSetup
 from flightstack.firmware.generator.text import snake_case
 from flightstack.firmware.sources import firmware_root, source_hash, using_firmware
 
@@ -44,6 +45,13 @@ def controller_named(name: str) -> Controller:
 def is_built_in(controller: AnyController) -> bool:
     """Return True if the installation's firmware has all laws of the controller."""
     return not controller_of(controller).own_laws
+
+
+def own_params(setup: LoopsSetup) -> dict[str, str]:
+    """Return the entry ``law_params`` of a log: parameters of laws that are not built-in; empty without such a law."""
+    numbers = loop_numbers(setup.vehicle, setup.controller, setup.gains, setup.max_tilt_rad, setup.given)
+    own = own_values(numbers, setup.controller)
+    return {"law_params": json.dumps(own)} if own else {}
 
 
 def logged_params(controller: Controller, text: str, log: Path) -> LawValues:

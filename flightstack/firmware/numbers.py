@@ -73,6 +73,8 @@ class TargetNumber(NamedTuple):
     is_whole: bool = False
     integral: str = ""
     """Member that this gain multiplies, scaled when the gain changes; see ``Tunable.integrates``."""
+    at_least: str = ""
+    """Number that this one must not be below."""
 
 
 def law_name(law: ControlLaw) -> str:
@@ -84,7 +86,7 @@ def _tunable(tunable: Tunable, law: str, memory: str) -> TargetNumber:
     stretched = tunable.name.startswith(_STRETCHED)
     integral = f"{memory}.{identifier(tunable.integrates)}" if tunable.integrates else ""
     place, high = f"{law}.{identifier(tunable.field)}", WIDEST if stretched else tunable.high
-    return TargetNumber(tunable.name, place, tunable.low, high, integral=integral)
+    return TargetNumber(tunable.name, place, tunable.low, high, False, integral, tunable.at_least)
 
 
 def _law_numbers(role: str, law: ControlLaw) -> Iterator[TargetNumber]:
@@ -92,7 +94,9 @@ def _law_numbers(role: str, law: ControlLaw) -> Iterator[TargetNumber]:
     member = ROLE_MEMBERS[role][0]
     for tunable in all_tunables(role, law):
         number = _tunable(tunable, f"{member}.{law_name(law)}", f"{member}_memory.{law_name(law)}")
-        yield number if is_built_in(role, law) else number._replace(low=-UNBOUNDED, high=UNBOUNDED)
+        yield (
+            number if is_built_in(role, law) else number._replace(low=-UNBOUNDED, high=UNBOUNDED, at_least="")
+        )
 
 
 def all_tunables(role: str, law: ControlLaw) -> tuple[Tunable, ...]:
@@ -157,6 +161,9 @@ def _indices(laws: Laws) -> Iterator[TargetNumber]:
 
 TARGET_NUMBERS = declared(BUILT_IN)
 """Numbers of a target with the built-in laws."""
+_LEAST = frozenset(number.at_least for number in TARGET_NUMBERS)
+FIRST_NUMBERS = {number.name: number.low for number in TARGET_NUMBERS if number.name in _LEAST}
+"""Numbers to set before all others: a pair then fits whatever the target had; the larger one comes first in a table."""
 
 
 def target_numbers(

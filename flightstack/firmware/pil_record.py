@@ -6,7 +6,7 @@ import io
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -31,6 +31,24 @@ STEP_ROW = np.dtype(
 of attempts, and wall time from the first attempt to the report."""
 
 
+class Trace(NamedTuple):
+    """Code of an emulated target that ran."""
+
+    image: str
+    """Path of the ELF file."""
+    executed: list[tuple[int, int]]
+    """First address and end of each range."""
+
+
+@runtime_checkable
+class TracedLink(Protocol):
+    """A link to a target whose execution is observed."""
+
+    @property
+    def trace(self) -> Trace:
+        """What ran until now."""
+
+
 class PilRecord:
     """Rows of all steps, and information about target and link."""
 
@@ -53,6 +71,8 @@ class PilRecord:
         """FS_PIL_STATUS after the last step, or None."""
         self.free_running: dict[str, Any] | None = None
         """Figures of a free-running target, see ``free_running.FreeRunning.figures``, or None."""
+        self.trace: Trace | None = None
+        """Executed code of an emulated target, or None."""
 
     def add(self, flags: int, report: PilReport, attempts: int, round_trip_s: float) -> None:
         """Record a step; discard a single trial step before the first flight."""
@@ -82,6 +102,7 @@ class PilRecord:
             "status": self.status,
             "free_running": self.free_running,
             "ending": ending,
+            "trace": None if self.trace is None else self.trace._asdict(),
         }
 
     def write(self, log: Path, counters: PilCounters, texts: list[str], ending: str | None) -> None:

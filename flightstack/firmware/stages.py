@@ -19,7 +19,7 @@ from flightstack.control.attitude_reference import (
     attitude_reference_step,
     in_body_frame,
 )
-from flightstack.control.control_law import NoMemory, NoParams
+from flightstack.control.control_law import CStep, NoMemory, NoParams
 from flightstack.control.controller import ATTITUDE, GUIDANCE, MIXER, POSITION, Controller, controller_of
 from flightstack.control.controller_loading import check_python
 from flightstack.control.loop_kernels import (
@@ -285,7 +285,7 @@ class StageModel:
         vehicle, controller = setup.vehicle, controller_of(setup.controller)
         check_python(controller)
         laws = controller.laws
-        numbers = loop_numbers(vehicle, controller, setup.gains, setup.max_tilt_rad)
+        numbers = loop_numbers(vehicle, controller, setup.gains, setup.max_tilt_rad, setup.given)
         self._memory = _memory_of(controller, len(vehicle.rotors), numbers)
         record = self._memory[0]
         record["dt_s"], record["outer_dt_s"] = 1.0 / setup.inner_hz, setup.divisor / setup.inner_hz
@@ -319,6 +319,11 @@ class StageModel:
         wanted = np.zeros((len(flags), OUTPUT_SIZE))
         self._kernel(inputs, flags, outputs, self._memory, wanted)
         return wanted
+
+
+def has_model(setup: LoopsSetup) -> bool:
+    """Return True if all laws are Python; one that is written in C has nothing to compare with."""
+    return not any(isinstance(law.step, CStep) for law in controller_of(setup.controller).laws.values())
 
 
 def _memory_of(controller: Controller, rotors: int, numbers: LoopNumbers) -> RecordArray:

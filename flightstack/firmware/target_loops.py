@@ -15,8 +15,9 @@ from flightstack.core.errors import TargetError, WrongFirmwareError
 from flightstack.core.float32 import as_float32
 from flightstack.firmware.c_loops import INPUT_SIZE, OUTPUT_SIZE, SETPOINT_AT, TARGET_AT
 from flightstack.firmware.identity import check_identity, described
+from flightstack.firmware.numbers import FIRST_NUMBERS
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilCounters, PilTiming
-from flightstack.firmware.pil_record import PilRecord
+from flightstack.firmware.pil_record import PilRecord, TracedLink
 from flightstack.firmware.pil_session import PilSession
 from flightstack.firmware.pil_steps import WANT_REFERENCE, StepInput
 from flightstack.firmware.sources import source_hash
@@ -75,7 +76,7 @@ class TargetLoops:
             *([] if note is None else [note]),
         ]
         self.version = f"C, float, {', '.join(details)}"
-        for name, value in numbers.items():
+        for name, value in (*FIRST_NUMBERS.items(), *numbers.items()):
             self.set(name, value)
         self.send_numbers()
 
@@ -145,6 +146,8 @@ class TargetLoops:
             responds = any(step.result is not None for step in self._client.steps)
             if self.ending is None or responds:
                 self.record.status = self._final_counters()
+            if isinstance(self._link, TracedLink):
+                self.record.trace = self._link.trace
         finally:
             self._link.close()
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from flightstack.core.atomic_file import write_text_atomically
 from flightstack.core.errors import ConfigError
 from flightstack.params.spec import LARGEST_NAME, ParamSpec
-from flightstack.params.store import ParamStore
+from flightstack.params.store import ParamStore, set_all
 
 INT32, REAL32 = 6, 9
 """MAV_PARAM_TYPE of the parameters."""
@@ -151,13 +151,14 @@ NOTHING_LOADED = LoadedParams({}, ())
 def load_into(store: ParamStore, path: Path) -> LoadedParams:
     """Set the parameters of a file; raise ConfigError for a known parameter with a bad value."""
     lines = {item.name: item for item in read_param_file(path)}
-    for item in lines.values():
-        spec = store.specs.get(item.name)
-        if spec is None:
-            continue
-        problem = _kind_problem(spec, item) or store.set(item.name, item.value)
-        if problem is not None:
-            raise ConfigError(path, f"line {item.line}", f"{item.name}: {problem}")
+    known = [item for item in lines.values() if item.name in store.specs]
+    refused = set_all(
+        known,
+        lambda item: _kind_problem(store.specs[item.name], item) or store.set(item.name, item.value),
+    )
+    if refused is not None:
+        item, problem = refused
+        raise ConfigError(path, f"line {item.line}", f"{item.name}: {problem}")
     return LoadedParams(lines, tuple(name for name in lines if name not in store.specs))
 
 

@@ -43,6 +43,8 @@ class ParamSpec(NamedTuple):
     choices: tuple[tuple[int, str], ...] = ()
     """Values of an enumeration, each with its meaning; empty for a range."""
     reboot_required: bool = False
+    at_least: str = ""
+    """Parameter that this one must not be below."""
 
     def number(self, value: float) -> float:
         """Return ``value`` as ``int`` for an integer parameter, else as ``float``."""

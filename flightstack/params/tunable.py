@@ -30,6 +30,8 @@ class Tunable(NamedTuple):
     integrates: str = ""
     """Field of the law's memory that this gain multiplies; scaled when the gain changes so that the integral term is
     continuous."""
+    at_least: str = ""
+    """Name of the parameter that this one must not be below."""
 
 
 def spec_of(tunable: Tunable, default: float, group: str) -> ParamSpec:
@@ -43,6 +45,7 @@ def spec_of(tunable: Tunable, default: float, group: str) -> ParamSpec:
         tunable.help,
         group=group,
         decimals=tunable.decimals,
+        at_least=tunable.at_least,
     )
 
 

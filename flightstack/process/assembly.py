@@ -5,7 +5,6 @@ The process (``app``) and in-process tests use the same stack.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,10 +14,10 @@ from flightstack import __version__
 from flightstack.control.backend import ControlBackend
 from flightstack.control.controller import controller_of
 from flightstack.control.controller_loading import check_python, load_controller
-from flightstack.control.loop_parameters import loop_numbers, own_values
+from flightstack.control.loop_parameters import loop_numbers
 from flightstack.firmware.c_loops import LoopsSetup
 from flightstack.firmware.choice import PYTHON, parse_loops
-from flightstack.firmware.law_tree import law_tree
+from flightstack.firmware.law_tree import law_tree, own_params
 from flightstack.firmware.targets import make_loops
 from flightstack.flight_log.flight_log import vehicle_fields
 from flightstack.flight_log.recorder import FlightRecorder, OpenLog
@@ -205,8 +204,6 @@ def _log_info(
     ``law_params`` has the parameters of laws from other packages at the start, which a replay needs: not all are
     parameters of the vehicle.
     """
-    numbers = loop_numbers(setup.vehicle, setup.controller, setup.gains, setup.max_tilt_rad)
-    own = own_values(numbers, setup.controller)
     return {
         "sys_name": "flightstack",
         "ver_sw": __version__,
@@ -217,7 +214,7 @@ def _log_info(
         "ver_loops": loops_version,
         "inner_hz": loop_rates.inner_hz,
         "outer_hz": loop_rates.outer_hz,
-        **({"law_params": json.dumps(own)} if own else {}),
+        **own_params(setup),
     }
 
 

@@ -2,6 +2,9 @@
 
 It requests FS_PLANT_STATE (full precision, one frame each way per step), or PX4's HIL_STATE_QUATERNION from simulators
 that do not support it, and answers with FS_ACTUATORS or HIL_ACTUATOR_CONTROLS accordingly.
+
+A vehicle that flies on its sensors requests HIL_SENSOR as well, and takes its time from it, as PX4 does. It needs no
+state: a simulator that speaks PX4's contract alone is answered with HIL_ACTUATOR_CONTROLS.
 """
 
 from __future__ import annotations
@@ -14,11 +17,13 @@ import numpy as np
 from flightstack.core.contract import MAX_ROTORS, STATE_SIZE, FloatArray
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.mavlink.dialect import FS_PLANT_STATE_ID, mavlink
-from flightstack.mavlink.frames import FrameFinder
+from flightstack.mavlink.frames import CHECKSUM_SIZE, HEADER_V2, MAGIC_V2, FrameFinder
 from flightstack.mavlink.link import Link, Message
 from flightstack.params.vehicle import Vehicle, system_type
 from flightstack.simulator_link.battery_frame import UNUSED_CELL, BatteryReport, decode_battery, report_of
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame, PlantStateFrame
+from flightstack.simulator_link.sensor_frames import HIL_SENSOR_ID
+from flightstack.simulator_link.sensor_inbox import SensorInbox
 from flightstack.simulator_link.state_steps import StateSteps
 
 HIL_ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED | mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
@@ -54,7 +59,8 @@ NEW_STATE = Freshness(0, 0)
 class SimulatorEndpoint:
     """Decodes states from the simulator and encodes the answers.
 
-    ``state`` (13,) and ``rotor_speed_rad_s`` (8,) are updated in place.
+    ``state`` (13,) and ``rotor_speed_rad_s`` (8,) are updated in place. With ``uses_sensors`` the estimator writes
+    ``state``, and ``truth`` is the simulator's.
 
     ``time_us`` is the simulated time since boot: 0 at the first state, then advanced by the steps between states. A
     step back, or one longer than ``LONGEST_STEP_US`` (such as after a simulator restart), is counted in ``time_jumps``:
@@ -62,7 +68,13 @@ class SimulatorEndpoint:
     """
 
     def __init__(
-        self, vehicle: Vehicle, home: GeoPoint, lockstep: bool, system_id: int = 1, interval_us: int = 2000
+        self,
+        vehicle: Vehicle,
+        home: GeoPoint,
+        lockstep: bool,
+        system_id: int = 1,
+        interval_us: int = 2000,
+        uses_sensors: bool = False,
     ) -> None:
         self._link = Link(system_id, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self._plant = PlantStateFrame()
@@ -72,9 +84,13 @@ class SimulatorEndpoint:
         self._frame = LocalFrame(home)
         self._max_speed_rad_s = np.array([min(r.max_speed_rad_s, 1e6) for r in vehicle.rotors])
         self._lockstep = LOCKSTEP_FLAG if lockstep else 0
-        self._uses_hil = False
-        self.state: FloatArray = self._plant.state
-        self.state[6] = 1.0
+        self.sensors = SensorInbox() if uses_sensors else None
+        """Messages of the sensors, of a vehicle that flies on them."""
+        self._uses_hil = uses_sensors  # until the simulator sends FS_PLANT_STATE
+        self.truth: FloatArray = self._plant.state
+        """True state, shape (13,)."""
+        self.truth[6] = 1.0
+        self.state: FloatArray = self.truth.copy() if uses_sensors else self.truth
         self.rotor_speed_rad_s = self._plant.rotor_speed_rad_s
         self.time_us = 0
         self.time_jumps = 0
@@ -97,14 +113,15 @@ class SimulatorEndpoint:
 
     def resume(self, other: SimulatorEndpoint) -> None:
         """Continue the connection of another endpoint after a reboot."""
-        self.state[:] = other.state
+        self.state[:], self.truth[:] = other.state, other.truth
         self.rotor_speed_rad_s[:] = other.rotor_speed_rad_s
         self._state_us = other._state_us  # the vehicle clock restarts
         self.battery, self.has_state, self._uses_hil = other.battery, other.has_state, other._uses_hil
 
     def initial_requests(self, interval_us: int) -> bytes:
-        """Return the messages to send after connecting: a heartbeat and a request for FS_PLANT_STATE."""
-        return self.heartbeat(False) + self._request(FS_PLANT_STATE_ID, interval_us)
+        """Return the messages to send after connecting: a heartbeat and requests for FS_PLANT_STATE and sensors."""
+        sensors = b"" if self.sensors is None else self._request(HIL_SENSOR_ID, interval_us)
+        return self.heartbeat(False) + self._request(FS_PLANT_STATE_ID, interval_us) + sensors
 
     def fallback_request(self, interval_us: int) -> bytes:
         """Return the request for PX4's HIL_STATE_QUATERNION."""
@@ -134,6 +151,8 @@ class SimulatorEndpoint:
 
         A complete state frame is used at once: incomplete bytes before it are discarded.
         """
+        if self.sensors is not None:
+            return self._receive_sensors(data, self.sensors)
         if self._plant.open(data):
             self._take_time(self._plant.time_us)
             self._uses_hil = False
@@ -154,22 +173,55 @@ class SimulatorEndpoint:
         self._take_battery(report)
         return True
 
+    def _receive_sensors(self, data: memoryview, sensors: SensorInbox) -> bool:
+        """Process the frames of an exchange one after another, and anything else with the general decoder."""
+        fresh, at, end, battery = False, 0, len(data), None
+        while not self.finder.partial_size and end - at > HEADER_V2 and data[at] == MAGIC_V2:
+            size = HEADER_V2 + data[at + 1] + CHECKSUM_SIZE
+            frame = data[at : at + size]
+            is_clock = sensors.open(frame)
+            if is_clock:
+                self._take_clock(sensors)
+                fresh = True
+            elif is_clock is None:
+                if self._plant.open(frame):
+                    self._uses_hil = False
+                elif (report := decode_battery(frame)) is not None:
+                    battery = report
+                else:
+                    break
+            at += size
+        if at < end:
+            fresh = self._receive_any(data[at:]) or fresh
+        if battery is not None:
+            self._take_battery(battery)
+        return fresh
+
+    def _take_clock(self, sensors: SensorInbox) -> None:
+        before_us = self.time_us
+        self._take_time(sensors.clock_us)
+        sensors.stamp(self.time_us, self.time_us - before_us)
+
     def _receive_any(self, data: memoryview) -> bool:
         fresh = False
         battery: BatteryReport | None = None
         for frame in self.finder.find(data):
             if self._plant.open(frame):
-                self._take_time(self._plant.time_us)
                 self._uses_hil = False
-                fresh = True
+                if self.sensors is None:
+                    self._take_time(self._plant.time_us)
+                    fresh = True
                 continue
             for message in self._link.decode(frame):
                 kind = message.get_msgId()
                 if kind == FS_PLANT_STATE_ID:
                     self._take_plant_state(message)
-                    fresh = True
+                    fresh = fresh or self.sensors is None
                 elif kind == mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION:
                     self._take_hil(message)
+                    fresh = fresh or self.sensors is None
+                elif self.sensors is not None and self.sensors.take_message(message):
+                    self._take_clock(self.sensors)
                     fresh = True
                 elif kind == mavlink.MAVLINK_MSG_ID_BATTERY_STATUS:
                     battery = report_of(message)
@@ -266,17 +318,19 @@ class SimulatorEndpoint:
     def _take_plant_state(self, m: Message) -> None:
         """Process a state of the general decoder: its frame may be signed or truncated."""
         self._uses_hil = False
-        self.state[:] = (*m.position_ned_m, *m.velocity_ned_m_s, *m.q, *m.rates_frd_rad_s)
+        self.truth[:] = (*m.position_ned_m, *m.velocity_ned_m_s, *m.q, *m.rates_frd_rad_s)
         self.rotor_speed_rad_s[:] = m.rotor_speed_rad_s
-        self._take_time(m.time_us)
+        if self.sensors is None:
+            self._take_time(m.time_us)
 
     def _take_hil(self, m: Message) -> None:
-        self._uses_hil = True
+        self._uses_hil = True if self.sensors is None else self._uses_hil
         position = self._frame.to_ned(GeoPoint(m.lat / 1e7, m.lon / 1e7, m.alt / 1e3))
         velocity = (m.vx / 100.0, m.vy / 100.0, m.vz / 100.0)
         rates = (m.rollspeed, m.pitchspeed, m.yawspeed)
-        self.state[:STATE_SIZE] = (*position, *velocity, *m.attitude_quaternion, *rates)
-        self._take_time(m.time_usec)
+        self.truth[:STATE_SIZE] = (*position, *velocity, *m.attitude_quaternion, *rates)
+        if self.sensors is None:
+            self._take_time(m.time_usec)
 
     def answer(self, rotor_speed_rad_s: FloatArray, armed: bool) -> bytes | memoryview:
         """Return the answer to the newest state with commanded rotor speeds (8,)."""

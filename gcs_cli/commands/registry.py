@@ -67,6 +67,9 @@ class GcsGroup(LazyGroup):
         ),
         "report": LazyCommand("gcs_cli.commands.report", "Write the report page of a flight from its log."),
         "compare": LazyCommand("gcs_cli.commands.compare", "Compare two or more flights."),
+        "estimate": LazyCommand(
+            "gcs_cli.commands.estimate", "Estimate the state of a vehicle from the sensors of its log."
+        ),
     }
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import os
 import shutil
 import sys
 from typing import Annotated
@@ -84,6 +86,7 @@ def watch_screen(connection: Connection, screen: str = SCREENS[0].mode) -> None:
     from gcs_cli.tui.app import WatchApp
     from gcs_cli.tui.feed import Feed
 
+    _follow_terminal_size()
     feed = Feed(connection)
     view = WatchApp(feed, screen)
     view.run()
@@ -91,6 +94,17 @@ def watch_screen(connection: Connection, screen: str = SCREENS[0].mode) -> None:
         raise feed.error
     if view.return_code:
         raise typer.Exit(FAILED)
+
+
+def _follow_terminal_size() -> None:
+    """Forget COLUMNS and LINES of the environment: Textual would prefer them to the size of the terminal.
+
+    GNU Readline sets both in any program that loads it, for the programs that it starts.
+    """
+    with contextlib.suppress(OSError, ValueError):  # not on a terminal
+        if os.get_terminal_size(sys.stdout.fileno()).columns > 0:
+            os.environ.pop("COLUMNS", None)
+            os.environ.pop("LINES", None)
 
 
 def _print_once(connection: Connection, screen: str) -> None:

@@ -1,7 +1,8 @@
-"""Read any log: ULog by its first bytes, else a tlog."""
+"""Read any log, also compressed with xz: ULog by its first bytes, else a tlog."""
 
 from __future__ import annotations
 
+import lzma
 from pathlib import Path
 
 from flightstack.core.errors import ConfigError
@@ -12,6 +13,7 @@ from gcs_cli.logs.ulog_reader import read_ulog
 from gcs_cli.report.run_directory import LOG_NAME
 
 _ULOG_MAGIC = b"ULog"
+_XZ_MAGIC = b"\xfd7zXZ\x00"
 
 
 def log_file(path: Path) -> Path:
@@ -30,8 +32,12 @@ def read_log(path: Path) -> Recording:
     file = log_file(path)
     try:
         content = file.read_bytes()
+        if content.startswith(_XZ_MAGIC):
+            content = lzma.decompress(content)
     except OSError as error:
         raise CliError(f"{file}: cannot be read: {error.strerror}", USAGE) from None
+    except (lzma.LZMAError, EOFError) as error:
+        raise CliError(f"{file}: cannot be decompressed: {error}", USAGE) from None
     try:
         return (read_ulog if content.startswith(_ULOG_MAGIC) else read_tlog)(content, str(file))
     except ConfigError as error:

@@ -13,6 +13,7 @@ from flightstack.core.contract import FloatArray
 AnyArray: TypeAlias = np.ndarray[Any, np.dtype[Any]]
 
 ULOG, TLOG = "ULog", "tlog"
+_YEAR_S = 365.2425 * 86400.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +105,12 @@ class Recording:
     def duration_s(self) -> float:
         """From the first to the last sample."""
         return (self.end_us - self.start_us) * 1e-6
+
+    @property
+    def year(self) -> float | None:
+        """Date of the log as a year with a fraction; None if unknown."""
+        seconds = None if self.epoch_us is None else (self.epoch_us + self.start_us) * 1e-6
+        return None if seconds is None else 1970.0 + seconds / _YEAR_S
 
     def since_start_s(self, time_us: int) -> float:
         """Return a time of the log as seconds since its start."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 import webbrowser
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -174,10 +175,24 @@ def print_outcome(console: Console, result: dict[str, Any], folder: Path) -> Non
         unit = result["profile"]["unit"]
         words = f"mean {figures['mean']:.1f}, p99 {figures['p99']:.0f}, max {figures['max']:.0f} {unit}"
         console.print(f"[bright_black]{stage:<9}[/]{words}", highlight=False)
+    for line in _code_lines(result):
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
     style = "green" if result["verdict"] == PASSED else "red"
     console.print(f"[bright_black]verdict  [/][{style}]{result['verdict']}[/]", highlight=False)
     console.print("[bright_black]files    [/]", end="")
     console.print(f"{folder}/  pil.html pil.json", markup=False, highlight=False, soft_wrap=True)
+
+
+def _code_lines(result: dict[str, Any]) -> Iterator[str]:
+    """Yield a line for each of CPU load, coverage and stack that is known."""
+    load, coverage, usage = result["load"], result["coverage"], result["stack_usage"]
+    if load is not None:
+        percent = f"mean {load['mean_percent']:.3g} %, max {load['max_percent']:.3g} %"
+        yield f"load     {percent} of {load['period_us']:g} µs at {load['clock_hz'] / 1e6:g} MHz"
+    if coverage is not None:
+        yield f"coverage {coverage['percent']:.1f} % of {coverage['lines']} lines of core"
+    if usage is not None:
+        yield f"stack    {usage['total']} bytes on the deepest path, {usage['compiler']}"
 
 
 def _cells(check: dict[str, Any]) -> tuple[str, str, str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +13,16 @@ from flightstack.core.contract import FloatArray
 STAGES = ("outer", "inner", "mixer", "whole")
 STAGE_TITLES = {"outer": "outer loop", "inner": "inner loop", "mixer": "mixer", "whole": "whole step"}
 _BINS = 24
+EMULATED_CLOCK_HZ = 168e6
+"""Clock that the load of an emulated target is given for: that of an STM32F405, a common Cortex-M4F."""
+_ABOUT_LOAD = {
+    "cycles": "cycles of the board, at its own clock",
+    "instructions": (
+        "instructions of the emulated Cortex-M4F as one cycle each at 168 MHz (STM32F405): a lower bound, since "
+        "division, branches, loads and flash wait states take more cycles"
+    ),
+    "ns": "time of this machine, which did other things as well",
+}
 
 
 class StageProfile(NamedTuple):
@@ -51,6 +62,50 @@ def stage_profiles(costs: FloatArray) -> list[StageProfile]:
         for stage, column in zip(STAGES, columns, strict=True)
         if np.any(column > 0)
     ]
+
+
+class Load(NamedTuple):
+    """Processor time of a step in percent of its period."""
+
+    clock_hz: float
+    period_s: float
+    mean: float
+    p99: float
+    largest: float
+    about: str
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the object for ``pil.json``."""
+        return {
+            "clock_hz": self.clock_hz,
+            "period_us": round(self.period_s * 1e6, 3),
+            "mean_percent": round(self.mean, 4),
+            "p99_percent": round(self.p99, 4),
+            "max_percent": round(self.largest, 4),
+            "about": self.about,
+        }
+
+
+def cpu_load(
+    profiles: Sequence[StageProfile], unit: str, clock_hz: float, inner_hz: float | None
+) -> Load | None:
+    """Return the load of the whole step, or None if its cost or period is unknown.
+
+    Instructions of an emulated target count as one cycle each, of ``EMULATED_CLOCK_HZ``.
+    """
+    whole = next((profile for profile in profiles if profile.stage == "whole"), None)
+    hz = {"cycles": clock_hz, "instructions": EMULATED_CLOCK_HZ, "ns": 1e9}.get(unit, 0.0)
+    if whole is None or not hz or inner_hz is None:
+        return None
+    percent = 100.0 * inner_hz / hz
+    return Load(
+        hz,
+        1.0 / inner_hz,
+        percent * whole.mean,
+        percent * whole.p99,
+        percent * whole.largest,
+        _ABOUT_LOAD[unit],
+    )
 
 
 def _profile(stage: str, costs: FloatArray) -> StageProfile:

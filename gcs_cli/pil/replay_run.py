@@ -15,13 +15,15 @@ from flightstack.core.contract import FloatArray
 from flightstack.core.errors import ConfigError, TargetError
 from flightstack.firmware.c_loops import CLoops, LoopsSetup
 from flightstack.firmware.choice import PYTHON, SERIAL, LoopsChoice
-from flightstack.firmware.law_tree import controller_named, logged_params
+from flightstack.firmware.law_tree import controller_named, logged_params, own_params
+from flightstack.firmware.stages import has_model
 from flightstack.firmware.targets import finish_loops, make_loops
 from flightstack.flight_log.flight_log import vehicle_fields
 from flightstack.params.behaviour import SPECS
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
 from flightstack.params.vehicle import Vehicle, load_vehicle
 from gcs_cli.errors import NO_ANSWER, USAGE, CliError
+from gcs_cli.pil.code_facts import code_facts
 from gcs_cli.pil.compare import Difference, compared, deviation
 from gcs_cli.pil.flight_samples import FlightSamples, read_samples
 from gcs_cli.pil.replay import Recording, UnfitLogError, as_flight, recording, replayed
@@ -29,6 +31,7 @@ from gcs_cli.pil.report_charts import DeviationChart
 from gcs_cli.pil.result import (
     Outcome,
     assembled,
+    costs_of,
     largest_difference,
     pair_name,
     profiles_of,
@@ -108,7 +111,7 @@ def configured(
         max(1, round(inner_hz / outer_hz)),
     )
     info = {**vehicle_fields(flown), "controller": controller, "gains": gains}
-    info |= {"inner_hz": inner_hz, "outer_hz": outer_hz}
+    info |= {"inner_hz": inner_hz, "outer_hz": outer_hz, **own_params(setup)}
     own = {name: value for name, value in setup.numbers().items() if not name.startswith(_OF_TARGET)}
     return setup, info, own
 
@@ -189,6 +192,8 @@ def replay(
         "compared with the log's, and stage by stage with Python's, computed in float64 from what the target reports. "
         f"{meaning(choice, replay=True)}",
         "conditions": _conditions(log, target, prepared_replay),
+        "inner_hz": prepared_replay.setup.inner_hz,
+        **code_facts(record, prepared_replay.setup.controller.name),
     }
     return judged(prepared_replay, outputs, record, has_same_bits(choice), facts, limits)
 
@@ -210,24 +215,21 @@ def judged(
     """Compare the outputs with the log and with Python's stages, and check them. Pure."""
     flight, steps = replay.flight, replay.record
     made = as_flight(steps, outputs, {})
-    expected = as_flight(steps, expected_outputs(steps, outputs, replay.setup, replay.numbers), {})
+    modelled = has_model(replay.setup)
+    computed = expected_outputs(steps, outputs, replay.setup, replay.numbers) if modelled else outputs
+    expected = as_flight(steps, computed, {})
     pair, stages = pair_name(LOG, "target"), pair_name(STAGEWISE, "target")
     differences = list(compared(pair, flight, made))
-    by_stage = list(compared(stages, expected, made))
+    by_stage = list(compared(stages, expected, made)) if modelled else []
     left_out = None if steps.tells_targets else TARGET
     of_stages = limits.stages if same_bits else board_limits(limits.stages)
     checks = [
         *(_log_checks(pair, differences, replay, made, same_bits, limits.replay) if flight.signals else ()),
-        *difference_checks(stages, by_stage, of_stages, left_out),
-        status_check(f"{stages} steps of another status", expected, made, False),
+        *(_stage_checks(stages, by_stage, of_stages, left_out, expected, made) if modelled else ()),
         *(target_checks(record, len(outputs)) if record is not None else ()),
     ]
     result = assembled([*differences, *by_stage], checks, record, facts)
-    if not replay.record.tells_targets:
-        result["meaning"] += (
-            " This log does not tell which attitude targets the outer loop made: all were given to the inner loop, "
-            "and the outer loop did not run."
-        )
+    result["meaning"] += _left_out(modelled, steps.tells_targets)
     shown = pair if differences else stages
     result["tiles"] = [
         {"name": f"largest difference {shown}", "value": largest_difference(differences or by_stage)},
@@ -238,8 +240,35 @@ def judged(
         DeviationChart(BY_NAME[name], {shown: deviation(BY_NAME[name], first, made)}) for name in _SHOWN
     ]
     return Outcome(
-        result, [chart for chart in charts if np.size(chart.pairs[shown].size)], profiles_of(record)
+        result,
+        [chart for chart in charts if np.size(chart.pairs[shown].size)],
+        profiles_of(record),
+        costs_of(record),
     )
+
+
+def _left_out(modelled: bool, tells_targets: bool) -> str:
+    """Return sentences about comparisons that cannot be made."""
+    words = "" if modelled else " A law is written in C: it has no stage in Python to compare with."
+    if not tells_targets:
+        words += (
+            " This log does not tell which attitude targets the outer loop made: all were given to the inner loop, "
+            "and the outer loop did not run."
+        )
+    return words
+
+
+def _stage_checks(
+    pair: str,
+    differences: Sequence[Difference],
+    limits: Limits,
+    left_out: str | None,
+    expected: FlightSamples,
+    made: FlightSamples,
+) -> Iterator[Check]:
+    """Yield the checks against Python's stages."""
+    yield from difference_checks(pair, differences, limits, left_out)
+    yield status_check(f"{pair} steps of another status", expected, made, False)
 
 
 def _log_checks(

@@ -6,13 +6,17 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from flightstack.core.contract import FloatArray
+from gcs_cli.charts.figure import Figure
 from gcs_cli.charts.pages import render_page, shown
 from gcs_cli.pil.profile import STAGE_TITLES, StageProfile
-from gcs_cli.pil.report_charts import DeviationChart, deviation_figures, profile_figure
+from gcs_cli.pil.report_charts import DeviationChart, cost_over_time_figure, deviation_figures, profile_figure
 from gcs_cli.pil.signals import BY_NAME, STAGES
 from gcs_cli.pil.target_record import status_words
 
 TEMPLATES = Path(__file__).parent / "templates"
+_MOST_FRAMES = 12
+"""Functions with the largest frames in the report; ``pil.json`` has all."""
 _OF_TARGET = (
     "steps",
     "repeats",
@@ -26,7 +30,10 @@ _OF_TARGET = (
 
 
 def render_report(
-    result: Mapping[str, Any], charts: Sequence[DeviationChart], profiles: Sequence[StageProfile]
+    result: Mapping[str, Any],
+    charts: Sequence[DeviationChart],
+    profiles: Sequence[StageProfile],
+    costs: FloatArray | None = None,
 ) -> str:
     """Return the report as HTML; ``result`` is what ``pil.json`` holds."""
     profile = result["profile"]
@@ -38,6 +45,11 @@ def render_report(
         differences=difference_table(result["differences"]),
         deviations=list(deviation_figures(charts)),
         profile=profile_figure(profiles, profile["unit"], profile["about"]) if profiles else None,
+        cost_over_time=None
+        if costs is None or not len(costs)
+        else cost_over_time_figure(costs, profile["unit"], result["inner_hz"]),
+        load=_load(result["load"]),
+        frames=list((result["stack_usage"] or {"frames": {}})["frames"].items())[:_MOST_FRAMES],
         stage_titles=STAGE_TITLES,
         target=_target(result),
         link=_link(result),
@@ -64,6 +76,20 @@ def difference_table(differences: Sequence[Mapping[str, Any]]) -> dict[str, Any]
 def _titled(name: str) -> str:
     signal = BY_NAME[name]
     return signal.title if signal.unit == "1" else f"{signal.title} [{signal.unit}]"
+
+
+def _cost_over_time(costs: FloatArray | None, result: Mapping[str, Any]) -> Figure | None:
+    if costs is None or not len(costs):
+        return None
+    return cost_over_time_figure(costs, result["profile"]["unit"], result["inner_hz"])
+
+
+def _load(load: Mapping[str, Any] | None) -> str:
+    if load is None:
+        return ""
+    percent = ", ".join(f"{name} {load[f'{name}_percent']:.3g} %" for name in ("mean", "p99", "max"))
+    clock = f"{load['clock_hz'] / 1e6:g} MHz"
+    return f"CPU load: {percent} of a step's {load['period_us']:g} µs at {clock}; {load['about']}."
 
 
 def _target(result: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -8,10 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from flightstack.core.contract import FloatArray
 from gcs_cli.charts.colours import nth_colour
-from gcs_cli.charts.figure import Axis, Bars, Figure, Panel, Series
+from gcs_cli.charts.figure import TIME, Axis, Bars, Figure, Panel, Series
 from gcs_cli.pil.compare import Deviation
 from gcs_cli.pil.profile import STAGE_TITLES, StageProfile
+from gcs_cli.pil.profile import STAGES as PROFILED
 from gcs_cli.pil.signals import Signal
 
 _DECADES = 4.0
@@ -57,6 +59,22 @@ def profile_figure(profiles: Sequence[StageProfile], unit: str, caption: str) ->
     """Return a histogram for each stage of a step."""
     panels = [histogram_panel(stage, unit, _STAGE_COLOURS[stage.stage]) for stage in profiles]
     return Figure("cost-of-a-step", "What a step costs", panels, caption, columns=2, height=150)
+
+
+def cost_over_time_figure(costs: FloatArray, unit: str, inner_hz: float | None) -> Figure:
+    """Return the largest cost of each stretch over time, for each stage; ``costs`` is (steps, 4)."""
+    starts = np.unique(np.arange(_STRETCHES) * len(costs) // _STRETCHES)
+    largest = np.maximum.reduceat(costs, starts)
+    x = starts.astype(np.float64) if inner_hz is None else starts / inner_hz
+    curves = [
+        Series(STAGE_TITLES[stage], x, largest[:, column], _STAGE_COLOURS[stage])
+        for column, stage in enumerate(PROFILED)
+    ]
+    time = Axis("step") if inner_hz is None else TIME
+    caption = f"Largest cost of each of {len(starts)} stretches."
+    return Figure(
+        "cost-over-time", "Cost of a step over time", [Panel(Axis("cost", unit), curves, x=time)], caption
+    )
 
 
 def histogram_panel(profile: StageProfile, unit: str, colour: str) -> Panel:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import Any, NamedTuple
 
+from flightstack.core.contract import FloatArray
 from gcs_cli.pil.compare import (
     Difference,
     compared,
@@ -15,7 +16,7 @@ from gcs_cli.pil.compare import (
     ticks_apart,
 )
 from gcs_cli.pil.flight_samples import FlightSamples
-from gcs_cli.pil.profile import StageProfile, stage_profiles
+from gcs_cli.pil.profile import StageProfile, cpu_load, stage_profiles
 from gcs_cli.pil.report_charts import DeviationChart
 from gcs_cli.pil.signals import BY_NAME
 from gcs_cli.pil.target_record import TargetRecord
@@ -62,6 +63,8 @@ class Outcome(NamedTuple):
     result: dict[str, Any]
     charts: list[DeviationChart]
     profiles: list[StageProfile]
+    costs: FloatArray | None = None
+    """Cost of the stages of each step, (steps, 4); None without a target that measures them."""
 
     @property
     def passed(self) -> bool:
@@ -102,22 +105,14 @@ def closed_loop(
     ]
     listed = [difference for pair in differences.values() for difference in pair]
     result = assembled(listed, checks, record, facts)
-    result["flights"] = {
-        stage: {
-            "outcome": flown.outcome,
-            "outcome_text": flown.outcome_text,
-            **_of_samples(flown.samples),
-            **flown.facts,
-        }
-        for stage, flown in flights.items()
-    }
+    result["flights"] = {stage: _of_flight(flown) for stage, flown in flights.items()}
     result["status_differences"] = {
         pair_name(a, b): status_differences(first, second)[0]
         for (a, first), (b, second) in combinations(there.items(), 2)
     }
     result["compared"] = _ABOUT_TICKS + ("every tick in which the loops run." if same_bits else "the same.")
     result["tiles"] = [*_tiles(differences, checks), *target_tiles(record)]
-    return Outcome(result, list(charts.values()), profiles_of(record))
+    return Outcome(result, list(charts.values()), profiles_of(record), costs_of(record))
 
 
 def assembled(
@@ -129,11 +124,15 @@ def assembled(
     """Return the keys that every ``pil.json`` has."""
     return {
         "format": FORMAT,
+        "inner_hz": None,
+        "coverage": None,
+        "stack_usage": None,
         **facts,
         "verdict": PASSED if all_passed(checks) else FAILED,
         "checks": [check.as_json() for check in checks],
         "differences": [found.as_json(BY_NAME[found.signal]) for found in differences],
         "profile": _profile(record),
+        "load": _load(record, facts.get("inner_hz")),
         "target": None if record is None else dict(record.identity),
         "stack": _stack(record),
         "link": {} if record is None else dict(record.link),
@@ -210,9 +209,21 @@ def target_checks(record: TargetRecord | None, ticks: int) -> Iterator[Check]:
         yield Check("steps that overran their period", 0.0, float(overruns), "")
 
 
+def costs_of(record: TargetRecord | None) -> FloatArray | None:
+    """Return the costs of all steps, or None if the target measures none."""
+    return None if record is None or not record.unit else record.costs
+
+
 def profiles_of(record: TargetRecord | None) -> list[StageProfile]:
     """Return the profile of each stage; empty if the target measures no cost."""
     return [] if record is None or not record.unit else stage_profiles(record.costs)
+
+
+def _load(record: TargetRecord | None, inner_hz: float | None) -> dict[str, Any] | None:
+    if record is None:
+        return None
+    load = cpu_load(profiles_of(record), record.unit, record.identity["clock_hz"], inner_hz)
+    return None if load is None else load.as_json()
 
 
 def _profile(record: TargetRecord | None) -> dict[str, Any] | None:
@@ -243,6 +254,11 @@ def _stack(record: TargetRecord | None) -> dict[str, Any] | None:
     if record is None or not record.status or not record.status["stack_size"]:
         return None
     return {"size": record.status["stack_size"], "high_water": record.status["stack_high_water"]}
+
+
+def _of_flight(flown: Flown) -> dict[str, Any]:
+    outcome = {"outcome": flown.outcome, "outcome_text": flown.outcome_text}
+    return {**outcome, **_of_samples(flown.samples), **flown.facts}
 
 
 def _of_samples(samples: FlightSamples | None) -> dict[str, Any]:

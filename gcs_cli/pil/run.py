@@ -19,6 +19,7 @@ from gcs_cli.fly.fly_display import BarDisplay, Display, draws_bars
 from gcs_cli.fly.fly_flags import FlyOptions
 from gcs_cli.fly.fly_options import outer_rate_hz
 from gcs_cli.fly.fly_run import fly, write_results
+from gcs_cli.pil.code_facts import code_facts
 from gcs_cli.pil.flight_samples import read_samples
 from gcs_cli.pil.report import render_report
 from gcs_cli.pil.result import COMPLETED, Flown, Outcome, closed_loop
@@ -89,6 +90,8 @@ def run(
         "about": _about(options, target),
         "meaning": meaning(choice),
         "conditions": _conditions(options, target),
+        "inner_hz": options.inner_hz,
+        **code_facts(record, options.controller),
     }
     outcome = closed_loop(flights, record, has_same_bits(choice), facts, limits)
     write_outcome(folder, outcome)
@@ -193,7 +196,7 @@ def _battery(options: FlyOptions) -> str | None:
 def write_outcome(folder: Path, outcome: Outcome) -> None:
     """Write ``pil.json`` and ``pil.html`` atomically; raise CliError."""
     text = json.dumps(outcome.result, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
-    html = render_report(outcome.result, outcome.charts, outcome.profiles)
+    html = render_report(outcome.result, outcome.charts, outcome.profiles, outcome.costs)
     try:
         write_text_atomically(folder / JSON_NAME, text)
         write_text_atomically(folder / HTML_NAME, html)

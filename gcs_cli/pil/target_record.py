@@ -41,6 +41,8 @@ class TargetRecord(NamedTuple):
     """Steps reported with stopped rotors."""
     ending: str | None = None
     """The reason of an early end, or None."""
+    trace: Mapping[str, Any] | None = None
+    """``image`` and ``executed`` addresses of an emulated target."""
 
     @property
     def counted(self) -> dict[str, int]:
@@ -111,4 +113,5 @@ def record_of(content: Mapping[str, Any], costs: FloatArray, statuses: StatusArr
         overruns,
         bad_inputs,
         content["ending"],
+        content.get("trace"),
     )

@@ -27,6 +27,7 @@ from sim_bridge.plant.fault_table import (
     Kind,
     Range,
     Row,
+    SensorUnit,
 )
 
 __all__ = ["Fault", "Kind", "Schedule", "parse_fault"]
@@ -97,7 +98,11 @@ def _parse_effect(what: str, rotor_count: int) -> Fault:
         elif name in row.ranges and "," in name:
             fault = fault._replace(vector=_parse_vector(word, name, row.ranges[name]))
         elif name in row.ranges:
-            fault = fault._replace(value=_parse_number(word, name, row.ranges[name]))
+            span = row.ranges[name]
+            if row.kind is Kind.SENSOR_NOISE:
+                unit, _, most = _sensor_unit(fault.sensor)
+                span = Range(0.0, most, unit)
+            fault = fault._replace(value=_parse_number(word, name, span))
     return fault
 
 
@@ -160,11 +165,17 @@ def _parse_sensor(text: str) -> str:
     return text
 
 
+def _sensor_unit(sensor: str) -> SensorUnit:
+    """Return the unit of the faults of a sensor that have a value."""
+    found = SENSORS[sensor.rstrip("0123456789")]
+    if not found.components:
+        raise ValueError(f"{sensor} is gyro and accelerometer: name one of them")
+    return found
+
+
 def _parse_sensor_value(text: str, sensor: str) -> Vector3:
     """Parse one number for each component of a sensor."""
-    unit, count, most = SENSORS[sensor.rstrip("0123456789")]
-    if not count:
-        raise ValueError(f"{sensor} is gyro and accelerometer: name one of them")
+    unit, count, most = _sensor_unit(sensor)
     parts = text.split(",")
     if len(parts) != count:
         numbers = "one number," if count == 1 else f"{count} numbers separated by commas, each"

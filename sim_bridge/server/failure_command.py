@@ -49,12 +49,13 @@ def inject_failure(simulator: Simulator, unit: float, failure: float, instance: 
 
     Motors: off, stuck at the present speed, slow (half of the thrust) or OK. Battery: off (nearly empty) or OK (full).
     Sensors: off, stuck, garbage, wrong, delayed (0.2 s), intermittent (half is lost) or OK. Instance 0 is all of them.
+    A sensor is unsupported for a client that has not requested the sensors: it flies on the true state.
     """
     if unit == mavlink.FAILURE_UNIT_SYSTEM_MOTOR:
         return _fail_motor(simulator, failure, instance)
     if unit == mavlink.FAILURE_UNIT_SYSTEM_BATTERY:
         return _fail_battery(simulator, failure, instance)
-    if unit in _SENSORS:
+    if unit in _SENSORS and simulator.sensors is not None:
         return _fail_sensor(simulator, _SENSORS[int(unit)], failure, instance)
     return _UNSUPPORTED
 

@@ -144,6 +144,7 @@ def test_every_parameter_starts_at_its_default_and_takes_its_range(real: str) ->
             0.0 if abs(default) < 1e-9 else float(f"{default:.12g}")
         )  # the generator's digits, and no rubbish
         assert loops.get(number.name) == tiny(given)  # to the last bit
+    loops.set("POS_THR_MIN", 0.0)  # must not be above POS_THR_MAX
     for number in TARGET_NUMBERS:  # each alone: setting one changes no other
         before = [loops.get(other.name) for other in TARGET_NUMBERS if other is not number]
         between = [] if number.is_whole else [number.high - (number.high - number.low) / 3.0]

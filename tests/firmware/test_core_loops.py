@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -203,3 +204,45 @@ def test_rate_groups_begin_with_the_outer_loop_and_come_back_to_it(divisor: int,
     due = np.zeros(140_000, np.uint16)
     Core("float").call("drive_rate_groups", divisor, due.size, due)
     assert np.array_equal(due, np.where(np.arange(due.size) % period == 0, OUTER_DUE, 0))
+
+
+@pytest.mark.parametrize("real", ["float", "double"])
+def test_infinities_of_both_signs_do_not_make_up_for_each_other(real: str) -> None:
+    """In every pair of places: a processor without NaN may give a number for their sum."""
+    numbers = target_numbers(
+        load_vehicle("x_quad"), load_controller("pid"), open_gains("tuned"), 0.6, 500.0, 5
+    )
+    places = [(i, j) for i in range(13) for j in range(13) if i != j]
+    ticks = level(len(places) + 1, OUTER_DUE)
+    for tick, (i, j) in enumerate(places, start=1):
+        ticks.states[tick, i], ticks.states[tick, j] = np.inf, -np.inf
+    made, status = Loops(Core(real), numbers).run(*ticks)
+    assert (status[1:] == LoopStatus.INPUT_NOT_FINITE).all()
+    assert (made[1:] == made[0]).all()
+    setpoints = level(12, OUTER_DUE)
+    for place in range(11):
+        setpoints.setpoints[place + 1, place], setpoints.setpoints[place + 1, (place + 1) % 11] = (
+            np.inf,
+            -np.inf,
+        )
+    made, status = Loops(Core(real), numbers).run(*setpoints)
+    assert not (status & LoopStatus.INPUT_NOT_FINITE).any()
+    assert (made[1:, :5] == made[0, :5]).all()  # the target stays
+
+
+def test_no_test_for_finite_numbers_adds_them_up() -> None:
+    """The core compares each number: the C28x does not promise a NaN for the difference of two infinities."""
+    text = (CORE / "fs_loops.c").read_text()
+    bodies = re.findall(r"static uint16_t \w+_is_(?:finite|sound)\(.*?\n}", text, re.DOTALL)
+    assert len(bodies) == 7
+    assert not any(re.search(r" [-+] ", body) for body in bodies)
+
+
+@pytest.mark.parametrize("real", ["float", "double"])
+def test_least_thrust_above_the_largest_is_refused_in_c(real: str) -> None:
+    c = Loops(Core(real), {})
+    assert c.set("POS_THR_MAX", 8.0) == 0
+    assert c.set("POS_THR_MIN", 8.5) == 1
+    assert c.set("POS_THR_MIN", 8.0) == 0
+    assert c.set("POS_THR_MAX", 7.5) == 1
+    assert (c.get("POS_THR_MIN"), c.get("POS_THR_MAX")) == (8.0, 8.0)

@@ -37,6 +37,7 @@ class Box(NamedTuple):
     values: Annotated[FloatArray, 3]
     grid: Annotated[FloatArray, 2, 3]
     scale: float
+    counts: Annotated[np.ndarray[tuple[int], np.dtype[np.int64]], 2]
 
 
 @compiled
@@ -61,6 +62,14 @@ def _turn(box: Box, x: float) -> None:
     for i in range(box.grid.shape[0]):
         for j in range(i + 1):
             box.grid[i, j] -= x * box.values[j]
+
+
+@compiled
+def _clear(box: Box, start: int, count: int) -> int:
+    for i in range(start, start + count):
+        box.values[i] = 0.5 * box.values[i]
+        box.counts[0] += 1
+    return box.counts[0]
 
 
 @compiled
@@ -150,6 +159,9 @@ _SIMPLE = [
     "box.grid[1, 0] *= {number}",
     "y = _fill(box.values, {number})",
     "_turn(box, {number})",
+    "box.counts[1] = _clear(box, COUNT - 2, 2)",
+    "_clear(box, 0, 1)",
+    "a = {number} + float(box.counts[1])",
     "w[0] = _sum(box.grid) - {number}",
     "v = v if flag and a > {number} else cross(v, pair.v)",
     "a = cross(v, pair.v).x if flag else {number}",

@@ -107,7 +107,9 @@ class Reader:
             done = subprocess.run([sys.executable, *options], capture_output=True, text=True, check=False)
             return commands.Ended(done.stdout, done.stderr, done.returncode)
         if program == "gcs":
-            starts_processes = rest[0] == "fly" or (rest[0] == "pil" and rest[1] not in ("doctor", "replay"))
+            starts_processes = rest[0] == "fly" or (
+                rest[0] == "pil" and rest[1] not in ("doctor", "replay", "vectors")
+            )
             own = ["--instance", self._instance]
             rest = rest + own if starts_processes else [*own, "--timeout", "60", *rest]
         return IN_PROCESS[program](*rest)

@@ -42,10 +42,12 @@ ON_VEHICLE = {
 """Commands that wait for a vehicle, with arguments."""
 ELSEWHERE = {
     "fly": "test_gcs_fly", "sim": "test_gcs_sim", "paper": "test_paper_run", "test": "test_gcs_test",
-    "replay": "test_gcs_logs", "report": "test_gcs_logs", "compare": "test_compare", "mission new": "test_gcs_missions",
+    "replay": "test_gcs_logs", "report": "test_gcs_logs", "compare": "test_compare",
+    "estimate": "test_estimate", "mission new": "test_gcs_missions",
     "mission convert": "test_gcs_missions", "log info": "test_gcs_logs", "log plot": "test_gcs_logs",
     "log export": "test_log_export", "log draw": "test_render", "pil fly": "test_gcs_pil",
     "pil doctor": "test_gcs_pil", "pil replay": "test_gcs_pil", "pil generate": "test_law_tree",
+    "pil vectors": "test_gcs_pil",
 }  # fmt: skip
 """Commands on files, or with a vehicle of their own, and the file that tests them."""
 

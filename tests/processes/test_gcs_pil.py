@@ -22,6 +22,7 @@ from gcs_cli.fly.fly_flags import FlyOptions
 from gcs_cli.pil import run as pil_run
 from gcs_cli.pil.flight_samples import read_samples
 from gcs_cli.pil.result import Flown
+from gcs_cli.pil.vectors import read_vectors
 from tests.support.commands import Ended, gcs
 from tests.support.plugin_site import install
 from tests.support.process import children_of
@@ -121,6 +122,10 @@ def test_the_emulated_target_counts_instructions_and_makes_the_same_bits(flown: 
     assert result["profile"]["unit"] == "instructions"
     assert result["stack"]["high_water"] > 0
     assert "no board" in result["meaning"]
+    assert 0.0 < result["load"]["mean_percent"] < result["load"]["max_percent"] < 2.0
+    ran = result["coverage"]["files"]
+    assert ran["core/fs_attitude_pid.c"]["missed"] == []
+    assert ran["core/fs_attitude_backstepping.c"]["executed"] == 0
     assert "F28377S" not in json.dumps([result["target"], result["profile"], result["title"]])
     of_host = result_of(flown)
     assert result["flights"]["SIL"]["log_sha256"] == of_host["flights"]["SIL"]["log_sha256"]
@@ -222,13 +227,16 @@ def test_a_board_that_is_unplugged_ends_the_run_with_a_sentence(
             ["replay", "none.ulg", "--junit", "out.txt"],
             "--junit out.txt: give the file a name that ends in .xml",
         ),
+        (["vectors", "x.txt"], "x.txt: give the file a name that ends in .csv or .mat"),
+        (["vectors", "none/x.csv"], "none/x.csv: cannot be written"),
+        (["vectors", "x.csv", "--controller", "mine"], "--controller: mine: there is no such"),
         (["doctor"], "give either --port DEVICE or --target"),
         (["doctor", "--port", "/dev/ttyNONE"], "no such device"),
     ],
 )
 def test_mistakes_are_answered_with_a_sentence(arguments: list[str], words: str, tmp_path: Path) -> None:
     paths = [str(MISSIONS / each) if each.endswith((".plan", ".ulg")) else each for each in arguments]
-    out = [] if "doctor" in arguments else ["--out", str(tmp_path / "out")]
+    out = [] if {"doctor", "vectors"} & set(arguments) else ["--out", str(tmp_path / "out")]
     done = pil(*paths, *out)
     assert done.returncode == USAGE, done.stdout + done.stderr
     assert words in done.stderr
@@ -260,6 +268,20 @@ def test_a_verdict_that_is_not_good_fails_when_it_is_asked_for(flown: Path, tmp_
     ]
     assert "log–target attitude target" in failed
     assert not any(name.startswith("stages–target") for name in failed if name)  # Python's log, sound loops
+
+
+def test_vectors_of_a_flight_are_written_and_replayed(flown: Path, tmp_path: Path) -> None:
+    file = tmp_path / "hop.csv"
+    done = pil("vectors", file, "--log", flown / "sil" / "flight.ulg", "--json")
+    assert done.returncode == DONE, done.stderr
+    said = json.loads(done.stdout)
+    assert (said["event"], said["file"]) == ("vectors", str(file))
+    assert pil("vectors", file).returncode == USAGE  # exists
+    done = pil("replay", file, "--target", "c", "--out", tmp_path / "out", "--fail-over")
+    assert done.returncode == DONE, done.stdout + done.stderr
+    result = result_of(tmp_path / "out")
+    assert largest(result, "log–target") == 0.0
+    assert len(read_vectors(file).record.time_us) == said["steps"]
 
 
 def test_limits_of_a_file_judge_a_replay(flown: Path, tmp_path: Path) -> None:

@@ -165,7 +165,11 @@ def test_all_vehicles_take_one_order_while_the_window_shrinks(tmp_path: Path) ->
     options = (*OPTIONS, "--gcs-port", port)
     with vehicle(one, *options, speed=1) as first, vehicle(two, *options, speed=1) as second:
         ids = first.instance + 1, second.instance + 1
-        with watching(f"udpin:127.0.0.1:{port}", tmp_path) as view:
+        inherited = {
+            "COLUMNS": "120",
+            "LINES": "35",
+        }  # from a shell: the view follows its terminal all the same
+        with watching(f"udpin:127.0.0.1:{port}", tmp_path, **inherited) as view:
             view.wait("v Vehicles", "of 2")
             view.press("v")
             view.wait("all of them", f"{ids[0]}  quadrotor", f"{ids[1]}  quadrotor")

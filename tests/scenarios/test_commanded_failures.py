@@ -65,7 +65,7 @@ def test_nothing_fails_unless_it_is_allowed() -> None:
     ("numbers", "result", "reason"),
     [
         ((MOTOR, OFF, 9), DENIED, "no such motor"),
-        ((BATTERY, OFF, 3), DENIED, "no such motor or battery"),
+        ((BATTERY, OFF, 3), DENIED, "no such motor, battery or sensor"),
         ((math.nan, OFF, 0), DENIED, "whole numbers"),
         ((MOTOR, math.inf, 0), DENIED, "whole numbers"),
         ((MOTOR, OFF, 1.5), DENIED, "whole numbers"),

@@ -92,7 +92,7 @@ def test_the_battery_fails_by_command() -> None:
         ((101, 1, 5), mavlink.MAV_RESULT_DENIED), ((101, 1, -1), mavlink.MAV_RESULT_DENIED),
         ((101, 1, 1.5), mavlink.MAV_RESULT_DENIED), ((101, 1, math.nan), mavlink.MAV_RESULT_DENIED),
         ((101, 3, 1), mavlink.MAV_RESULT_UNSUPPORTED), ((101, math.nan, 1), mavlink.MAV_RESULT_UNSUPPORTED),
-        ((8, 1, 0), mavlink.MAV_RESULT_UNSUPPORTED), ((math.inf, 1, 0), mavlink.MAV_RESULT_UNSUPPORTED),
+        ((4, 1, 0), mavlink.MAV_RESULT_UNSUPPORTED), ((math.inf, 1, 0), mavlink.MAV_RESULT_UNSUPPORTED),
         ((100, 2, 0), mavlink.MAV_RESULT_UNSUPPORTED), ((100, 1, 7), mavlink.MAV_RESULT_DENIED),
     ],
 )  # fmt: skip

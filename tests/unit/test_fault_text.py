@@ -63,6 +63,8 @@ def test_fault_is_parsed(text: str, fault: Fault) -> None:
         ("sensor:sonar:off", "'sonar' is not a sensor: imu, gyro, accel, mag, baro, gnss, range, flow; imu2, gyro2"),
         ("sensor:mag2:off", "'mag2' is not a sensor"), ("sensor gyro0 off", "'gyro0' is not a sensor"),
         ("sensor:imu:bias=1,2,3", "imu is gyro and accelerometer: name one of them"),
+        ("sensor:imu:noise=1", "imu is gyro and accelerometer"),
+        ("sensor:mag:noise=11", "SPREAD must be 0 to 10 gauss"),
         ("sensor:gyro:bias=1", "VALUE of gyro must be 3 numbers separated by commas, each -2000 to 2000 °/s"),
         ("sensor:baro:bias=1,2", "VALUE of baro must be one number, -1000 to 1000 hPa"),
         ("sensor:mag:bias=0,0,11", "VALUE must be -10 to 10 gauss"), ("sensor baro bias x", "'x' is not a number"),

@@ -41,6 +41,15 @@ def fill(a: Annotated[FloatArray, 3]) -> float:
 def plain(x: float) -> float:
     return x
 
+@compiled
+def rounds(x: float, count: int) -> float:
+    for i in range(count):
+        x += 1.0
+    return x
+
+class Counts(NamedTuple):
+    numbers: Annotated[np.ndarray[tuple[int], np.dtype[np.int64]], 2]
+
 class Box(NamedTuple):
     values: Annotated[FloatArray, 3]
     grid: Annotated[FloatArray, 2, 3]
@@ -48,13 +57,16 @@ class Box(NamedTuple):
     x: float
 
 @compiled
-def law(x: float, n: int, flag: bool, v: Vector3, a: Annotated[FloatArray, 3], box: Box) -> float:
+def law(x: float, n: int, flag: bool, v: Vector3, a: Annotated[FloatArray, 3], box: Box, counts: Counts) -> float:
 """
 LINE = HEAD.count("\n") + 1
 REFUSED = {
     "while x > 0.0:\n    x -= 1.0\nreturn x": "while loop",
     "for value in a:\n    x += value\nreturn x": "for loop over values",
-    "for i in range(n):\n    x += 1.0\nreturn x": "loop bound",
+    "m = n\nfor i in range(m):\n    x += 1.0\nreturn x": "loop bound",
+    "n = n + 1\nfor i in range(n):\n    x += 1.0\nreturn x": "loop bound",
+    "return rounds(x, int(x))": "loop bound",
+    "counts.numbers[0] = x\nreturn x": "values of different types",
     "for i in range(3):\n    i = 2\nreturn x": "loop variable",
     "for i in range(3):\n    x += 1.0\nelse:\n    x = 0.0\nreturn x": "else of a loop",
     "try:\n    x = 1.0\nexcept ValueError:\n    x = 2.0\nreturn x": "try statement",

@@ -10,11 +10,13 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 from flightstack.control.attitude_backstepping import CONTROLLER as BACKSTEPPING
-from flightstack.control.attitude_controller import AttitudeController
+from flightstack.control.attitude_controller import AttitudeController, AttitudeInputs
 from flightstack.control.attitude_pid import CONTROLLER as PID
+from flightstack.control.control_law import ControlLaw, NoMemory, NoParams
 from flightstack.control.loops import PythonLoops
 from flightstack.control.mixer import mixer_for
-from flightstack.core.contract import LoopRow, LoopStatus
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import LoopRow, LoopStatus, Vector3
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
 from tests.support.failing_controller import CONTROLLER as FAILING
@@ -251,3 +253,31 @@ def test_an_attitude_given_from_outside_is_flown_in_a_straight_line_over_an_oute
     row = np.zeros(LoopRow.SIZE)
     loops.step(flight.state, flight.wish, SPEEDS, True, row)
     assert loops._last_target.tolist() == before.tolist()  # the way back begins here
+
+
+def rate_damping(
+    memory: NoMemory, inputs: AttitudeInputs, params: NoParams, dt_s: float
+) -> tuple[NoMemory, Vector3]:
+    """A law that does not look at the reference."""
+    return memory, Vector3(-0.01 * inputs.rates_frd_rad_s.x, 0.0, 0.0)
+
+
+def test_a_reference_that_is_not_finite_is_not_kept_by_a_law_that_ignores_it() -> None:
+    law = ControlLaw(
+        "damping",
+        compiled(rate_damping),
+        NoMemory,
+        NoParams,
+        (0.0,),
+        lambda vehicle, gains: NoParams(0.0),
+        (),
+    )
+    flight = Flight(make(law), at_rest(), setpoint())
+    flight.tick(3)
+    flight.loops._memory[0]["reference_params"][3] = 1e308  # its largest acceleration
+    flight.loops._memory[0]["reference_params"][0] = 1e200  # and bandwidth
+    flight.state = at_rest(rates=(0.1, 0.0, 0.0))
+    flight.loops.set_attitude_target(np.array([0.0, 1.0, 0.0, 0.0, 4.0]))
+    held = flight.tick()
+    assert held[LoopRow.STATUS] == LoopStatus.OUTPUT_NOT_FINITE
+    assert np.isfinite(flight.loops._reference_memory).all()

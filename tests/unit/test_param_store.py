@@ -155,3 +155,45 @@ def test_declarations_are_sound() -> None:
         for choice, meaning in spec.choices:
             assert spec.low <= choice <= spec.high, spec
             assert meaning[0].isupper(), spec
+
+
+LEAST = ParamSpec("THR_MIN", 1.0, 0.0, 100.0, "N", "Least")
+LARGEST = ParamSpec("THR_MAX", 10.0, 0.0, 100.0, "N", "Largest", at_least="THR_MIN")
+limits = st.tuples(
+    st.sampled_from(["THR_MIN", "THR_MAX"]), st.sampled_from([0.0, 1.0, 5.0, 10.0, 20.0, 50.0])
+)
+
+
+def test_a_parameter_of_a_pair_beyond_the_other_is_refused() -> None:
+    store = ParamStore((LEAST, LARGEST))
+    assert store.set("THR_MIN", 11.0) == "11 is above THR_MAX, which is 10"
+    assert store.set("THR_MAX", 0.5) == "0.5 is below THR_MIN, which is 1"
+    assert store.set("THR_MIN", 10.0) is None
+    assert store.values() == {"THR_MAX": 10.0, "THR_MIN": 10.0}
+
+
+@given(st.lists(limits), st.sampled_from([None, ["THR_MIN"], ["THR_MAX"]]))
+def test_a_pair_is_in_order_at_every_change(changes, names) -> None:
+    store = ParamStore((LEAST, LARGEST))
+    seen = store.values()
+
+    def check(name: str, value: float) -> None:  # a listener passes each change on, such as to a target
+        seen[name] = value
+        assert seen["THR_MIN"] <= seen["THR_MAX"]
+
+    store.subscribe(check)
+    for name, value in changes:
+        store.set(name, value)
+    store.reset(names)
+    assert store.is_default("THR_MIN") or names == ["THR_MAX"]
+    assert store.is_default("THR_MAX") or names == ["THR_MIN"]
+
+
+@pytest.mark.parametrize("order", [("THR_MIN=20", "THR_MAX=30"), ("THR_MAX=30", "THR_MIN=20"),
+                                   ("THR_MAX=0.5", "THR_MIN=0.25"), ("THR_MIN=0.25", "THR_MAX=0.5")])  # fmt: skip
+def test_a_pair_is_given_in_any_order(order: tuple[str, str]) -> None:
+    store = ParamStore((LEAST, LARGEST))
+    apply_assignments(store, order)
+    assert store.values() == {name: float(value) for name, value in (text.split("=") for text in order)}
+    with pytest.raises(ConfigError, match="THR_MIN=60: 60 is above THR_MAX, which is 50"):
+        apply_assignments(store, ("THR_MIN=60", "THR_MAX=50"))

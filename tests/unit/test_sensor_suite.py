@@ -194,6 +194,14 @@ def test_gnss_jumps_and_is_spoofed_slowly() -> None:
     assert since[-1].vn == 50  # a spoofer that is consistent
 
 
+def test_drift_begins_when_it_is_injected() -> None:
+    bench = Bench()
+    before = of_type(bench.run(1.0), "HIL_SENSOR")[0]
+    bench.simulator.inject(parse_fault("sensor:baro:drift=1", 4))
+    first = [m for m in of_type(bench.run(0.1), "HIL_SENSOR") if m.fields_updated & BARO][-1]
+    assert 0.0 < first.abs_pressure - before.abs_pressure < 0.11
+
+
 def test_frozen_sensor_repeats_its_last_measurement() -> None:
     noisy = with_sensors("consumer")
     before, since = after("sensor:mag:freeze", "HIL_SENSOR", noisy)
@@ -331,7 +339,7 @@ def test_client_injects_each_type_of_failure(failure: int) -> None:
 
 
 def test_injected_failure_without_effect_is_answered() -> None:
-    simulator = Simulator(X_QUAD)
+    simulator = Bench(X_QUAD).simulator
     off = mavlink.FAILURE_TYPE_OFF
     assert inject_failure(simulator, mavlink.FAILURE_UNIT_SENSOR_GYRO, off, 2) == DENIED
     assert inject_failure(simulator, mavlink.FAILURE_UNIT_SENSOR_DISTANCE_SENSOR, off, 0) == DENIED
@@ -345,8 +353,13 @@ def test_injected_failure_without_effect_is_answered() -> None:
     assert simulator.faults == ()
 
 
+def test_failure_of_a_sensor_is_unsupported_on_the_true_state() -> None:
+    off = mavlink.FAILURE_TYPE_OFF
+    assert inject_failure(Simulator(X_QUAD), mavlink.FAILURE_UNIT_SENSOR_GPS, off, 0) == UNSUPPORTED
+
+
 def test_new_failure_of_a_sensor_replaces_the_old_one() -> None:
-    simulator = Simulator(X_QUAD)
+    simulator = Bench(X_QUAD).simulator
     unit = mavlink.FAILURE_UNIT_SENSOR_MAG
     inject_failure(simulator, unit, mavlink.FAILURE_TYPE_OFF, 0)
     inject_failure(simulator, mavlink.FAILURE_UNIT_SENSOR_BARO, mavlink.FAILURE_TYPE_OFF, 0)

@@ -160,13 +160,14 @@ class Assignments:
         """Assign a value to a name or to an item of an array."""
         if isinstance(target, ast.Subscript):
             place = self.expressions.value(target)
-            if place.type is not REAL:
+            if place.type not in (REAL, INT):
                 raise self.function.refusal(target, "array value")
             self.writer.write_to(target, place)
-            self.writer.store(
-                f"{place.text} = ",
-                as_real(value) if value.type in (INT, WHOLE) else self._real(target, value),
-            )
+            if place.type is REAL and value.type in (INT, WHOLE):
+                value = as_real(value)
+            if value.type is not place.type:
+                raise self.function.refusal(target, "values of different types")
+            self.writer.store(f"{place.text} = ", value)
             return
         if not isinstance(target, ast.Name):
             raise self.function.refusal(target, "assignment to an attribute")
@@ -177,11 +178,6 @@ class Assignments:
             return
         variable, is_new = self.writer.declare(target, target.id, value.type)
         self._store(target, variable, is_new, value)
-
-    def _real(self, node: ast.AST, value: Value) -> Value:
-        if value.type is not REAL:
-            raise self.function.refusal(node, "values of different types")
-        return value
 
     def _store(self, node: ast.AST, variable: Variable, is_new: bool, value: Value) -> None:
         writer, kind = self.writer, c_type(variable.type)
@@ -207,7 +203,7 @@ class Assignments:
         if text.endswith("]"):  # a row: its index may change
             if not isinstance(value.type, Array) or len(value.type.shape) > 1:
                 raise self.function.refusal(target, "array value", f"part {target.id} of an array")
-            self.writer.pointer(f"fs_real *{identifier(target.id)}", text, value.root)
+            self.writer.pointer(f"{c_type(value.type)} *{identifier(target.id)}", text, value.root)
             text = identifier(target.id)
         self.writer.variables[target.id] = Variable(text, value.type, root=value.root, is_stable=True)
         self.writer.assigned.add(target.id)
@@ -228,6 +224,8 @@ class Assignments:
                 return False
         else:
             self.writer.write_to(target, old)
+            if made.type is not old.type:
+                raise self.function.refusal(target, "values of different types")
         place = variable.name if isinstance(target, ast.Name) else old.text
         number = value if made.type is INT else as_real(value)
         is_product = made.type is WHOLE and known[0] == "*"  # which has a sum behind it

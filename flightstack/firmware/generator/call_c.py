@@ -40,7 +40,7 @@ class Difference(NamedTuple):
 def _layout(kind: Type) -> Any:
     """Return the ctypes type of a value in a library of double."""
     if isinstance(kind, Array):
-        made: Any = ctypes.c_double
+        made: Any = ctypes.c_int32 if kind.item is INT else ctypes.c_double
         for size in reversed(kind.shape):
             made = made * (MAX_ROTORS if size == ROTORS else int(size))
         return made
@@ -56,7 +56,7 @@ def _fill(kind: Type, place: Any, value: Any) -> None:
     if isinstance(kind, Array):
         for at, item in enumerate(value):
             if len(kind.shape) > 1:
-                _fill(Array(kind.shape[1:]), place[at], item)
+                _fill(Array(kind.shape[1:], kind.item), place[at], item)
             else:
                 place[at] = item
         return
@@ -135,7 +135,7 @@ class Vectors:
             return kind.kind(*(self.value(inner) for inner in kind.fields.values()))
         if isinstance(kind, Array):
             sizes = [ROTOR_COUNT if size == ROTORS else int(size) for size in kind.shape]
-            return np.array([self.value(REAL) for _ in range(math.prod(sizes))]).reshape(sizes)
+            return np.array([self.value(kind.item) for _ in range(math.prod(sizes))]).reshape(sizes)
         if kind is INT:
             return int(self._random.integers(-3, 4))
         if kind is BOOL:

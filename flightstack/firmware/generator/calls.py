@@ -99,9 +99,22 @@ class Calls:
                 texts.append(_array_argument(kind, value, name in callee.written))
             if name in callee.written:
                 self.writer.write_to(node, value)
+            if name in callee.bounds:
+                self._check_bound(node, name, value)
         if callee.needs_rotors:
             texts.append(self.writer.rotors())
         return texts
+
+    def _check_bound(self, node: ast.Call, name: str, value: Value) -> None:
+        """Accept a constant, a loop's variable, or a parameter that bounds a loop too."""
+        if value.literal is not None or value.is_constant:
+            return
+        if value.text in self.writer.loops:
+            return
+        if self.writer.is_whole_parameter(value.text):
+            self.function.bounds.add(value.text)
+            return
+        raise self.function.refusal(node, "loop bound", f"loop bound {name} of {ast.unparse(node.func)}")
 
     def bound(
         self,
@@ -157,7 +170,8 @@ class Calls:
         if kind is REAL and value.type in (INT, WHOLE):
             raise self.function.refusal(node, "integer for a float")
         if isinstance(kind, Array) and isinstance(value.type, Array):
-            if kind.shape != value.type.shape and ("",) not in (kind.shape, value.type.shape):
+            is_known = ("",) not in (kind.shape, value.type.shape)
+            if kind.item is not value.type.item or (is_known and kind.shape != value.type.shape):
                 raise self.function.refusal(node, "values of different types", "array of another shape")
             return value
         if value.type != kind:
@@ -224,7 +238,7 @@ def _array_argument(kind: Type, value: Value, is_written: bool) -> str:
     if is_written or not isinstance(kind, Array) or len(kind.shape) == 1:
         return value.text
     sizes = "".join(f"[{c_size(size)}]" for size in kind.shape[1:])
-    return f"(const fs_real(*){sizes}){value.within(UNARY)}"
+    return f"(const {c_type(kind)}(*){sizes}){value.within(UNARY)}"
 
 
 def _is_literal(node: ast.expr | None) -> bool:
@@ -244,7 +258,7 @@ def c_prototype(function: Function, is_inline: bool = False) -> str:
             parts.append(f"{const}{c_type(kind)} *{name}")
         elif isinstance(kind, Array):
             sizes = "".join(f"[{c_size(size)}]" for size in kind.shape)
-            parts.append(f"{const}fs_real {name}{sizes}")
+            parts.append(f"{const}{c_type(kind)} {name}{sizes}")
         else:
             parts.append(f"{c_type(kind)} {name}")
     if function.needs_rotors:

@@ -229,10 +229,25 @@ def table(numbers: Sequence[TargetNumber], defaults: dict[str, float]) -> str:
                 "fs_real fs_param_value(const fs_loops *loops, uint16_t index)", places, "", literal(0.0)
             ),
             "",
+            *_consistency(numbers),
+            "",
             _switch("fs_real *fs_param_integral(fs_loops *loops, uint16_t index)", integrals, "&", "NULL"),
             "",
         ]
     )
+
+
+def _consistency(numbers: Sequence[TargetNumber]) -> list[str]:
+    """Return a function that compares the numbers of each pair."""
+    places = {number.name: number.place for number in numbers}
+    pairs = [(places[number.at_least], number.place) for number in numbers if number.at_least]
+    tests = " && ".join(f"loops->{least} <= loops->{largest}" for least, largest in pairs)
+    return [
+        "uint16_t fs_param_is_consistent(const fs_loops *loops)",
+        "{",
+        f"    return ({tests}) ? 1U : 0U;",
+        "}",
+    ]
 
 
 def _switch(signature: str, places: dict[int, str], prefix: str, otherwise: str) -> str:

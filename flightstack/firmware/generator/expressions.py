@@ -144,7 +144,7 @@ class Expressions:
             return bool_literal(value)
         if isinstance(value, int | float):
             literal = self.literal(node, value)
-            return Value(literal.type, self.writer.unit.constant(name, literal.text), literal=None)
+            return Value(literal.type, self.writer.unit.constant(name, literal.text), is_constant=True)
         shape = array_shape(value)
         if shape is not None:
             return Value(Array(shape), self.writer.unit.table(name, value, shape))
@@ -203,7 +203,7 @@ class Expressions:
             if isinstance(place.literal, int) and place.literal < 0:
                 raise self.function.refusal(node, "index", "negative index")
             text, _ = f"{text}[{place.text}]", left.pop(0)
-        return Value(Array(tuple(left)) if left else REAL, text, root=array.root)
+        return Value(Array(tuple(left), kind.item) if left else kind.item, text, root=array.root)
 
     # ------------------------------------------------------------------ operators
 
@@ -241,7 +241,8 @@ class Expressions:
         text = f"{left.within(rank)} {sign} {right.within(rank + 1)}"
         if left.type is WHOLE and sign == "*":  # an integer has no negative zero
             return Value(WHOLE, f"{text} + FS_LIT(0.0)", SUM)
-        return Value(left.type, text, rank)
+        is_constant = all(value.is_constant or value.literal is not None for value in (left, right))
+        return Value(left.type, text, rank, is_constant=is_constant)
 
     def _boolop(self, node: ast.BoolOp) -> Value:
         is_and = isinstance(node.op, ast.And)

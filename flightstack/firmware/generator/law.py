@@ -53,6 +53,8 @@ class Function:
     result: Type = NOTHING
     written: set[str] = field(default_factory=set)
     """Array parameters that the function writes to."""
+    bounds: set[str] = field(default_factory=set)
+    """Integer parameters that bound a loop: every call gives them a bounded number."""
     needs_rotors: bool = False
     """The number of rotors is a parameter of its own in C."""
     lines: list[str] = field(default_factory=list)

@@ -29,7 +29,7 @@ class Statements:
         self.expressions = Expressions(function, self.writer)
         self._last_line = function.node.body[0].lineno - 1
         self.assignments = Assignments(function, self.writer, self.expressions)
-        self._loops: list[str] = []
+        self._loops = self.writer.loops
 
     def run(self) -> None:
         """Translate the whole function."""
@@ -202,8 +202,11 @@ class Statements:
         for inner in ast.walk(node):
             if not isinstance(inner, ast.Name) or id(inner) in within or not self.writer.has(inner.id):
                 continue
-            if inner.id not in self._loops and inner.id not in self._sizes:
+            if inner.id in self._loops or inner.id in self._sizes:
+                continue
+            if not self.writer.is_whole_parameter(inner.id):
                 raise self.function.refusal(node, "loop bound", f"loop bound {ast.unparse(node)}")
+            self.function.bounds.add(inner.id)
         value = self.expressions.value(node)
         if value.type is not INT:
             raise self.function.refusal(node, "loop bound", f"loop bound {ast.unparse(node)}")

@@ -17,7 +17,7 @@ class OutsideSubsetError(Exception):
 ADVICE: dict[str, str] = {
     "while loop": "use `for i in range(N)` with a constant N, and `break`",
     "for loop over values": "use `for i in range(N)` and an index",
-    "loop bound": "use a constant, the size of an array, or another loop's variable",
+    "loop bound": "use a constant, the size of an array, another loop's variable, or an integer parameter",
     "loop variable": "copy it to another variable inside the loop",
     "else of a loop": "set a flag in the loop and test it afterwards",
     "try statement": "test the value with `math.isfinite` or a comparison",

@@ -11,6 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ForwardRef, TypeAlias, get_args, get_origin
 
+import numpy as np
+
 from flightstack.core import contract
 from flightstack.firmware.generator.text import snake_case
 
@@ -53,9 +55,10 @@ class Several:
 
 @dataclass(frozen=True)
 class Array:
-    """An array of floats; a size is a number, ``ROTORS``, or empty if unknown."""
+    """An array of floats or integers; a size is a number, ``ROTORS``, or empty if unknown."""
 
     shape: tuple[int | str, ...]
+    item: Scalar = Scalar.REAL
 
 
 Type: TypeAlias = Scalar | Record | Several | Array
@@ -101,7 +104,9 @@ def record_name(kind: type) -> str:
 
 
 def c_type(kind: Type) -> str:
-    """Return the C type of a number or a record."""
+    """Return the C type of a number, a record, or an array's items."""
+    if isinstance(kind, Array):
+        return c_type(kind.item)
     if kind is WHOLE:
         return REAL.value
     return record_name(kind.kind) if isinstance(kind, Record) else kind.value  # type: ignore[union-attr]
@@ -123,6 +128,19 @@ def annotated(node: ast.expr, names: Mapping[str, Any]) -> Type:
         raise TypeError(str(error)) from error
 
 
+_ITEMS: dict[Any, Scalar] = {np.float64: REAL, np.int64: INT}
+
+
+def _item(base: Any, names: Mapping[str, Any]) -> Scalar | None:
+    """Return the type of the items of ``np.ndarray[…, np.dtype[np.float64]]`` or ``[np.int64]``, else None."""
+    if isinstance(base, ForwardRef):
+        base = base.__forward_arg__
+    if isinstance(base, str):
+        base = eval(base, {**vars(typing), "np": np, **names})
+    dtype = get_args(base)[-1:]
+    return _ITEMS.get(get_args(dtype[0])[0]) if dtype and get_args(dtype[0]) else None
+
+
 def _resolved(value: Any, names: Mapping[str, Any]) -> Type:
     if value == contract.FloatArray:
         return Array(("",))
@@ -135,9 +153,10 @@ def _resolved(value: Any, names: Mapping[str, Any]) -> Type:
     if get_origin(value) is tuple:
         return Several(tuple(_resolved(item, names) for item in get_args(value)))
     if get_origin(value) is typing.Annotated:
-        _, *shape = get_args(value)
-        if all(size == ROTORS or (isinstance(size, int) and size > 0) for size in shape):
-            return Array(tuple(shape))
+        base, *shape = get_args(value)
+        item = _item(base, names)
+        if item is not None and all(size == ROTORS or (isinstance(size, int) and size > 0) for size in shape):
+            return Array(tuple(shape), item)
     known = _PLAIN.get(value) if isinstance(value, type | None) else None
     if known is None:
         raise TypeError(f"{value!r} has no C type")

@@ -253,9 +253,7 @@ def structure(kind: type, name: str = "") -> list[str]:
         lines.append("    int32_t rotors;")
     for field, inner in record.fields.items():
         sizes = "".join(f"[{c_size(size)}]" for size in inner.shape) if isinstance(inner, Array) else ""
-        lines.append(
-            f"    {'fs_real' if isinstance(inner, Array) else c_type(inner)} {identifier(field)}{sizes};"
-        )
+        lines.append(f"    {c_type(inner)} {identifier(field)}{sizes};")
     return [*lines, f"}} {name or record_name(kind)};"]
 
 

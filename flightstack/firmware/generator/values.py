@@ -37,6 +37,8 @@ class Value:
     fields: tuple[Value, ...] = ()
     literal: int | float | bool | None = None
     """The value of a literal in the source."""
+    is_constant: bool = False
+    """True for a constant of a module."""
     root: str = ""
     """Variable that the value is a part of."""
     callee: str = ""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from flightstack.firmware.generator.law import Function
 from flightstack.firmware.generator.text import WIDTH, comment, fold, identifier
-from flightstack.firmware.generator.types import Array, Record, Scalar, Type, c_size, c_type, has_rotors
+from flightstack.firmware.generator.types import INT, Array, Record, Scalar, Type, c_size, c_type, has_rotors
 from flightstack.firmware.generator.usage import Path, Usage
 from flightstack.firmware.generator.values import Form, Value
 
@@ -50,6 +50,8 @@ class Writer:
         self.path: Path = ()
         self.variables: dict[str, Variable] = {}
         self.assigned: set[str] = set()
+        self.loops: list[str] = []
+        """Variables of the loops around the statement in progress."""
         self.pending: dict[Path, list[Variable]] = {}
         """Variables to declare before the compound statement in progress, by block."""
         names = {parameter.name for parameter in function.parameters}
@@ -74,6 +76,16 @@ class Writer:
         if variable is None or node.id not in self.assigned:
             raise self.function.refusal(node, "variable without a value", f"variable {node.id}")
         return Value(variable.type, variable.name, form=variable.form, root=variable.root)
+
+    def is_whole_parameter(self, name: str) -> bool:
+        """Return True for an integer parameter that the function does not assign."""
+        variable = self.variables.get(name)
+        return (
+            name in self._parameters()
+            and variable is not None
+            and variable.type is INT
+            and not self.usage.stores.get(name)
+        )
 
     def is_stable(self, root: str) -> bool:
         """Return True if pointers into a variable stay valid."""

@@ -1,0 +1,138 @@
+"""Sensor messages of a simulator that speaks PX4's contract, in the vehicle's time.
+
+HIL_SENSOR of id 0 is the clock. Messages before it, of other inertial sensors or of GNSS, get its time: simulators may
+stamp them by other clocks, and PX4 ignores their stamps as well.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, TypeAlias
+
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Message
+from flightstack.simulator_link.sensor_frames import (
+    HIL_GPS_ID,
+    HIL_SENSOR_ID,
+    HilGps,
+    HilSensorFrame,
+    decode_gps,
+    gps_of,
+)
+
+_DISTANCE_ID = mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR
+_FLOW_ID = mavlink.MAVLINK_MSG_ID_HIL_OPTICAL_FLOW
+MOST_WAITING = 64
+"""Reports that are kept until they are taken; the oldest ones are dropped."""
+
+
+class HilReport(NamedTuple):
+    """Measurements of one HIL_SENSOR: ``values`` as in ``HilSensorFrame``, valid where ``fields`` has the bits."""
+
+    number: int
+    fields: int
+    values: tuple[float, ...]
+    step_us: int
+    """Time since the last step of the clock; 0 in the first one."""
+
+
+class RangeReport(NamedTuple):
+    """A distance downwards; ``quality`` 0 to 1, 0 for none."""
+
+    distance_m: float
+    quality: float
+
+
+class FlowReport(NamedTuple):
+    """Optical flow and the rotation of the gyro over ``dt_s`` [rad]."""
+
+    dt_s: float
+    flow_rad: tuple[float, float]
+    gyro_rad: tuple[float, float, float]
+    quality: float
+
+
+Content: TypeAlias = HilReport | HilGps | RangeReport | FlowReport
+
+
+class Report(NamedTuple):
+    """A sensor message with its vehicle time."""
+
+    time_us: int
+    content: Content
+
+
+class SensorInbox:
+    """Collects sensor messages until they are taken."""
+
+    def __init__(self) -> None:
+        self._frame = HilSensorFrame()
+        self._waiting: list[Content] = []
+        self._reports: list[Report] = []
+
+    @property
+    def clock_us(self) -> int:
+        """Time stamp of the newest HIL_SENSOR."""
+        return self._frame.time_us
+
+    def open(self, frame: bytes | memoryview) -> bool | None:
+        """Take a frame of a sensor message; return True for the clock, None if it is another message.
+
+        After True call ``stamp``.
+        """
+        message_id = frame[7] | frame[8] << 8 | frame[9] << 16 if len(frame) > 9 else -1
+        if message_id == HIL_SENSOR_ID and self._frame.open(frame):
+            return self._take_sensor()
+        if message_id == HIL_GPS_ID and (gps := decode_gps(frame)) is not None:
+            self._wait(gps)
+            return False
+        return None
+
+    def take_message(self, message: Message) -> bool:
+        """Take a message of the general decoder; return True for the clock. After True call ``stamp``."""
+        kind = message.get_msgId()
+        if kind == HIL_SENSOR_ID:
+            self._frame.take(message)
+            return self._take_sensor()
+        if kind == HIL_GPS_ID:
+            self._wait(gps_of(message))
+        elif kind == _DISTANCE_ID and message.orientation == mavlink.MAV_SENSOR_ROTATION_PITCH_270:
+            in_range = message.min_distance <= message.current_distance <= message.max_distance
+            # 0 is an unknown quality, 1 an invalid signal
+            quality = 0.0 if message.signal_quality == 1 or not in_range else 1.0
+            self._wait(RangeReport(message.current_distance * 0.01, quality))
+        elif kind == _FLOW_ID:
+            m = message
+            flow, gyro = (
+                (m.integrated_x, m.integrated_y),
+                (m.integrated_xgyro, m.integrated_ygyro, m.integrated_zgyro),
+            )
+            self._wait(FlowReport(m.integration_time_us * 1e-6, flow, gyro, m.quality / 255.0))
+        return False
+
+    def _take_sensor(self) -> bool:
+        frame = self._frame
+        if frame.number == 0:
+            return True
+        self._wait(HilReport(frame.number, frame.fields, tuple(frame.values.tolist()), 0))
+        return False
+
+    def _wait(self, content: Content) -> None:
+        if len(self._waiting) == MOST_WAITING:
+            del self._waiting[0]
+        self._waiting.append(content)
+
+    def stamp(self, time_us: int, step_us: int) -> None:
+        """Give the messages since the last clock, and the clock's own measurements, their vehicle time."""
+        frame, reports = self._frame, self._reports
+        for content in self._waiting:
+            report = content._replace(step_us=step_us) if isinstance(content, HilReport) else content
+            reports.append(Report(time_us, report))
+        self._waiting.clear()
+        reports.append(Report(time_us, HilReport(0, frame.fields, tuple(frame.values.tolist()), step_us)))
+        if len(reports) > MOST_WAITING:
+            del reports[: len(reports) - MOST_WAITING]
+
+    def take(self) -> list[Report]:
+        """Return the new reports, oldest first, and clear them."""
+        reports, self._reports = self._reports, []
+        return reports

@@ -1,0 +1,104 @@
+"""``gcs estimate``: the estimator on the sensors of a log."""
+
+from __future__ import annotations
+
+import webbrowser
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from flightstack.core.atomic_file import check_new, write_text_atomically
+from flightstack.core.errors import ConfigError
+from flightstack.params.store import read_assignment
+from flightstack.process.command_line import make_app
+from gcs_cli.errors import USAGE, CliError
+from gcs_cli.estimate.log_samples import READ_PARAMETERS
+from gcs_cli.estimate.result import Result, estimate_log, quantities, render, rows_of
+from gcs_cli.logs.reader import log_file, read_log
+from gcs_cli.settings import JsonOption, OpenOption, OverwriteOption, output_of
+
+app = make_app(add_completion=False)
+
+
+@app.command()
+def estimate(
+    context: typer.Context,
+    log: Annotated[
+        Path,
+        typer.Argument(metavar="LOG", help="A ULog, also compressed (.ulg.xz).", show_default=False),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="FILE", help="Write the report page to this file.", show_default=False
+        ),
+    ] = None,
+    param: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--param", metavar="NAME=VALUE", help="Replace a parameter of the log.", show_default=False
+        ),
+    ] = None,
+    overwrite: OverwriteOption = False,
+    open_page: OpenOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Estimate attitude, velocity and position from the sensors of a log.
+
+    Compares the result with the log's own estimate, and with truth where the log has it. Delays of the sensors,
+    declination and limits of GNSS accuracy are the log's parameters: EKF2_GPS_DELAY, EKF2_MAG_DELAY, EKF2_BARO_DELAY,
+    EKF2_RNG_DELAY, EKF2_MAG_DECL, EKF2_REQ_EPH, EKF2_REQ_EPV, EKF2_REQ_SACC, EKF2_REQ_NSATS.
+    """
+    page = out if out is not None or not open_page else log_file(log).with_suffix(".html")
+    if page is not None:
+        if page.suffix.lower() not in (".html", ".htm"):
+            raise CliError(f"--out {page}: give the page a name that ends in .html", USAGE)
+        check_new(page, overwrite)
+    recording = read_log(log)
+    replaced = _replaced(param or ())
+    recording = replace(recording, parameters={**recording.parameters, **replaced})
+    result = estimate_log(recording)
+    if page is not None:
+        write_text_atomically(page, render(result, recording))
+    sentence = "\n".join(_lines(result, page))
+    file = None if page is None else str(page)
+    output_of(context, as_json).say("estimate", sentence, log=str(log), file=file, **result.summary)
+    if open_page and page is not None:
+        webbrowser.open(page.resolve().as_uri())
+
+
+def _replaced(assignments: Sequence[str]) -> dict[str, float]:
+    """Return the parameters of ``--param``; raise CliError (usage) for one that the estimator does not read."""
+    found = {}
+    for text in assignments:
+        try:
+            name, value = read_assignment(text)
+        except ConfigError as error:
+            raise CliError(str(error), USAGE) from None
+        if name not in READ_PARAMETERS:
+            raise CliError(f"--param {name}: the estimator reads {', '.join(READ_PARAMETERS)}", USAGE)
+        found[name] = value
+    return found
+
+
+def _lines(result: Result, page: Path | None) -> list[str]:
+    """Return the figures as lines: quantity, then root mean square (largest) of each comparison."""
+    summary = result.summary
+    rows = list(rows_of(summary))
+    span = summary["in_air_s"]
+    when = "in all of the log" if span is None else f"in the air ({span:.1f} s)"
+    lines = (
+        [f"difference {when}, root mean square (largest)"]
+        if rows
+        else ["the log has no estimate and no truth"]
+    )
+    if rows:
+        lines.append(" " * 20 + "".join(f"{name:>26}" for name, _ in rows))
+    for number, quantity in enumerate(quantities() if rows else ()):
+        lines.append(f"{quantity:20}" + "".join(f"{cells[number]:>26}" for _, cells in rows))
+    if page is not None:
+        lines.append(f"report written to {page}")
+    return lines

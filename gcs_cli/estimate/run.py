@@ -1,0 +1,121 @@
+"""The estimator over the samples of a log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from flightstack.core.contract import FloatArray
+from flightstack.estimation.error_state import ERROR_STATES, NOMINAL_SIZE
+from flightstack.estimation.estimator import Estimator
+from flightstack.estimation.kalman import OBSERVATION_COLUMNS, OBSERVATIONS
+from flightstack.estimation.sensor_samples import BaroSample, GnssSample, ImuSample, MagSample, RangeSample
+from gcs_cli.errors import CliError
+from gcs_cli.estimate.earth_field import field_at
+from gcs_cli.estimate.log_samples import Landed, params_of, samples_of
+from gcs_cli.estimate.track import Track
+from gcs_cli.logs.recording import Recording
+
+SNAPSHOT_S = 0.1
+"""Interval of the states, deviations and innovations that are kept."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """The output of the filter at each IMU sample, and its inner state at intervals.
+
+    ``state_s`` (m,) has the times of ``nominal`` (m, 28), ``deviations`` (m, 27) and ``observations`` (m, 22, 6).
+    """
+
+    track: Track
+    state_s: FloatArray
+    nominal: FloatArray
+    deviations: FloatArray
+    observations: FloatArray
+    samples: dict[str, int]
+    resets: FloatArray
+
+
+def run(log: Recording) -> Estimate:
+    """Run the filter; raise CliError if the log's sensors do not suffice."""
+    params, limits, declination_rad = params_of(log)
+    estimator = Estimator(params, limits)
+    estimator.set_declination(declination_rad)
+    keeper = _Keeper(estimator)
+    year = log.year
+    for sample in samples_of(log):
+        keeper.count(sample)
+        if isinstance(sample, ImuSample):
+            estimator.imu(sample)
+            keeper.keep(sample.time_s)
+        elif isinstance(sample, MagSample):
+            estimator.mag(sample)
+        elif isinstance(sample, BaroSample):
+            estimator.baro(sample)
+        elif isinstance(sample, GnssSample):
+            was_known = estimator.frame is not None
+            estimator.gnss(sample)
+            if not was_known and estimator.frame is not None:
+                estimator.set_earth_field(field_at(estimator.frame.origin, year))
+        elif isinstance(sample, RangeSample):
+            estimator.range(sample)
+        elif isinstance(sample, Landed):
+            estimator.set_landed(sample.is_landed)
+    return keeper.result(log)
+
+
+class _Keeper:
+    def __init__(self, estimator: Estimator) -> None:
+        self._estimator = estimator
+        self._record: Any = estimator.memory[0]
+        self._outputs: list[FloatArray] = []
+        self._states: list[tuple[float, FloatArray, FloatArray, FloatArray]] = []
+        self._samples: dict[str, int] = {}
+        self._next_s = 0.0
+
+    def count(self, sample: Any) -> None:
+        name = type(sample).__name__.removesuffix("Sample").lower()
+        self._samples[name] = self._samples.get(name, 0) + 1
+
+    def keep(self, time_s: float) -> None:
+        if not self._estimator.aligned:
+            return
+        self._outputs.append(self._record["output"].copy())
+        if time_s >= self._next_s:
+            self._next_s = time_s + SNAPSHOT_S
+            record = self._record
+            self._states.append(
+                (
+                    time_s,
+                    record["nominal"].copy(),
+                    self._estimator.deviations(),
+                    record["observations"].copy(),
+                )
+            )
+
+    def result(self, log: Recording) -> Estimate:
+        if len(self._outputs) < 2:
+            raise CliError(f"{log.source}: the log is too short to align the filter")
+        output = np.array(self._outputs)
+        frame = self._estimator.frame
+        signs = np.where(np.sum(output[1:, 1:5] * output[:-1, 1:5], axis=1) < 0.0, -1.0, 1.0)
+        attitude = output[:, 1:5] * np.concatenate([[1.0], np.cumprod(signs)])[:, None]
+        times, nominal, deviations, observations = zip(*self._states, strict=True)
+        return Estimate(
+            Track(
+                output[:, 0],
+                attitude,
+                output[:, 0],
+                output[:, 5:8],
+                output[:, 8:11],
+                None if frame is None else frame.origin,
+            ),
+            np.array(times),
+            np.array(nominal).reshape(-1, NOMINAL_SIZE),
+            np.array(deviations).reshape(-1, ERROR_STATES),
+            np.array(observations).reshape(-1, OBSERVATIONS, OBSERVATION_COLUMNS),
+            self._samples,
+            self._record["resets"].copy(),
+        )

@@ -1,0 +1,134 @@
+"""``gcs estimate``: the estimator on the sensors of a log."""
+
+from __future__ import annotations
+
+import json
+import lzma
+import os
+from pathlib import Path
+
+import pytest
+
+from flightstack.core.geodesy import GeoPoint
+from flightstack.estimation.sensor_samples import GnssSample
+from gcs_cli.__main__ import main
+from gcs_cli.errors import USAGE
+from gcs_cli.estimate.earth_field import field_at
+from gcs_cli.estimate.log_samples import params_of, pressure_altitude_m, samples_of
+from gcs_cli.estimate.track import differences, flight_span, logged_track, summary_of
+from gcs_cli.logs.reader import read_log
+from tests.support import flown_sensors as flown
+from tests.support.sensor_log import sensor_log
+from tests.support.synthetic_flight import synthetic_flight_bytes
+
+_BESIDE = Path(__file__).resolve().parents[3] / "shared" / "logs"
+SHARED_LOGS = Path(os.environ.get("SHARED_LOGS", _BESIDE))
+"""Flights of PX4 beside the checkout; not part of the project."""
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("log") / "flight.ulg"
+    path.write_bytes(sensor_log(20.0))
+    return path
+
+
+def test_figures_against_truth_have_units_in_their_names(
+    log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["estimate", str(log), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["event"] == "estimate"
+    assert found["to_log"] is None
+    assert found["to_truth"]["tilt_rms_deg"] < 1.0  # measured 0.4
+    assert found["to_truth"]["velocity_horizontal_rms_m_s"] < 0.3
+    assert found["to_truth"]["position_vertical_max_m"] < 2.0
+    assert found["samples"]["imu"] == 5000
+
+
+def test_report_holds_states_differences_and_innovations(log: Path, tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    assert main(["estimate", str(log), "--out", str(page)]) == 0
+    text = page.read_text(encoding="utf-8")
+    for name in (
+        "attitude",
+        "difference-truth",
+        "biases",
+        "innovations-gnss-velocity",
+        "innovations-magnetometer",
+    ):
+        assert f'data-chart="{name}"' in text
+    assert main(["estimate", str(log), "--out", str(page)]) == USAGE  # exists
+
+
+def test_compressed_log_is_read_in_place(log: Path, tmp_path: Path) -> None:
+    path = tmp_path / "flight.ulg.xz"
+    path.write_bytes(lzma.compress(log.read_bytes()))
+    assert len(read_log(path).topics) == len(read_log(log).topics)
+    path.write_bytes(path.read_bytes()[:-100])
+    assert main(["estimate", str(path)]) == USAGE
+
+
+def test_old_and_new_names_of_gnss_fields_give_equal_samples(log: Path, tmp_path: Path) -> None:
+    old = tmp_path / "old.ulg"
+    old.write_bytes(sensor_log(2.0, new_names=False))
+    (first, *_), (same, *_) = (
+        [sample for sample in samples_of(read_log(path)) if isinstance(sample, GnssSample)]
+        for path in (log, old)
+    )
+    assert same.latitude_deg == pytest.approx(first.latitude_deg, abs=1e-7)
+    assert same.altitude_msl_m == pytest.approx(first.altitude_msl_m, abs=1e-3)
+    assert same.velocity_ned_m_s == first.velocity_ned_m_s
+
+
+def test_delays_come_from_the_parameters_of_the_log(log: Path) -> None:
+    params, _, _ = params_of(read_log(log))
+    assert params.gnss_delay_s == pytest.approx(flown.GNSS_DELAY_S)
+    assert params.delay_s > params.gnss_delay_s
+
+
+def test_track_differs_from_itself_by_nothing(log: Path) -> None:
+    truth = logged_track(read_log(log), "_groundtruth")
+    assert truth is not None
+    span = flight_span(truth)
+    assert span is not None
+    assert span[0] == pytest.approx(flown.STANDS_S + 0.9, abs=0.3)  # 0.5 m above the start
+    assert max(value or 0.0 for value in summary_of(differences(truth, truth, *span)).values()) < 1e-5
+
+
+def test_parameter_of_the_log_is_replaced(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["estimate", str(log), "--json", "--param", "EKF2_GPS_DELAY=0"]) == 0
+    late = json.loads(capsys.readouterr().out)["to_truth"]["velocity_horizontal_rms_m_s"]
+    assert main(["estimate", str(log), "--json"]) == 0
+    assert late > 1.5 * json.loads(capsys.readouterr().out)["to_truth"]["velocity_horizontal_rms_m_s"]
+    assert main(["estimate", str(log), "--param", "EKF2_GPS_DELY=0"]) == USAGE
+
+
+def test_log_without_imu_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "flight.ulg"
+    path.write_bytes(synthetic_flight_bytes(seconds=1.0))
+    assert main(["estimate", str(path)]) == 1
+    assert "sensor_combined" in capsys.readouterr().err
+
+
+def test_pressure_altitude_is_that_of_the_standard_atmosphere() -> None:
+    assert pressure_altitude_m(1013.25) == pytest.approx(0.0, abs=1e-9)
+    assert pressure_altitude_m(898.746) == pytest.approx(1000.0, abs=0.1)  # ISO 2533
+
+
+def test_earth_field_has_the_declination_of_the_model() -> None:
+    north, east, down = field_at(GeoPoint(80.0, 0.0, 0.0), 2025.0)  # test value of the WMM 2025 report
+    assert (north, east, down) == pytest.approx((0.065218, 0.001459, 0.547910), abs=2e-5)
+
+
+@pytest.mark.parametrize("name", ["px4_sih_calm", "px4_world_windy", "px4_world_outage"])
+def test_estimate_is_closer_to_truth_than_that_of_px4(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    path = SHARED_LOGS / f"{name}.ulg.xz"
+    if not path.is_file():
+        pytest.skip(f"{path} is missing")
+    assert main(["estimate", str(path), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    ours, px4 = found["to_truth"], found["log_to_truth"]
+    for key in ours:
+        if "_rms_" in key:
+            assert ours[key] < px4[key], key
