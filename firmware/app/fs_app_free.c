@@ -31,6 +31,7 @@ void fs_app_free_init(fs_app *app)
 {
     app->free.is_on = 0U;
     app->free.is_flying = 0U;
+    app->free.has_time = 0U;
     app->free.now_us = 0UL;
     begin_window(app);
 }
@@ -71,6 +72,8 @@ uint16_t fs_app_free_command(fs_app *app, float what, float every, float timeout
     } else if ((what != 1.0F) || !((every >= 1.0F) && (every <= MOST_TICKS)) ||
                !((timeout_ms >= 0.0F) && (timeout_ms <= MOST_TIMEOUT_MS))) {
         result = FS_MAV_RESULT_DENIED;
+    } else if (app->free.has_time == 0U) {
+        result = FS_MAV_RESULT_UNSUPPORTED;
     } else if ((app->state == FS_APP_STEPPING) || (app->free.is_flying != 0U)) {
         result = FS_MAV_RESULT_TEMPORARILY_REJECTED;
     } else {
@@ -239,6 +242,7 @@ void fs_app_run(fs_app *app, uint32_t now_us)
     fs_free *run = &app->free;
     uint32_t late_us, missed;
 
+    run->has_time = 1U;
     run->now_us = now_us;
     if (run->is_on == 0U) {
         return;

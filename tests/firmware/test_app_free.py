@@ -47,6 +47,7 @@ def target() -> Iterator[Target]:
 
 def started(target: Target, every: float = 1, timeout_ms: float = 0) -> None:
     target.poll()
+    target.run(0)
     target.heard()
     assert free_run(target, 1, every, timeout_ms) == ACCEPTED
 
@@ -263,6 +264,12 @@ def test_stopping_does_not_end_the_safe_state(target: Target) -> None:
 def test_a_command_out_of_range_is_denied(values: tuple[float, ...]) -> None:
     target = Target()
     assert free_run(target, *values) == DENIED
+    target.close()
+
+
+def test_a_port_without_microseconds_does_not_run_freely() -> None:
+    target = Target()
+    assert free_run(target, 1, 1) == mavlink.MAV_RESULT_UNSUPPORTED
     target.close()
 
 

@@ -66,6 +66,7 @@ class FreeLine:
 def device() -> Iterator[Target]:
     target = Target()
     target.poll()
+    target.run(0)
     yield target
     target.close()
 
