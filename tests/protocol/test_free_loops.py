@@ -17,8 +17,7 @@ from flightstack.firmware.free_loops import STATE_TIMEOUT_MS, FreeLoops
 from flightstack.firmware.target_loops import TargetLoops
 from flightstack.firmware.targets import finish_loops, make_loops
 from tests.firmware.app_support import READY, SAFE, Target
-from tests.protocol.test_pil_link import SPEEDS, sil
-from tests.support.pil_setups import HASH, setup
+from tests.support.pil_setups import HASH, SPEEDS, setup, sil
 
 PERIOD_US = 2_000
 FREE = 4

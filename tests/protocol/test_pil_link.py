@@ -14,8 +14,7 @@ from flightstack.control.attitude_backstepping import CONTROLLER as BACKSTEPPING
 from flightstack.control.attitude_pid import CONTROLLER as PID
 from flightstack.core.contract import LoopFlags, LoopRow, LoopStatus
 from flightstack.core.errors import TargetError, WrongFirmwareError
-from flightstack.firmware.build import host_library
-from flightstack.firmware.c_loops import CLoops, HostLoops
+from flightstack.firmware.c_loops import CLoops
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilTiming
 from flightstack.firmware.target_loops import FINAL_ATTEMPTS, TargetLoops
 from flightstack.firmware.targets import finish_loops
@@ -24,9 +23,8 @@ from gcs_cli.pil.result import target_checks
 from gcs_cli.pil.target_record import STATES, read_record
 from tests.firmware.app_support import SAFE, Target, mavlink
 from tests.support.lossy_line import NO_FAULTS, LineFaults, LossyLine
-from tests.support.pil_setups import HASH, setup
+from tests.support.pil_setups import HASH, SPEEDS, setup, sil
 
-SPEEDS = np.zeros(8, np.float32)
 WEATHERS = {
     "fair": NO_FAULTS,
     "loses octets": LineFaults(loss=5e-4),
@@ -49,11 +47,6 @@ def connected(line: LossyLine, controller=PID, **options: object) -> CLoops:
     of = setup(controller)
     executor = TargetLoops(line, of.numbers(), clock_s=line.clock, expected_hash=HASH, **options)  # type: ignore[arg-type]
     return CLoops("serial:test", executor, of)
-
-
-def sil(controller=PID) -> CLoops:
-    of = setup(controller)
-    return CLoops("c", HostLoops(host_library(), of.numbers()), of)
 
 
 def drive(
