@@ -221,7 +221,7 @@ static uint16_t everything_left(void)
 {
     const uint32_t now_ms = f28_now_ms();
 
-    if (f28_ring_held(&to_send) != 0U || SCI_getTxFIFOStatus(SCIA_BASE) != SCI_FIFO_TX0) {
+    if (fs_ring_held(&to_send) != 0U || SCI_getTxFIFOStatus(SCIA_BASE) != SCI_FIFO_TX0) {
         has_left = 0U;
         return 0U;
     }
