@@ -9,10 +9,7 @@ from pathlib import Path
 import pytest
 
 from flightstack.firmware.boards import (
-    ARM_GCC,
     BOARDS,
-    GCC,
-    STRICT,
     board_compilers,
     board_image,
     raw_image,
@@ -21,16 +18,10 @@ from flightstack.firmware.boards import (
 from flightstack.firmware.build import BuildError
 from flightstack.firmware.elf import Elf
 from gcs_cli.errors import DONE, USAGE
-from tests.firmware.step_machines import tool
+from tests.firmware.board_builds import image
 from tests.support.commands import gcs
 
 BUILDS = [(name, compiler) for name in BOARDS for compiler in board_compilers(name)]
-
-
-def image(name: str, compiler: str, *flags: str) -> Path:
-    if compiler == GCC:
-        tool(ARM_GCC, "gcc-arm-none-eabi")
-    return board_image(name, compiler, extra=[*STRICT, *flags])
 
 
 @pytest.mark.parametrize(("name", "compiler"), BUILDS)

@@ -20,9 +20,9 @@ from gcs_cli.pil.conformance.line import Line
 from gcs_cli.pil.conformance.link_checks import all_bytes, burst, cut_frame, sizes
 from gcs_cli.pil.conformance.loop_checks import expected_outputs, stepped, vectors
 from gcs_cli.pil.conformance.run import conformance
+from tests.firmware.board_builds import image
 from tests.firmware.board_machines import BoardMachine, Nucleo, Pico2, RegisterMisuseError
 from tests.firmware.step_machines import tool
-from tests.firmware.test_board_images import image
 from tests.support.tools import NIGHTLY
 
 TIMEOUT_S = 0.25
