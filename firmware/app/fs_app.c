@@ -9,15 +9,16 @@
 /* Least difference of two readings, one right after the other. */
 static uint32_t overhead_of(fs_clock clock)
 {
-    uint32_t least = 0xFFFFFFFFUL, first, between;
+    uint32_t least = 0xFFFFFFFFUL;
     uint16_t i;
 
     if (clock == NULL) {
         return 0UL;
     }
     for (i = 0U; i < CALIBRATIONS; i++) {
-        first = clock();
-        between = clock() - first;
+        const uint32_t first = clock();
+        const uint32_t between = clock() - first;
+
         if (between < least) {
             least = between;
         }

@@ -45,7 +45,7 @@ void fs_app_free_stop(fs_app *app)
     }
 }
 
-static void start(fs_app *app, uint16_t every, uint32_t timeout_us)
+static void begin_running(fs_app *app, uint16_t every, uint32_t timeout_us)
 {
     fs_free *run = &app->free;
 
@@ -77,12 +77,12 @@ uint16_t fs_app_free_command(fs_app *app, float what, float every, float timeout
     } else if ((app->state == FS_APP_STEPPING) || (app->free.is_flying != 0U)) {
         result = FS_MAV_RESULT_TEMPORARILY_REJECTED;
     } else {
-        start(app, (uint16_t)every, (timeout_ms >= 1.0F) ? ((uint32_t)timeout_ms * 1000UL) : DEFAULT_TIMEOUT_US);
+        begin_running(app, (uint16_t)every, (timeout_ms >= 1.0F) ? ((uint32_t)timeout_ms * 1000UL) : DEFAULT_TIMEOUT_US);
     }
     return result;
 }
 
-static void stop_rotors(fs_app *app, const char *why)
+static void stop_running(fs_app *app, const char *why)
 {
     app->free.is_flying = 0U;
     if (app->state != FS_APP_SAFE) {
@@ -128,13 +128,13 @@ void fs_app_on_state(fs_app *app)
     } else if ((app->free.is_flying == 0U) && ((message.flags & FS_RESET) == 0UL)) {
         /* nothing flies until RESET */
     } else if (fault != NULL) {
-        stop_rotors(app, fault);
+        stop_running(app, fault);
     } else {
         take_state(app, &state);
     }
 }
 
-static void compute(fs_app *app, fs_pil_report *report)
+static void run_loops(fs_app *app, fs_pil_report *report)
 {
     fs_free *run = &app->free;
     fs_loop_input input;
@@ -215,11 +215,11 @@ static void tick(fs_app *app, uint32_t late_us)
     }
     if ((run->is_flying != 0U) && (age_us > run->timeout_us)) {
         run->timing.timeouts++;
-        stop_rotors(app, "No state in time: rotors stopped");
+        stop_running(app, "No state in time: rotors stopped");
     }
     if (run->is_flying != 0U) {
         note_age(app, age_us);
-        compute(app, &report);
+        run_loops(app, &report);
     } else if (fs_app_is_stopped(app) != 0U) {
         report.status = FS_APP_BAD_INPUT;
     } else {
@@ -234,7 +234,9 @@ static void tick(fs_app *app, uint32_t late_us)
 
 static uint32_t period_us(const fs_app *app)
 {
-    return (uint32_t)(app->loops.rates.inner_dt_s * US_PER_S + FS_LIT(0.5));
+    const fs_real period = app->loops.rates.inner_dt_s * US_PER_S + FS_LIT(0.5);
+
+    return (uint32_t)period;
 }
 
 void fs_app_run(fs_app *app, uint32_t now_us)

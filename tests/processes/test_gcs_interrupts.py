@@ -47,6 +47,7 @@ ELSEWHERE = {
     "mission convert": "test_gcs_missions", "log info": "test_gcs_logs", "log plot": "test_gcs_logs",
     "log export": "test_log_export", "log draw": "test_render", "pil fly": "test_gcs_pil",
     "pil doctor": "test_gcs_pil", "pil replay": "test_gcs_pil", "pil generate": "test_law_tree",
+    "pil free-run": "test_gcs_pil",
     "pil build": "test_board_images",
     "pil vectors": "test_gcs_pil",
 }  # fmt: skip

@@ -7,7 +7,7 @@
 
 static volatile uint32_t milliseconds;
 
-#define CYCLES_PER_US ((uint32_t)(F28_SYSCLK_HZ / 1000000UL))
+#define CYCLES_PER_US ((uint32_t)F28_SYSCLK_HZ / (uint32_t)1000000UL)
 
 static uint32_t taken, microseconds; /* cycles that are counted as microseconds */
 static volatile uint32_t interrupted; /* cycles that interrupts took */
@@ -37,7 +37,7 @@ static __interrupt void on_millisecond(void)
 }
 
 /* Let a timer count down from `last` to 0, over and over, at SYSCLK. */
-static void start(uint32_t base, uint32_t last)
+static void start_timer(uint32_t base, uint32_t last)
 {
     CPUTimer_stopTimer(base);
     CPUTimer_setPreScaler(base, 0U);
@@ -51,8 +51,8 @@ void f28_time_init(void)
     milliseconds = 0UL;
     interrupted = 0UL;
     microseconds = 0UL;
-    start(CPUTIMER0_BASE, F28_SYSCLK_HZ / 1000UL - 1UL);
-    start(CPUTIMER1_BASE, 0xFFFFFFFFUL);
+    start_timer(CPUTIMER0_BASE, F28_SYSCLK_HZ / 1000UL - 1UL);
+    start_timer(CPUTIMER1_BASE, 0xFFFFFFFFUL);
     Interrupt_register(INT_TIMER0, &on_millisecond);
     CPUTimer_enableInterrupt(CPUTIMER0_BASE);
     Interrupt_enable(INT_TIMER0);
