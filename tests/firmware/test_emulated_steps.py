@@ -33,8 +33,8 @@ RANDOM_STEPS = 100_000 if NIGHTLY else 20_000
 CALM_PLAN = "square.plan" if NIGHTLY else "hop.plan"
 COMPILERS = ["zig", "gcc"] if NIGHTLY else ["zig"]
 """Of the missions; the random steps, which run both laws, are compiled by both."""
-MEAN_INSTRUCTIONS, MOST_INSTRUCTIONS, MOST_IN_GUSTS_INSTRUCTIONS = 1450, 1950, 2100
-MOST_OF_ANY_INSTRUCTIONS = 2400
+MEAN_INSTRUCTIONS, MOST_INSTRUCTIONS, MOST_IN_GUSTS_INSTRUCTIONS = 1700, 2300, 2450
+MOST_OF_ANY_INSTRUCTIONS = 2900
 LAWS = [pytest.param(0, id="pid"), pytest.param(1, id="backstepping")]
 Emulated = Callable[[bytes, str], tuple[np.ndarray, Costs]]
 
@@ -121,7 +121,7 @@ def test_a_step_stays_within_its_instructions(emulated: Emulated, law: int, name
     In calm air the costliest step is the first one, which resets; in gusts it is one that limits thrust and yaw in a
     tick of the outer loop.
     """
-    # measured: 1332 to 1366; 1837 to 1859, and 1953 to 1975
+    # measured: 1589 to 1624; 2158 to 2180, and 2252 to 2274
     for flight, most in ((calm(), MOST_INSTRUCTIONS), (flown(), MOST_IN_GUSTS_INSTRUCTIONS)):
         _, costs = emulated(by_law(law, flight), name)
         assert costs.mean["whole"] < MEAN_INSTRUCTIONS, costs
@@ -131,4 +131,4 @@ def test_a_step_stays_within_its_instructions(emulated: Emulated, law: int, name
 @pytest.mark.parametrize("name", ["zig", "gcc"])
 def test_any_step_stays_within_its_instructions(emulated: Emulated, name: str) -> None:
     _, costs = emulated(random_stream(), name)
-    assert costs.most["whole"] < MOST_OF_ANY_INSTRUCTIONS, costs  # measured: 2136 and 2152
+    assert costs.most["whole"] < MOST_OF_ANY_INSTRUCTIONS, costs  # measured: 2458 and 2726
