@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -23,7 +23,7 @@ from flightstack.firmware.pil_steps import (
     StepInput,
     Window,
 )
-from flightstack.mavlink.frames import FrameReader
+from flightstack.mavlink.frames import Frame, FrameReader
 from flightstack.mavlink.link import Link, Message
 
 __all__ = ["PilClient", "PilCounters", "PilReport", "PilTiming"]
@@ -69,6 +69,8 @@ class PilClient:
 
     def __init__(self, timing: PilTiming = DEFAULT_TIMING) -> None:
         self.timing = timing
+        self.listener: Callable[[Frame, float], bool] | None = None
+        """Takes the frames of a stream beside the operations: True for a frame that it has processed."""
         self._codec = Link(OWN_SYSTEM, OWN_COMPONENT)
         self._reader = FrameReader()
         self._sequence = 0
@@ -135,6 +137,8 @@ class PilClient:
         counters.bad += reader.faults - faults
         for frame in frames:
             counters.frames += 1
+            if self.listener is not None and self.listener(frame, now_s):
+                continue
             if frame.message_id in REPORT_IDS:
                 self._take_report(PilReport.of(frame.data, frame.message_id))
             elif (message := message_of(self._codec, frame)) is not None:
@@ -192,7 +196,7 @@ class PilClient:
 
     def _drop_partial(self) -> None:
         """Drop an incomplete frame after a timeout, or it would absorb the next one."""
-        if self._reader.has_partial:
+        if self._reader.has_partial and self.listener is None:  # the next frame of a stream completes it
             self.counters.bad += 1
             self._reader = FrameReader()
 

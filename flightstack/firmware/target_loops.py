@@ -56,6 +56,7 @@ class TargetLoops:
         self._link, self._client = link, self.session.client
         self._numbers: dict[str, float] = {}
         self._pending: list[tuple[str, float]] = []  # set one by one: integrals are scaled at each
+        self._is_setting = False  # the client sets the first one of them
         self._is_closed = False
         self.ending: str | None = None
         """Why the target failed, or None."""
@@ -188,8 +189,25 @@ class TargetLoops:
         self._client.start_command(number, refusal, *values)
         self._finish()
 
+    def poll_numbers(self) -> str | None:
+        """Send the next number that was changed, without waiting; return why the target refuses it, or None."""
+        client = self._client
+        if self._is_setting and client.failure is not None:
+            return client.failure
+        if self._is_setting and client.result is not None:
+            del self._pending[0]
+            self._is_setting = False
+        if self._pending:
+            if not self._is_setting:
+                client.start_set(*self._pending[0])
+                self._is_setting = True
+            if data := client.poll(self.session.now_s):
+                self._link.write(data)
+        return None
+
     def send_numbers(self) -> None:
         """Set the numbers that were changed; raise TargetError."""
+        self._is_setting = False
         while self._pending:
             self._client.start_set(*self._pending[0])
             self._finish()

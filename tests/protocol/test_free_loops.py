@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,7 +15,10 @@ from flightstack.firmware.c_loops import CLoops
 from flightstack.firmware.free_loops import STATE_TIMEOUT_MS, FreeLoops
 from flightstack.firmware.target_loops import TargetLoops
 from flightstack.firmware.targets import finish_loops, make_loops
-from tests.firmware.app_support import READY, SAFE, Target
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.frames import message_id_of
+from flightstack.transports.byte_link import LineError
+from tests.firmware.app_support import READY, SAFE, Target, read
 from tests.support.pil_setups import HASH, SPEEDS, setup, sil
 
 PERIOD_US = 2_000
@@ -31,7 +33,9 @@ class FreeLine:
     def __init__(self, device: Target) -> None:
         self._device, self._data = device, b""
         self.now_us = 0
-        self.is_closed = self.is_cut = False
+        self.is_closed = self.is_cut = self.is_lost = False
+        self.dropped: list[int] = []
+        """Ids of messages of which the next frame is lost, in either direction."""
 
     def clock(self) -> float:
         return self.now_us * 1e-6
@@ -44,14 +48,28 @@ class FreeLine:
             self._device.run(self.now_us)
             if self.now_us % 1_000 == 0:
                 self._device.poll(1)
-            self._data += self._device.take()
+            self._data += self._answers()
+
+    def _answers(self) -> bytes:
+        frames = self._device.frames(65_536)
+        return b"".join(frame for frame in frames if not self._drops(message_id_of(frame)))
+
+    def _drops(self, message_id: int) -> bool:
+        if message_id in self.dropped:
+            self.dropped.remove(message_id)
+            return True
+        return False
 
     def write(self, data: bytes) -> None:
-        if not self.is_cut:
+        if self.is_lost:
+            raise LineError("the free line: connection lost")
+        if not self.is_cut and not self._drops(message_id_of(data)):
             self._device.give(data)
-            self._data += self._device.take()
+            self._data += self._answers()
 
     def read(self, timeout_s: float) -> bytes:
+        if self.is_lost:
+            raise LineError("the free line: connection lost")
         if timeout_s > 0.0 and not self._data:
             self.pass_us(round(timeout_s * 1e6))
         data, self._data = self._data, b""
@@ -171,14 +189,97 @@ def test_a_line_that_is_cut_ends_the_flight_with_a_sentence(device: Target) -> N
         level(loops)
 
 
-def test_parameters_change_in_flight(device: Target) -> None:
+PARAM_IDS = (mavlink.MAVLINK_MSG_ID_PARAM_SET, mavlink.MAVLINK_MSG_ID_PARAM_VALUE)
+
+
+@pytest.mark.parametrize("lost", [(), PARAM_IDS[:1], PARAM_IDS[1:], PARAM_IDS])
+def test_parameters_change_in_flight(device: Target, lost: tuple[int, ...]) -> None:
+    """States go on while a lost PARAM_SET or PARAM_VALUE is repeated."""
     loops, line = connected(device)
     level(loops)
+    line.dropped += lost
     loops.set_parameter("POS_Z_P", 3.0)
-    line.pass_us(PERIOD_US)
+    loops.set_parameter("POS_XY_P", 1.5)
+    for _ in range(60):
+        before_us = line.now_us
+        level(loops)
+        assert line.now_us == before_us  # a step does not wait
+        line.pass_us(PERIOD_US)
+    line.pass_us(10 * PERIOD_US)
+    assert line.dropped == []
+    line.read(0.0)
+    values = {name: device.ask(read(name)) for name in ("POS_Z_P", "POS_XY_P")}
+    for name, value in (("POS_Z_P", 3.0), ("POS_XY_P", 1.5)):
+        (answer,) = [each for each in values[name] if each.get_type() == "PARAM_VALUE"]
+        assert answer.param_value == value
+        assert loops.get_parameter(name) == value
+    assert device.state == FREE
+
+
+def test_parameters_change_on_the_ground(device: Target) -> None:
+    loops, line = connected(device)
+    row, state = np.zeros(LoopRow.SIZE), np.array([0.0] * 6 + [1.0] + [0.0] * 6)
+    loops.set_parameter("POS_Z_P", 3.0)
+    for _ in range(5):
+        loops.idle(state, SPEEDS, False, row)
+        line.pass_us(PERIOD_US)
+    line.read(0.0)
+    (answer,) = [each for each in device.ask(read("POS_Z_P")) if each.get_type() == "PARAM_VALUE"]
+    assert answer.param_value == 3.0
+
+
+def test_a_lost_link_on_the_ground_is_one_sentence(device: Target, tmp_path: Path) -> None:
+    loops, line = connected(device)
+    line.is_lost = True
+    with pytest.raises(TargetError, match=r"^the free line: connection lost$"):
+        loops.idle(np.zeros(13), SPEEDS, False, np.zeros(LoopRow.SIZE))
+    finish_loops(loops, tmp_path / "flight.ulg")
+    loops.close()
+    assert line.is_closed
+    assert json.loads((tmp_path / "pil-link.json").read_text())["ending"] == "the free line: connection lost"
+
+
+def test_close_of_a_lost_link_closes_the_line(device: Target) -> None:
+    loops, line = connected(device)
+    line.is_cut = True
+    loops.close()
+    assert line.is_closed
+
+
+def test_a_failed_flight_stops_the_target_and_has_a_record(device: Target, tmp_path: Path) -> None:
+    loops, line = connected(device)
     level(loops)
-    assert loops.get_parameter("POS_Z_P") == 3.0
-    assert math.isclose(loops.executor.get("POS_Z_P"), 3.0)
+    line.pass_us(400_000)
+    with pytest.raises(TargetError, match="No state in time"):
+        level(loops)
+    finish_loops(loops, tmp_path / "flight.ulg")
+    told = json.loads((tmp_path / "pil-link.json").read_text())
+    assert told["status"]["safe_states"] == 1
+    assert "No state in time: rotors stopped" in told["texts"]
+    assert told["ending"].endswith("stopped its rotors: No state in time: rotors stopped")
+    assert device.run_wait_us == 2**32 - 1  # it has stopped its ticks
+
+
+def test_a_pause_on_the_ground_lets_the_target_run_again(device: Target) -> None:
+    """For example until the simulator connects."""
+    loops, line = connected(device)
+    line.pass_us(20_000_000)
+    line.read(0.0)
+    level(loops)
+    line.pass_us(2 * PERIOD_US)
+    assert level(loops)[LoopRow.ROTOR_COMMAND].max() > 0.0
+    assert device.state == FREE
+
+
+def test_states_at_rest_come_before_the_timeout_at_low_rates(device: Target) -> None:
+    loops, line = connected(device)
+    row, state = np.zeros(LoopRow.SIZE), np.array([0.0] * 6 + [1.0] + [0.0] * 6)
+    level(loops)
+    for _ in range(20):  # 20 Hz; the first REST is lost
+        line.dropped += [mavlink.MAVLINK_MSG_ID_FS_PIL_STATE] * (line.now_us == 0)
+        loops.idle(state, SPEEDS, False, row)
+        line.pass_us(50_000)
+    assert device.state == FREE
 
 
 @pytest.mark.parametrize(
