@@ -34,6 +34,7 @@ void fs_app_init(fs_app *app, const fs_port *port)
     fs_outbox_init(&app->outbox);
     app->now_ms = 0UL;
     app->last_octet_ms = 0UL;
+    app->last_frame_ms = 0UL;
     app->last_step_ms = 0UL;
     app->last_heartbeat_ms = 0UL;
     app->last_status_ms = 0UL;
@@ -71,6 +72,7 @@ uint16_t fs_app_is_target(fs_octet system, fs_octet component)
 
 static void handle(fs_app *app)
 {
+    app->last_frame_ms = app->now_ms;
     fs_app_baud_heard(app);
     switch (app->frame.id) {
     case FS_PIL_STEP_ID:
@@ -169,7 +171,7 @@ void fs_app_poll(fs_app *app, uint32_t now_ms)
         app->state = FS_APP_READY; /* nothing is forgotten: the host may go on */
     }
     tell_news(app);
-    fs_app_free_tell(app);
+    fs_app_free_poll(app);
     app->is_polled = 1U;
 }
 

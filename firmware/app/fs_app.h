@@ -51,7 +51,8 @@
 
 #define FS_APP_STEP_TIMEOUT_MS 1000UL /* without a step: no host steps any more */
 #define FS_APP_SILENCE_MS 20UL        /* without an octet: what is held of a frame will not be completed */
-#define FS_APP_BAUD_TRIAL_MS 1000UL /* at a new baud rate without a frame: go back */
+#define FS_APP_REST_TIMEOUT_MS 5000UL /* free-running at rest without a frame: stop */
+#define FS_APP_BAUD_TRIAL_MS 1000UL /* at a new baud rate without a frame: go back; also until a change must begin */
 #define FS_APP_PERIOD_MS 1000UL       /* between heartbeats, between status messages, between complaints */
 
 /* What the application has to know about where it runs; it stays the port's and must outlive the application. */
@@ -72,7 +73,7 @@ typedef struct {
 /* The baud rate of the line; see fs_app_baud.c. */
 typedef struct {
     uint32_t baud, next, former;     /* present one; another one if a change is due; the one to go back to */
-    uint32_t since_ms, unframed_ms;  /* when it began; when the first octet without a frame came */
+    uint32_t since_ms, unframed_ms;  /* when it began or was commanded; when the first octet without a frame came */
     uint16_t is_on_trial, is_unframed, has_heard; /* the last: a frame, since noise was looked for */
 } fs_line;
 
@@ -94,7 +95,7 @@ typedef struct {
     uint32_t now_us, due_us, arrived_us, timeout_us;
     fs_pil_step state; /* its number is the host's time */
     fs_pil_timing timing;
-    uint32_t late_sum_us, age_sum_us, aged, window_ms;
+    uint32_t aged, window_ms; /* ticks with an age in this window; when it began */
 } fs_free;
 
 /* The state of the application: the caller owns it, and looks only at what fs_app_* functions tell. */
@@ -106,7 +107,7 @@ typedef struct {
     fs_outbox outbox;
     fs_octet payload[FS_MAX_PAYLOAD]; /* where a payload is made */
 
-    uint32_t now_ms, last_octet_ms, last_step_ms, last_heartbeat_ms, last_status_ms, last_complaint_ms;
+    uint32_t now_ms, last_octet_ms, last_frame_ms, last_step_ms, last_heartbeat_ms, last_status_ms, last_complaint_ms;
     uint32_t clock_overhead; /* cost of a clock reading; costs are told without it */
     uint16_t is_polled;    /* the three times of last news mean something */
     uint16_t has_received; /* octets since the last poll */

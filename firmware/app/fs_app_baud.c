@@ -3,7 +3,7 @@
  *
  * A new rate begins when the acknowledgement has left, and is on trial until a frame arrives at it. Without one, and when
  * octets arrive for a while of which none is part of a frame, the line goes back: a host at another rate finds the target
- * within seconds. Silence changes nothing.
+ * within seconds. Silence changes nothing. A change that cannot begin within a second is dropped.
  */
 #include "fs_app_parts.h"
 #include "fs_constants.h"
@@ -23,6 +23,13 @@ void fs_app_baud_init(fs_app *app)
     app->line.unframed_ms = 0UL;
 }
 
+static void go_to(fs_app *app, uint32_t baud, uint32_t former)
+{
+    app->line.next = baud;
+    app->line.former = former;
+    app->line.since_ms = app->now_ms;
+}
+
 uint16_t fs_app_set_baud(fs_app *app, float baud)
 {
     uint16_t result = FS_MAV_RESULT_ACCEPTED;
@@ -34,8 +41,7 @@ uint16_t fs_app_set_baud(fs_app *app, float baud)
     } else if (app->line.next != app->line.baud) { /* a trial is none: this command is a frame, which ends it */
         result = FS_MAV_RESULT_TEMPORARILY_REJECTED;
     } else {
-        app->line.next = (uint32_t)baud;
-        app->line.former = app->line.baud;
+        go_to(app, (uint32_t)baud, app->line.baud);
     }
     return result;
 }
@@ -83,11 +89,13 @@ void fs_app_baud_poll(fs_app *app)
 {
     if (app->line.next != app->line.baud) {
         go_to_next(app);
+        if ((app->now_ms - app->line.since_ms) >= FS_APP_BAUD_TRIAL_MS) {
+            app->line.next = app->line.baud; /* the line was never free: a host that waits is gone by now */
+        }
     } else if ((app->line.is_on_trial != 0U) && ((app->now_ms - app->line.since_ms) >= FS_APP_BAUD_TRIAL_MS)) {
-        app->line.next = app->line.former;
+        go_to(app, app->line.former, app->line.former);
     } else if ((app->line.baud != app->port->baud) && (is_only_noise(app) != 0U)) {
-        app->line.former = app->port->baud;
-        app->line.next = app->port->baud;
+        go_to(app, app->port->baud, app->port->baud);
     } else {
         /* the rate is right, or nobody speaks */
     }

@@ -21,18 +21,15 @@ static void begin_window(fs_app *app)
     static const fs_pil_timing blank = {0};
 
     app->free.timing = blank;
-    app->free.late_sum_us = 0UL;
-    app->free.age_sum_us = 0UL;
     app->free.aged = 0UL;
     app->free.window_ms = app->now_ms;
 }
 
 void fs_app_free_init(fs_app *app)
 {
-    app->free.is_on = 0U;
-    app->free.is_flying = 0U;
-    app->free.has_time = 0U;
-    app->free.now_us = 0UL;
+    static const fs_free blank = {0};
+
+    app->free = blank;
     begin_window(app);
 }
 
@@ -128,6 +125,7 @@ void fs_app_on_state(fs_app *app)
     } else if ((app->free.is_flying == 0U) && ((message.flags & FS_RESET) == 0UL)) {
         /* nothing flies until RESET */
     } else if (fault != NULL) {
+        app->free.state.step = state.step; /* the host tells by it which flight was refused */
         stop_running(app, fault);
     } else {
         take_state(app, &state);
@@ -164,12 +162,18 @@ static void run_loops(fs_app *app, fs_pil_report *report)
     }
 }
 
+/* A sum of a second's ages could exceed 32 bits. */
+static void add_to_mean(float *mean, uint32_t value, uint32_t count)
+{
+    *mean += ((float)value - *mean) / (float)count;
+}
+
 static void note_age(fs_app *app, uint32_t age_us)
 {
     fs_pil_timing *timing = &app->free.timing;
 
     app->free.aged++;
-    app->free.age_sum_us += age_us;
+    add_to_mean(&timing->age_mean_us, age_us, app->free.aged);
     if (age_us > timing->age_max_us) {
         timing->age_max_us = age_us;
     }
@@ -184,6 +188,9 @@ static void send_drive(fs_app *app, const fs_pil_report *report, uint32_t age_us
     fs_pil_drive drive;
     uint16_t i;
 
+    if (app->line.next != app->line.baud) { /* the line changes its rate as soon as the outbox is empty */
+        return;
+    }
     drive.state_time_us = app->free.state.step;
     drive.status = report->status;
     drive.age_us = age_us;
@@ -209,7 +216,7 @@ static void tick(fs_app *app, uint32_t late_us)
     const uint32_t age_us = run->now_us - run->arrived_us;
 
     run->timing.ticks++;
-    run->late_sum_us += late_us;
+    add_to_mean(&run->timing.late_mean_us, late_us, run->timing.ticks);
     if (late_us > run->timing.late_max_us) {
         run->timing.late_max_us = late_us;
     }
@@ -273,23 +280,28 @@ uint32_t fs_app_run_wait_us(const fs_app *app)
     return left_us;
 }
 
-/* Once a period: the figures since the last time. */
-void fs_app_free_tell(fs_app *app)
+/* Once a period: the figures since the last time. Figures without room count in the next period. */
+static void tell_timing(fs_app *app)
 {
-    fs_free *run = &app->free;
-    fs_pil_timing *timing = &run->timing;
+    fs_pil_timing *timing = &app->free.timing;
 
-    if ((run->is_on == 0U) || ((app->now_ms - run->window_ms) < FS_APP_PERIOD_MS)) {
-        return;
-    }
-    if (timing->ticks > 0UL) {
-        timing->late_mean_us = (float)run->late_sum_us / (float)timing->ticks;
-    }
-    if (run->aged > 0UL) {
-        timing->age_mean_us = (float)run->age_sum_us / (float)run->aged;
-    }
     timing->period_us = period_us(app);
-    (void)fs_outbox_put(&app->outbox, FS_PIL_TIMING_ID, app->payload, fs_pil_timing_encode(timing, app->payload),
-                        FS_OUTBOX_ANSWER);
-    begin_window(app);
+    if (fs_outbox_put(&app->outbox, FS_PIL_TIMING_ID, app->payload, fs_pil_timing_encode(timing, app->payload),
+                      FS_OUTBOX_ANSWER) != 0U) {
+        begin_window(app);
+    }
+    app->free.window_ms = app->now_ms;
+}
+
+void fs_app_free_poll(fs_app *app)
+{
+    const fs_free *run = &app->free;
+
+    if ((run->is_on != 0U) && (run->is_flying == 0U) &&
+        ((app->now_ms - app->last_frame_ms) >= FS_APP_REST_TIMEOUT_MS)) {
+        fs_app_free_stop(app); /* the host is gone */
+    }
+    if ((run->is_on != 0U) && ((app->now_ms - run->window_ms) >= FS_APP_PERIOD_MS)) {
+        tell_timing(app);
+    }
 }

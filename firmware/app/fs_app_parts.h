@@ -39,7 +39,7 @@ void fs_app_free_init(fs_app *app);
 uint16_t fs_app_free_command(fs_app *app, float what, float every, float timeout_ms);
 void fs_app_free_stop(fs_app *app);
 void fs_app_on_state(fs_app *app);
-void fs_app_free_tell(fs_app *app);
+void fs_app_free_poll(fs_app *app); /* tell figures; end at rest without a host */
 
 /* fs_app_params.c */
 void fs_app_on_param_list(fs_app *app);

@@ -169,3 +169,30 @@ def test_the_terminal_of_the_host_takes_every_rate() -> None:
     target.poll(1)
     assert target.request("FS_PIL_IDENTITY").baud == 2_000_000
     target.close()
+
+
+def test_a_change_that_cannot_begin_is_dropped(target: Target) -> None:
+    target.is_sending = True
+    assert set_baud(target, FAST) == ACCEPTED
+    target.poll(1_000)
+    target.is_sending = False
+    target.poll(1)
+    target.heard()
+    assert target.baud == START_BAUD
+    assert set_baud(target, OTHER) == ACCEPTED
+    target.poll(1)
+    assert target.baud == OTHER
+
+
+def test_a_return_that_cannot_begin_is_tried_again(target: Target) -> None:
+    assert set_baud(target, FAST) == ACCEPTED
+    target.poll(1)
+    assert target.baud == FAST
+    target.is_sending = True
+    for _ in range(4):
+        target.poll(1_000)
+    target.is_sending = False
+    for _ in range(3):
+        target.heard()
+        target.poll(1)
+    assert target.baud == START_BAUD

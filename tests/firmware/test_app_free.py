@@ -26,6 +26,7 @@ from tests.firmware.app_support import (
     Target,
     command,
     kinds,
+    step,
 )
 
 FREE, REST = 4, 16
@@ -297,3 +298,71 @@ def test_deadlines_and_heartbeats(target: Target) -> None:
     target.run(PERIOD_US - 1)
     assert target.run_wait_us == 1
     assert target.request("HEARTBEAT").system_status == mavlink.MAV_STATE_ACTIVE
+
+
+def test_a_target_at_rest_without_a_host_stops_its_ticks() -> None:
+    target = Target()
+    started(target)
+    at(target, 0, state(1, RESET), state(2, REST))
+    for _ in range(3):
+        target.poll(4_000)
+        target.heard()
+        assert target.state == FREE
+        at(target, target.now_ms * 1_000, state(3, REST))  # any frame will do
+    target.poll(5_000)
+    assert target.state == READY
+    assert target.run_wait_us == 2**32 - 1
+    target.close()
+
+
+def test_the_safe_state_lasts_when_the_ticks_stop_without_a_host(target: Target) -> None:
+    at(target, 0, state(1, RESET))
+    target.run(200_000)
+    target.poll(5_000)
+    assert target.state == SAFE
+    assert target.run_wait_us == 2**32 - 1
+
+
+def test_the_time_of_a_refused_first_state_is_told(target: Target) -> None:
+    """A host drops commands from before its flight: it could not tell why the rotors stand."""
+    at(target, 0, state(77, RESET, [math.nan, *LEVEL[1:]]))
+    (drive,) = at(target, PERIOD_US)
+    assert (drive.state_time_us, drive.status) == (77, BAD_INPUT)
+
+
+def test_the_mean_age_does_not_overflow() -> None:
+    target = Target()
+    started(target, timeout_ms=10_000)
+    at(target, 0, state(1, RESET))
+    for tick in range(1, 1_001):
+        target.run(8_000_000 + tick)
+        target.run(8_000_000 + tick * PERIOD_US)
+    target.heard()
+    assert timing(target).age_mean_us > 8_000_000
+    target.close()
+
+
+def test_figures_without_room_count_in_the_next_second(target: Target) -> None:
+    at(target, 0, state(1, RESET))
+    for _ in range(60):  # refused in flight, with a report each
+        target.give(target.pack(step(3)))
+    target.poll(1_000)
+    assert "FS_PIL_TIMING" not in kinds(target.heard())
+    target.poll(10)
+    assert "FS_PIL_TIMING" not in kinds(target.heard())
+    at(target, PERIOD_US)
+    assert timing(target).ticks == 2
+
+
+def test_a_baud_rate_changes_while_commands_are_sent() -> None:
+    """At a rate that is too slow for them."""
+    target = Target(bauds=(921_600,))
+    started(target)
+    target.give(target.pack(state(0, RESET)))
+    target.give(target.pack(command(mavlink.MAV_CMD_FS_SET_BAUD_RATE, 921_600)))
+    for tick in range(100):
+        target.run(PERIOD_US * tick)
+        target.take(20)
+        target.poll(2)
+    assert target.baud == 921_600
+    target.close()
