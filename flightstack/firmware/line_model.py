@@ -23,6 +23,8 @@ USB_S = 1.25e-4
 """Delay of high-speed USB per exchange: a microframe."""
 _FRAME, _FLOAT = HEADER_V2 + CHECKSUM_SIZE, 4
 _INNER_STATE, _STAGES = 7, 5 + 10 + 4 + 4
+STATE_OCTETS = _FRAME + 8 + _FLOAT * (STATE_SIZE + SETPOINT_SIZE)
+"""Octets of an FS_PIL_STATE."""
 
 
 class Line(NamedTuple):
@@ -83,6 +85,11 @@ def replay_hz(line: Line, period: Sequence[Octets], window: int) -> float:
     steps = [period[at % len(period)] for at in range(window * len(period))]
     windows = [steps[at : at + window] for at in range(0, len(steps), window)]
     return len(steps) / sum(exchange_s(line, each) for each in windows)
+
+
+def free_running_baud(rate_hz: float) -> float:
+    """Return the baud rate that states of a free-running target require at ``rate_hz``; its commands are shorter."""
+    return STATE_OCTETS * BITS_PER_OCTET * rate_hz
 
 
 def spare_latency_s(line: Line, period: Sequence[Octets], rate_hz: float) -> float:

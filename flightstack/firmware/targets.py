@@ -23,6 +23,7 @@ from flightstack.firmware.choice import (
 )
 from flightstack.firmware.free_loops import FreeLoops
 from flightstack.firmware.law_tree import firmware_for
+from flightstack.firmware.line_model import free_running_baud
 from flightstack.firmware.line_rate import negotiate_baud
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilTiming
 from flightstack.firmware.target_loops import TargetLoops
@@ -154,11 +155,23 @@ def connect(choice: LoopsChoice, numbers: dict[str, float]) -> TargetLoops | Fre
     try:
         if isinstance(link, SerialPort):
             note = negotiate_baud(link, choice.baud, timing)
+            if choice.ending == FREE:
+                _check_rate(link, choice.baud if note is None else DEFAULT_BAUD, numbers["FS_INNER_HZ"], note)
         loops = TargetLoops(link, numbers, timing, short=choice.ending == SHORT, note=note)
         return FreeLoops(loops) if choice.ending == FREE else loops
     except BaseException:
         link.close()
         raise
+
+
+def _check_rate(link: SerialPort, baud: int, inner_hz: float, note: str | None) -> None:
+    """Raise LineError for a line on which states of a free-running target would arrive ever later."""
+    if (required := free_running_baud(inner_hz)) > baud:
+        reason = "" if note is None else f" ({note})"
+        raise LineError(
+            f"{link.name}: free-running at {inner_hz:g} Hz requires at least {required:.0f} baud, "
+            f"such as serial:DEVICE:921600,free{reason}"
+        )
 
 
 def finish_loops(loops: ControlBackend, log: Path | None) -> None:

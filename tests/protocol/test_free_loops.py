@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import pty
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,6 +15,7 @@ from flightstack.core.contract import LoopRow
 from flightstack.core.errors import ConfigError, TargetError
 from flightstack.firmware.c_loops import CLoops
 from flightstack.firmware.free_loops import STATE_TIMEOUT_MS, FreeLoops
+from flightstack.firmware.line_model import STATE_OCTETS
 from flightstack.firmware.target_loops import TargetLoops
 from flightstack.firmware.targets import finish_loops, make_loops
 from flightstack.mavlink.dialect import mavlink
@@ -280,6 +283,20 @@ def test_states_at_rest_come_before_the_timeout_at_low_rates(device: Target) -> 
         loops.idle(state, SPEEDS, False, row)
         line.pass_us(50_000)
     assert device.state == FREE
+
+
+def test_free_running_refuses_a_line_too_slow_for_its_states() -> None:
+    ours, theirs = pty.openpty()
+    name = f"serial:{os.ttyname(theirs)}:115200,free"
+    with pytest.raises(ConfigError, match=r"free-running at 500 Hz requires at least 580000 baud"):
+        make_loops(name, setup(), lockstep=False)
+    os.close(ours)
+    os.close(theirs)
+
+
+def test_octets_of_a_state_are_those_of_the_line_model(device: Target) -> None:
+    state = mavlink.MAVLink_fs_pil_state_message(1, 1, [1.0] * 13, [1.0] * 11)
+    assert len(state.pack(mavlink.MAVLink(None, 1, 1))) == STATE_OCTETS
 
 
 @pytest.mark.parametrize(
