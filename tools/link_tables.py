@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from flightstack.firmware.line_model import (
+    STATE_OCTETS,
     Line,
     Octets,
+    free_running_baud,
     lockstep_hz,
     period_octets,
     replay_hz,
@@ -49,6 +51,9 @@ and target, to keep the inner rate in real time.
 * 1 kHz fits at 2 Mbaud if it delays an answer by {one_ms:.2f} ms at most; with a timer of 1 ms it reaches
   {one_hz:.0f} steps/s. The F28377S cannot make 2 Mbaud; it makes 2.5 Mbaud.
 
+A free-running target (`TARGET,free`) receives a state of {octets} octets per inner tick: at least
+{half_baud:.0f} baud at 500 Hz and {one_baud:.0f} at 1 kHz. A slower line is refused.
+
 A flight in lockstep does not depend on any of this: a slower line makes it longer and changes nothing in it.
 """
 
@@ -62,6 +67,9 @@ def link_page(note: str) -> str:
     ]
     half, one = (period_octets(ROTORS, True, divisor) for _, divisor in RATES_HZ)
     tail = TAIL.format(
+        octets=STATE_OCTETS,
+        half_baud=free_running_baud(500.0),
+        one_baud=free_running_baud(1000.0),
         half_ms=spare_latency_s(Line(921_600), half, 500.0) * 1e3,
         half_hz=lockstep_hz(Line(921_600, 1e-3), half),
         one_ms=spare_latency_s(Line(2_000_000), one, 1000.0) * 1e3,

@@ -62,6 +62,9 @@ class ControlBackend(Protocol):
     def idle(self, state: FloatArray, rotor_speed_rad_s: FloatArray, armed: bool, row: FloatArray) -> None:
         """Write ``row`` for a vehicle that must not fly: rotors at idle speed when armed, else stopped."""
 
+    def hold(self) -> None:
+        """Keep a target running in a tick in which the last rotor commands are held."""
+
     def close(self) -> None:
         """Release resources; no other call may follow."""
 

@@ -192,5 +192,8 @@ class PythonLoops:
         """Write ``row`` for a vehicle that must not fly: rotors at idle speed when armed, else stopped."""
         self._idle.write(state, rotor_speed_rad_s, armed, row)
 
+    def hold(self) -> None:
+        """Do nothing: there is no target."""
+
     def close(self) -> None:
         """Do nothing: there are no resources to release."""

@@ -59,6 +59,9 @@ class LoopExecutor(Protocol):
     def rest(self) -> None:
         """Note a tick on the ground, in which the loops do not run."""
 
+    def hold(self) -> None:
+        """Keep a target running in a tick without a step in flight; raise TargetError."""
+
     def close(self) -> None:
         """Release resources; no step may follow."""
 
@@ -175,6 +178,10 @@ class CLoops:
         self.executor.rest()
         self._idle.write(state, rotor_speed_rad_s, armed, row)
 
+    def hold(self) -> None:
+        """Keep a target running in a tick in which the last rotor commands are held."""
+        self.executor.hold()
+
     def close(self) -> None:
         """Release the executor."""
         self.executor.close()
@@ -238,6 +245,9 @@ class HostLoops:
 
     def rest(self) -> None:
         """Do nothing."""
+
+    def hold(self) -> None:
+        """Do nothing: there is no target."""
 
     def close(self) -> None:
         """Do nothing: memory is freed with the object."""

@@ -45,6 +45,7 @@ class FreeLoops:
         self._session.client.listener = self._free.take_frame
         self._sent_s = -math.inf
         self._given = 0
+        self._held: list[float] = []
         self._is_closed = False
         self.input: FloatArray = np.zeros(INPUT_SIZE)
         self.output: FloatArray = np.full(OUTPUT_SIZE, math.nan)
@@ -71,10 +72,8 @@ class FreeLoops:
         ):  # holds until the next outer tick, here and there
             self._given = flags & LoopFlags.SET_TARGET
         flags = flags & LoopFlags.RESET | self._given
-        self._exchange(flags, sent_numbers(flags, self.input))
-        if (problem := self._free.failure(self._session.now_s)) is not None:
-            texts = self._session.client.texts
-            self._fail(problem + (f": {texts[-1][1]}" if texts and self._free.status & BAD_INPUT else ""))
+        self._held = sent_numbers(flags, self.input)
+        self._fly(flags)
         level = self.input[6:10].tolist()
         attitude = (*level, *level, 0.0) if self._free.attitude is None else self._free.attitude
         self.output[REFERENCE_AT : REFERENCE_AT + REFERENCE_ATTITUDE_SIZE] = attitude[
@@ -88,12 +87,24 @@ class FreeLoops:
         """Raise TargetError: a replay needs a target that computes each step."""
         raise TargetError("a free-running target cannot replay a flight")
 
+    def hold(self) -> None:
+        """Repeat the last state of a flight, or the target would stop the rotors; raise TargetError."""
+        if self._free.is_flying:
+            self._fly(self._given)
+
     def rest(self) -> None:
         """Tell the target that the vehicle is on the ground: no states follow until the next flight."""
         if self._free.is_flying or self._session.now_s - self._sent_s >= _REST_S:
             self._exchange(REST, [0.0] * 24)
         else:
             self._poll()
+
+    def _fly(self, flags: int) -> None:
+        """Exchange the newest state; raise TargetError."""
+        self._exchange(flags, self._held)
+        if (problem := self._free.failure(self._session.now_s)) is not None:
+            texts = self._session.client.texts
+            self._fail(problem + (f": {texts[-1][1]}" if texts and self._free.status & BAD_INPUT else ""))
 
     def _exchange(self, flags: int, numbers: Sequence[float]) -> None:
         session = self._session

@@ -138,6 +138,9 @@ class TargetLoops:
     def rest(self) -> None:
         """Do nothing: a target in lockstep waits for the next step."""
 
+    def hold(self) -> None:
+        """Do nothing: a target in lockstep waits for the next step."""
+
     def close(self) -> None:
         """Read the target's counters and close the link; a second call does nothing."""
         if self._is_closed:

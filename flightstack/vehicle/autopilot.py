@@ -55,6 +55,7 @@ class Autopilot:
             self._backend.idle(now.state, now.rotor_speed, now.status.armed, row)
             failsafes.follow_rotors(row)
         elif failsafes.states.holds_rotors:
+            self._backend.hold()
             row[:] = self._good_row
             row[LoopRow.STATUS] = LoopStatus.INPUT_STALE
         else:

@@ -263,6 +263,26 @@ def test_a_failed_flight_stops_the_target_and_has_a_record(device: Target, tmp_p
     assert device.run_wait_us == 2**32 - 1  # it has stopped its ticks
 
 
+def test_a_hold_keeps_the_target_flying(device: Target) -> None:
+    """The flight stack holds its commands while its own state is stale."""
+    loops, line = connected(device)
+    for _ in range(10):
+        level(loops)
+        line.pass_us(PERIOD_US)
+    for _ in range(500):
+        loops.hold()
+        line.pass_us(PERIOD_US)
+    assert device.state == FREE
+    assert level(loops)[LoopRow.ROTOR_COMMAND].max() > 0.0
+    assert device.status().safe_states == 0
+
+
+def test_a_hold_before_the_first_flight_sends_nothing(device: Target) -> None:
+    loops, line = connected(device)
+    line.is_lost = True
+    loops.hold()
+
+
 def test_a_pause_on_the_ground_lets_the_target_run_again(device: Target) -> None:
     """For example until the simulator connects."""
     loops, line = connected(device)
