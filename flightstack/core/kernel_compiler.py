@@ -18,6 +18,7 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvid
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult, Flags
 from numba.core.environment import lookup_environment
+from numba.core.sigutils import normalize_signature
 from numba.core.typing.templates import AbstractTemplate, Signature, infer_global, signature
 
 _DEFAULTS = {name: option.default for name, option in Flags.options.items()}
@@ -134,6 +135,15 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
 
     _impl_class = _KernelCacheImpl
 
+    def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
+        """Return the stored result for these types, or None.
+
+        Two processes that save for the first time at once choose the same file: the index of one names the other's.
+        """
+        stored = super().load_overload(sig, target_context)
+        arguments, _ = normalize_signature(sig)
+        return stored if stored is not None and tuple(stored.signature.args) == tuple(arguments) else None
+
 
 class _PartCacheImpl(_KernelCacheImpl):
     def rebuild(self, target_context: Any, payload: Any) -> CompileResult:
@@ -164,7 +174,7 @@ class _PartCacheImpl(_KernelCacheImpl):
         )
 
 
-class PartCache(FunctionCache):  # type: ignore[misc]
+class PartCache(KernelCache):
     """Cache on disk of functions that compiled functions call."""
 
     _impl_class = _PartCacheImpl

@@ -137,6 +137,7 @@ class QemuLink:
             pipe.close()
 
 
+@pytest.mark.skipif(not NIGHTLY, reason="half a minute: NIGHTLY=1 runs it")
 def test_a_nucleos_image_runs_in_qemu_by_its_interrupts() -> None:
     """Vectors, SysTick and USART2 by QEMU's interrupt controller; its clock registers are missing: 16 MHz.
 

@@ -23,8 +23,8 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "barometer": fusion.fuse_baro,
     "range": fusion.fuse_range,
     "field": fusion.fuse_field,
-    "yaw": fusion.fuse_yaw,
     "rest": fusion.fuse_rest,
+    "held position": fusion.fuse_hold,
     "IMU sums": imu_input.add_sample,
     "alignment": alignment.align,
 }

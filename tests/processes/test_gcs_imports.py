@@ -145,7 +145,7 @@ USED: dict[str, set[str]] = {
     "replay": {"numpy", "pyulog"},
     "report": {"numpy", "pyulog", "jinja2"},
     "compare": {"numpy", "pyulog", "jinja2", "rich"},
-    "estimate": {"numpy", "numba", "pyulog", "jinja2"},
+    "estimate": {"numpy", "numba", "scipy", "pyulog", "jinja2"},
     "watch": {"rich"},
 }
 """Libraries that a command imports at once, because it uses them always."""

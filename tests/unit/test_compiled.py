@@ -132,7 +132,7 @@ def test_no_module_that_compiled_code_names_escapes_the_digest() -> None:
 def test_a_specialised_kernel_is_cached_by_the_sources_of_all_its_parts() -> None:
     top = Path(module.__file__).parents[2]
     made_of = ("sim_bridge.plant.integrator", "sim_bridge.plant.paper")
-    joined = ("flightstack.control.loops", "flightstack.control.attitude_backstepping")
+    joined = ("flightstack.control.loops", "sim_bridge.plant.paper")
     assert digest_of(top, *joined) != digest_of(top, *joined[:1])
     expected = kernel_cache.digest(top, made_of, numba.__version__)
     if "NUMBA_DISABLE_JIT" not in os.environ:
@@ -202,6 +202,30 @@ def test_copies_of_the_sources_share_their_kernels(tmp_path: Path) -> None:
         )
         hits.append(int(done.stdout))
     assert hits == [0, 1]
+
+
+def test_a_stored_kernel_for_other_types_is_not_used(tmp_path: Path) -> None:
+    """Two processes that save their first kernel of a function at once write the same file."""
+    code = """if True:
+        from flightstack.core.geometry import Quaternion, quaternion_product
+        for number in (1, 1.0):
+            turn = Quaternion(0 * number, number, 0 * number, 0 * number)
+            print(*quaternion_product(turn, turn))"""
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+    environment.pop("NUMBA_CACHE_DIR", None)
+
+    def printed() -> str:
+        return subprocess.run(
+            [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+        ).stdout
+
+    assert printed() == "-1 0 0 0\n-1.0 0.0 0.0 0.0\n"
+    stored = sorted(tmp_path.rglob("geometry.quaternion_product-*.nbc"))
+    assert len(stored) == 2 * ("NUMBA_DISABLE_JIT" not in os.environ)
+    contents = [path.read_bytes() for path in stored]
+    for path, content in zip(stored, reversed(contents), strict=True):
+        path.write_bytes(content)
+    assert printed() == "-1 0 0 0\n-1.0 0.0 0.0 0.0\n"
 
 
 def test_cache_directory_of_other_numba_users_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:

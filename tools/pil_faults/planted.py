@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -125,11 +125,11 @@ def checks_of(
     yield from difference_checks(pair, differences, STAGE_LIMITS)
 
 
-def findings(core: PlantedCore) -> Iterator[Finding]:
-    """Replay the excitation with each fault."""
+def findings(core: PlantedCore, planted: Iterable[Fault]) -> Iterator[Finding]:
+    """Replay the excitation with each of the faults."""
     sound, setups = core.library(), {name: setup_of(name) for name in (PID, BACKSTEPPING)}
     records = {name: excitation(setup) for name, setup in setups.items()}
-    for fault in faults():
+    for fault in planted:
         setup, record = setups[fault.controller], records[fault.controller]
         library = core.library(fault) if fault.file else sound
         checks = checks_of(library, setup, record, fault)
