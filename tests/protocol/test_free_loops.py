@@ -233,9 +233,11 @@ def test_parameters_change_on_the_ground(device: Target) -> None:
 
 def test_a_lost_link_on_the_ground_is_one_sentence(device: Target, tmp_path: Path) -> None:
     loops, line = connected(device)
+    row, state = np.zeros(LoopRow.SIZE), np.array([0.0] * 6 + [1.0] + [0.0] * 6)
+    loops.idle(state, SPEEDS, False, row)
     line.is_lost = True
     with pytest.raises(TargetError, match=r"^the free line: connection lost$"):
-        loops.idle(np.zeros(13), SPEEDS, False, np.zeros(LoopRow.SIZE))
+        loops.idle(state, SPEEDS, False, row)  # in which no state is due
     finish_loops(loops, tmp_path / "flight.ulg")
     loops.close()
     assert line.is_closed
