@@ -23,7 +23,7 @@ from flightstack.firmware.choice import (
 )
 from flightstack.firmware.free_loops import FreeLoops
 from flightstack.firmware.law_tree import firmware_for
-from flightstack.firmware.line_rate import negotiate_baud
+from flightstack.firmware.line_rate import RatedLink, negotiate_baud
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilTiming
 from flightstack.firmware.target_loops import TargetLoops
 from flightstack.transports.byte_link import ByteLink, LineError
@@ -152,7 +152,7 @@ def connect(choice: LoopsChoice, numbers: dict[str, float]) -> TargetLoops | Fre
     """Return the loops on a target with their numbers; raise BuildError, LineError, TargetError, WrongFirmwareError."""
     link, timing, note = open_link(choice), timing_of(choice), None
     try:
-        if isinstance(link, SerialPort):
+        if isinstance(link, RatedLink):
             note = negotiate_baud(link, choice.baud, timing)
         loops = TargetLoops(link, numbers, timing, short=choice.ending == SHORT, note=note)
         return FreeLoops(loops) if choice.ending == FREE else loops
