@@ -5,6 +5,7 @@ from __future__ import annotations
 from flightstack.firmware.line_model import (
     Line,
     Octets,
+    free_baud,
     lockstep_hz,
     period_octets,
     replay_hz,
@@ -50,6 +51,12 @@ and target, to keep the inner rate in real time.
   {one_hz:.0f} steps/s. The F28377S cannot make 2 Mbaud; it makes 2.5 Mbaud.
 
 A flight in lockstep does not depend on any of this: a slower line makes it longer and changes nothing in it.
+
+## Free-running
+
+A [free-running target](pil.md#free-running) receives a state and sends commands in each tick, and a line that is too
+slow would delay both more and more. `--loops TARGET,free` is refused below {free_half:.0f} baud at 500 Hz, and
+{free_one:.0f} baud at 1 kHz: ten bits for each octet of the longer frame.
 """
 
 
@@ -66,6 +73,8 @@ def link_page(note: str) -> str:
         half_hz=lockstep_hz(Line(921_600, 1e-3), half),
         one_ms=spare_latency_s(Line(2_000_000), one, 1000.0) * 1e3,
         one_hz=lockstep_hz(Line(2_000_000, 1e-3), one),
+        free_half=free_baud(500.0),
+        free_one=free_baud(1000.0),
     )
     return HEAD.format(note=note) + "".join(sections) + tail
 

@@ -8,11 +8,13 @@ when an answer arrives, exchanges take whole periods of that timer.
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from flightstack.core.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, STATE_SIZE
 from flightstack.firmware.pil_steps import REFERENCE_ATTITUDE_SIZE
+from flightstack.mavlink.dialect import LAYOUT_BY_NAME
 from flightstack.mavlink.frames import CHECKSUM_SIZE, HEADER_V2
 
 BITS_PER_OCTET = 10.0
@@ -57,6 +59,13 @@ def period_octets(rotors: int, short: bool, divisor: int) -> list[Octets]:
     """Return the exchanges of an outer period of ``divisor`` inner ticks."""
     ticks = range(divisor)
     return [octets_of(rotors, short, tick == 0, short and tick == divisor - 1) for tick in ticks]
+
+
+def free_baud(inner_hz: float) -> float:
+    """Return the least baud rate of a free-running target: states and commands at the inner rate, at once."""
+    layouts = (LAYOUT_BY_NAME[name] for name in ("FS_PIL_STATE", "FS_PIL_DRIVE"))
+    longest = max(_FRAME + struct.calcsize(layout.format) for layout in layouts)
+    return longest * BITS_PER_OCTET * inner_hz
 
 
 def exchange_s(line: Line, exchanges: Sequence[Octets]) -> float:

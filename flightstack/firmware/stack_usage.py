@@ -1,8 +1,8 @@
 """Stack of each function and the deepest call path, as GCC reports them with ``-fcallgraph-info=su``.
 
 They are GCC's frames, not those of the image that another compiler makes with link-time optimisation; a target reports
-its own high-water mark. A call through a pointer, or out of the given sources, ends a path; after the former the path is
-no bound.
+its own high-water mark. A call out of the given sources ends a path, and so does a call through a
+pointer, with which the deepest path is no bound.
 """
 
 from __future__ import annotations

@@ -23,6 +23,7 @@ from flightstack.firmware.choice import (
 )
 from flightstack.firmware.free_loops import FreeLoops
 from flightstack.firmware.law_tree import firmware_for
+from flightstack.firmware.line_model import free_baud
 from flightstack.firmware.line_rate import RatedLink, negotiate_baud
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilTiming
 from flightstack.firmware.target_loops import TargetLoops
@@ -111,6 +112,8 @@ def make_loops(loops: str, setup: LoopsSetup, lockstep: bool = True) -> ControlB
 
 
 def _check_clock(choice: LoopsChoice, loops: str, lockstep: bool) -> None:
+    if choice.ending == FREE and choice.kind == EMULATED:
+        raise ConfigError("--loops", loops, "cannot run by its own timer: an emulated target has none")
     if choice.ending == FREE and lockstep:
         problem = f"a free-running target ({loops}) requires --clock realtime: it has its own time"
         raise ConfigError("--clock", "lockstep", problem)
@@ -154,11 +157,20 @@ def connect(choice: LoopsChoice, numbers: dict[str, float]) -> TargetLoops | Fre
     try:
         if isinstance(link, RatedLink):
             note = negotiate_baud(link, choice.baud, timing)
+        if choice.kind == SERIAL and choice.ending == FREE:
+            _check_speed(choice.baud if note is None else DEFAULT_BAUD, numbers["FS_INNER_HZ"])
         loops = TargetLoops(link, numbers, timing, short=choice.ending == SHORT, note=note)
         return FreeLoops(loops) if choice.ending == FREE else loops
     except BaseException:
         link.close()
         raise
+
+
+def _check_speed(baud: int, inner_hz: float) -> None:
+    """Raise LineError if a line is too slow for a free-running target: old states would wait on it."""
+    if (least := free_baud(inner_hz)) > baud:
+        needs = f"at {inner_hz:g} Hz a free-running target requires {least:.0f} baud"
+        raise LineError(f"{needs}, and the line runs at {baud}: use serial:DEVICE:BAUD or a lower --inner-hz")
 
 
 def finish_loops(loops: ControlBackend, log: Path | None) -> None:

@@ -183,7 +183,11 @@ def test_parameters_change_in_flight(device: Target) -> None:
 
 @pytest.mark.parametrize(
     ("loops", "lockstep", "words"),
-    [("host,free", True, "requires --clock realtime"), ("host", False, "require lockstep")],
+    [
+        ("host,free", True, "requires --clock realtime"),
+        ("host", False, "require lockstep"),
+        ("emulated,free", False, "cannot run by its own timer"),
+    ],
 )
 def test_a_target_flies_on_its_own_clock_alone(loops: str, lockstep: bool, words: str) -> None:
     with pytest.raises(ConfigError, match=words):

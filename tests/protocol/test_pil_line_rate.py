@@ -12,11 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from flightstack.core.errors import TargetError
+from flightstack.core.errors import ConfigError, TargetError
+from flightstack.firmware import targets
 from flightstack.firmware.choice import LoopsChoice
 from flightstack.firmware.line_rate import negotiate_baud
 from flightstack.firmware.pil_client import DEFAULT_TIMING
 from flightstack.firmware.target_loops import TargetLoops
+from flightstack.firmware.targets import make_loops
 from flightstack.transports.byte_link import LineError
 from flightstack.transports.serial_port import SerialPort
 from gcs_cli.errors import CliError
@@ -92,6 +94,16 @@ def test_the_first_rate_finds_a_target_at_another_one(device: Target) -> None:
     line.set_baud(START_BAUD)
     assert negotiated(line, START_BAUD) is None
     assert device.baud == START_BAUD
+
+
+def test_a_free_running_target_needs_a_fast_line(device: Target, monkeypatch: pytest.MonkeyPatch) -> None:
+    line = RatedLine(device, START_BAUD)
+    monkeypatch.setattr(targets, "open_link", lambda _: line)
+    monkeypatch.setattr(targets, "negotiate_baud", lambda link, wanted, _: negotiated(link, wanted))
+    with pytest.raises(ConfigError, match="at 500 Hz a free-running target requires 580000 baud") as caught:
+        make_loops("serial:/dev/x,free", setup(), lockstep=False)
+    assert "the line runs at 115200" in str(caught.value)
+    assert line.is_closed
 
 
 def test_doctor_measures_every_rate_a_second_time(device: Target, monkeypatch: pytest.MonkeyPatch) -> None:
