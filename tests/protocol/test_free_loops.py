@@ -65,6 +65,7 @@ class FreeLine:
 def device() -> Iterator[Target]:
     target = Target()
     target.poll()
+    target.run(-1)
     target.run(0)
     yield target
     target.close()
