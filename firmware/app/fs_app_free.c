@@ -251,7 +251,9 @@ void fs_app_run(fs_app *app, uint32_t now_us)
     fs_free *run = &app->free;
     uint32_t late_us, missed;
 
-    run->has_time = 1U;
+    if (now_us != run->now_us) {
+        run->has_time = 1U;
+    }
     run->now_us = now_us;
     if (run->is_on == 0U) {
         return;

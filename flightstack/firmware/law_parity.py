@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from typing import Any
+from typing import Any, NamedTuple
 
 from flightstack.control.control_law import CStep
 from flightstack.control.controller import AnyController, controller_of
@@ -14,8 +14,17 @@ from flightstack.firmware.law_tree import firmware_for
 VECTORS = 1000
 
 
-def differing_steps(controller: AnyController, count: int = VECTORS) -> int:
-    """Return for how many random steps, ``count`` of each law, C has other bits than Python; half have boundary values.
+class Parity(NamedTuple):
+    """Random steps of a controller's own laws."""
+
+    compared: int
+    """0 if every own law is written in C."""
+    differing: int
+    """Steps for which C has other bits than Python."""
+
+
+def law_parity(controller: AnyController, count: int = VECTORS) -> Parity:
+    """Compare C with Python in ``count`` random steps of each law in Python; half have boundary values.
 
     Raise ConfigError if the law has no C, or the C does not compile.
     """
@@ -24,8 +33,9 @@ def differing_steps(controller: AnyController, count: int = VECTORS) -> int:
             library = ctypes.CDLL(str(host_library("double")))
     except (BuildError, OSError) as error:
         raise ConfigError("--controller", controller.name, f"its C cannot be compiled: {error}") from None
-    steps = [law.step for law in controller_of(controller).own_laws.values()]
-    return sum(_differing(library, step, count) for step in steps if not isinstance(step, CStep))
+    laws = controller_of(controller).own_laws.values()
+    steps = [law.step for law in laws if not isinstance(law.step, CStep)]
+    return Parity(count * len(steps), sum(_differing(library, step, count) for step in steps))
 
 
 def _differing(library: ctypes.CDLL, step: Any, count: int) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from flightstack.core.errors import TargetError
 from flightstack.firmware.choice import DEFAULT_BAUD
@@ -21,6 +21,7 @@ after 1 s without a frame."""
 _HELLO = "FS_PIL_IDENTITY"
 
 
+@runtime_checkable
 class RatedLink(ByteLink, Protocol):
     """A link with a baud rate."""
 
@@ -42,7 +43,8 @@ def negotiate_baud(
     """
     session = PilSession(link, timing, clock_s)
     try:
-        if wanted == start_baud or session.request(_HELLO, PRESENT_ATTEMPTS) is not None:
+        attempts = RETURN_ATTEMPTS if wanted == start_baud else PRESENT_ATTEMPTS
+        if session.request(_HELLO, attempts) is not None or wanted == start_baud:
             return None
         link.set_baud(start_baud)
         if session.request(_HELLO, RETURN_ATTEMPTS) is None:
@@ -59,6 +61,22 @@ def negotiate_baud(
     except OSError as error:
         raise TargetError(str(error)) from error
     return f"the target did not answer at {wanted} baud: the line stays at {start_baud} baud"
+
+
+def restore_baud(
+    link: RatedLink,
+    timing: PilTiming,
+    clock_s: Callable[[], float] = time.monotonic,
+    start_baud: int = DEFAULT_BAUD,
+) -> None:
+    """Bring the line, at whose rate the target answers, and the target to ``start_baud``; raise TargetError."""
+    session = PilSession(link, timing, clock_s)
+    try:
+        if _changed(session, start_baud) is None:
+            link.set_baud(start_baud)
+            session.request(_HELLO, RETURN_ATTEMPTS)
+    except OSError as error:
+        raise TargetError(str(error)) from error
 
 
 def _changed(session: PilSession, baud: int) -> str | None:

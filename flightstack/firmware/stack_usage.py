@@ -1,7 +1,8 @@
 """Stack of each function and the deepest call path, as GCC reports them with ``-fcallgraph-info=su``.
 
 They are GCC's frames, not those of the image that another compiler makes with link-time optimisation; a target reports
-its own high-water mark. An indirect call, or a call out of the given sources, ends a path.
+its own high-water mark. A call out of the given sources ends a path, and so does a call through a
+pointer, with which the deepest path is no bound.
 """
 
 from __future__ import annotations
@@ -25,6 +26,10 @@ _CORTEX_M4 = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d
 _COMPILERS = (("arm-none-eabi-gcc", _CORTEX_M4, "Cortex-M4F"), ("gcc", (), "this machine"))
 _NODE = re.compile(r'node: \{ title: "([^"]+)" label: "([^"]+)"')
 _EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
+_POINTER = "__indirect_call"
+"""GCC's node for the target of a call through a pointer."""
+_FORM = b"2"
+"""Form and meaning of the kept result."""
 _BYTES = re.compile(r"(\d+) bytes \((\w+)")
 
 
@@ -40,7 +45,7 @@ class StackUsage(NamedTuple):
     total: int
     """Bytes of that path."""
     is_bounded: bool
-    """False if a function of the path has a frame of variable size, or the calls have a cycle."""
+    """False if a frame has a variable size, a call is through a pointer, or the calls have a cycle."""
 
 
 class _Graph(NamedTuple):
@@ -74,7 +79,7 @@ def stack_usage() -> StackUsage | None:
 
 def _place(compiler: str) -> Path:
     """Return the file that keeps the result for these sources and this compiler."""
-    key = hashlib.sha256(source_hash() + compiler.encode()).hexdigest()[:16]
+    key = hashlib.sha256(_FORM + source_hash() + compiler.encode()).hexdigest()[:16]
     return cache_root() / "stack" / f"{key}.json"
 
 
@@ -139,4 +144,5 @@ def deepest(graph: _Graph) -> tuple[tuple[str, ...], int, bool]:
         return known[name]
 
     total, path = max((below(name, frozenset()) for name in graph.frames), key=lambda found: found[0])
-    return path, total, not cyclic and not graph.unbounded & set(path)
+    by_pointer = any(_POINTER in callees for callees in graph.calls.values())
+    return path, total, not (cyclic or graph.unbounded or by_pointer)

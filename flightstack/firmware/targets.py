@@ -24,7 +24,7 @@ from flightstack.firmware.choice import (
 from flightstack.firmware.free_loops import FreeLoops
 from flightstack.firmware.law_tree import firmware_for
 from flightstack.firmware.line_model import free_running_baud
-from flightstack.firmware.line_rate import negotiate_baud
+from flightstack.firmware.line_rate import RatedLink, negotiate_baud
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilTiming
 from flightstack.firmware.target_loops import TargetLoops
 from flightstack.transports.byte_link import ByteLink, LineError
@@ -112,6 +112,8 @@ def make_loops(loops: str, setup: LoopsSetup, lockstep: bool = True) -> ControlB
 
 
 def _check_clock(choice: LoopsChoice, loops: str, lockstep: bool) -> None:
+    if choice.ending == FREE and choice.kind == EMULATED:
+        raise ConfigError("--loops", loops, "cannot run by its own timer: an emulated target has none")
     if choice.ending == FREE and lockstep:
         problem = f"a free-running target ({loops}) requires --clock realtime: it has its own time"
         raise ConfigError("--clock", "lockstep", problem)
@@ -153,10 +155,12 @@ def connect(choice: LoopsChoice, numbers: dict[str, float]) -> TargetLoops | Fre
     """Return the loops on a target with their numbers; raise BuildError, LineError, TargetError, WrongFirmwareError."""
     link, timing, note = open_link(choice), timing_of(choice), None
     try:
-        if isinstance(link, SerialPort):
+        if isinstance(link, RatedLink):
             note = negotiate_baud(link, choice.baud, timing)
-            if choice.ending == FREE:
-                _check_rate(link, choice.baud if note is None else DEFAULT_BAUD, numbers["FS_INNER_HZ"], note)
+        if choice.kind == SERIAL and choice.ending == FREE:
+            _check_rate(
+                choice.where, choice.baud if note is None else DEFAULT_BAUD, numbers["FS_INNER_HZ"], note
+            )
         loops = TargetLoops(link, numbers, timing, short=choice.ending == SHORT, note=note)
         return FreeLoops(loops) if choice.ending == FREE else loops
     except BaseException:
@@ -164,12 +168,12 @@ def connect(choice: LoopsChoice, numbers: dict[str, float]) -> TargetLoops | Fre
         raise
 
 
-def _check_rate(link: SerialPort, baud: int, inner_hz: float, note: str | None) -> None:
+def _check_rate(name: str, baud: int, inner_hz: float, note: str | None) -> None:
     """Raise LineError for a line on which states of a free-running target would arrive ever later."""
     if (required := free_running_baud(inner_hz)) > baud:
         reason = "" if note is None else f" ({note})"
         raise LineError(
-            f"{link.name}: free-running at {inner_hz:g} Hz requires at least {required:.0f} baud, "
+            f"{name}: free-running at {inner_hz:g} Hz requires at least {required:.0f} baud, "
             f"such as serial:DEVICE:921600,free{reason}"
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,12 +12,11 @@ from rich.table import Table
 
 from flightstack.core.errors import TargetError
 from flightstack.firmware.build import BuildError
-from flightstack.firmware.choice import SERIAL, LoopsChoice
-from flightstack.firmware.line_rate import negotiate_baud
+from flightstack.firmware.choice import DEFAULT_BAUD, SERIAL, LoopsChoice
+from flightstack.firmware.line_rate import RatedLink, negotiate_baud, restore_baud
 from flightstack.firmware.sources import source_hash
 from flightstack.firmware.targets import open_link, timing_of
 from flightstack.transports.byte_link import ByteLink, LineError
-from flightstack.transports.serial_port import SerialPort
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
 from gcs_cli.pil.advice import Port, advice
 from gcs_cli.pil.probe import Measurement, measured
@@ -27,9 +27,16 @@ BAUDS = (115_200, 230_400, 460_800, 921_600)
 
 
 def examine(
-    choice: LoopsChoice, bauds: Sequence[int], exchanges: int, progress: Callable[[int, int], None]
+    choice: LoopsChoice,
+    bauds: Sequence[int],
+    exchanges: int,
+    progress: Callable[[int, int], None],
+    clock_s: Callable[[], float] = time.monotonic,
 ) -> list[Measurement]:
-    """Measure the link at each baud rate, or once if it is not serial; raise CliError if it cannot be opened."""
+    """Measure the link at each baud rate, or once if it is not serial; raise CliError if it cannot be opened.
+
+    A serial target is at the rate of its start afterwards.
+    """
     found: list[Measurement] = []
     for baud in bauds if choice.kind == SERIAL else (None,):
         tried = choice if baud is None else choice._replace(baud=baud)
@@ -38,11 +45,7 @@ def examine(
         except (BuildError, LineError) as error:
             raise CliError(str(error), USAGE) from None
         try:
-            note = None if all(each.identity is None for each in found) and found else _changed(link, tried)
-            if note is None:
-                found.append(measured(link, baud, exchanges, progress, timing_of(tried)))
-            else:
-                found.append(Measurement(baud, None, note))
+            found.append(_measured(link, tried, exchanges, progress, clock_s))
         except (OSError, TargetError) as error:
             raise CliError(str(error), NO_ANSWER) from None
         finally:
@@ -50,9 +53,21 @@ def examine(
     return found
 
 
-def _changed(link: ByteLink, choice: LoopsChoice) -> str | None:
-    """Bring a serial line to the rate of ``choice``; return why that failed, or None."""
-    return negotiate_baud(link, choice.baud, timing_of(choice)) if isinstance(link, SerialPort) else None
+def _measured(
+    link: ByteLink,
+    choice: LoopsChoice,
+    exchanges: int,
+    progress: Callable[[int, int], None],
+    clock_s: Callable[[], float],
+) -> Measurement:
+    timing, baud = timing_of(choice), choice.baud if choice.kind == SERIAL else None
+    note = negotiate_baud(link, choice.baud, timing, clock_s) if isinstance(link, RatedLink) else None
+    if note is not None:
+        return Measurement(baud, None, note)
+    found = measured(link, baud, exchanges, progress, timing, clock_s)
+    if isinstance(link, RatedLink) and found.problem is None and baud != DEFAULT_BAUD:
+        restore_baud(link, timing, clock_s)
+    return found
 
 
 def port_of(choice: LoopsChoice) -> Port | None:

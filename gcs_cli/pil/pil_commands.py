@@ -12,7 +12,7 @@ from typing import Any
 from rich.console import Console
 
 from flightstack.core.atomic_file import write_bytes_atomically
-from flightstack.firmware.law_parity import VECTORS, differing_steps
+from flightstack.firmware.law_parity import law_parity
 from flightstack.firmware.law_tree import controller_named, generated_names, is_built_in, write_tree
 from flightstack.process.clock import nearest_outer_hz
 from gcs_cli.errors import FAILED, USAGE, CliError
@@ -102,21 +102,23 @@ def run_generate(name: str, out: Path | None, as_json: bool) -> None:
         write_tree(controller, folder)
     except OSError as error:
         raise CliError(f"{folder}: cannot be written: {error.strerror}", USAGE) from None
-    names, differing = sorted(generated_names(controller)), differing_steps(controller)
+    names, parity = sorted(generated_names(controller)), law_parity(controller)
     if as_json:
-        result = {"controller": name, "directory": str(folder), "files": names, "steps_compared": VECTORS}
-        print(json.dumps({**result, "steps_differing": differing}), flush=True)
+        result = {"controller": name, "directory": str(folder), "files": names}
+        steps = {"steps_compared": parity.compared, "steps_differing": parity.differing}
+        print(json.dumps({**result, **steps}), flush=True)
     else:
         console = FlyConsole(highlight=False)
         lines = [f"firmware with {name}: {folder}/", *(f"  core/{file}" for file in names)]
-        lines.append(
-            f"C in double against Python: {VECTORS} random steps, {differing} of them with other bits"
-        )
+        figures = f"{parity.compared} random steps, {parity.differing} of them with other bits"
+        nothing = "nothing to compare: the law is written in C"
+        lines.append(f"C in double against Python: {figures if parity.compared else nothing}")
         for line in lines:
             console.print(line, markup=False, highlight=False, soft_wrap=True)
-    if differing:
+    if parity.differing:
         raise CliError(
-            f"--controller {name}: its C and its Python differ in {differing} of {VECTORS} steps", FAILED
+            f"--controller {name}: its C and its Python differ in {parity.differing} of {parity.compared} steps",
+            FAILED,
         )
 
 

@@ -220,9 +220,9 @@ def _about(found: Difference, kind: _Kind) -> str:
 
 
 def _closeness(check: Check) -> float:
-    if not math.isfinite(check.measured):
-        return math.inf
-    return check.measured / check.limit if check.limit else check.measured
+    if not check.limit:
+        return 0.0 if check.passed else math.inf
+    return check.measured / check.limit if math.isfinite(check.measured) else math.inf
 
 
 def all_passed(checks: Iterable[Check]) -> bool:

@@ -48,6 +48,7 @@ def target() -> Iterator[Target]:
 
 def started(target: Target, every: float = 1, timeout_ms: float = 0) -> None:
     target.poll()
+    target.run(-1)
     target.run(0)
     target.heard()
     assert free_run(target, 1, every, timeout_ms) == ACCEPTED
@@ -56,6 +57,17 @@ def started(target: Target, every: float = 1, timeout_ms: float = 0) -> None:
 def free_run(target: Target, *values: float) -> int:
     answers = target.ask(command(mavlink.MAV_CMD_FS_FREE_RUN, *values))
     return int(next(answer.result for answer in answers if answer.get_type() == "COMMAND_ACK"))
+
+
+def test_microseconds_that_stand_still_are_unsupported() -> None:
+    target = Target()
+    for _ in range(3):
+        target.poll(1)
+        target.run(0)
+    assert free_run(target, 1, 1) == mavlink.MAV_RESULT_UNSUPPORTED
+    target.run(1)
+    assert free_run(target, 1, 1) == ACCEPTED
+    target.close()
 
 
 def state(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from flightstack.control.controller import controller_of
 from flightstack.core.errors import ConfigError
 from flightstack.firmware.build import host_library
 from flightstack.firmware.c_loops import HostLoops, LoopsSetup
-from flightstack.firmware.law_parity import differing_steps
+from flightstack.firmware.law_parity import law_parity
 from flightstack.firmware.law_tree import firmware_for, law_tree
 from flightstack.firmware.targets import make_loops
 from flightstack.params.config import StackConfig
@@ -23,6 +24,7 @@ from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
 from flightstack.process.assembly import check
 from flightstack.testing import World
+from gcs_cli.pil import pil_commands
 from gcs_cli.pil.replay_run import fed, judged, prepared
 from tests.support.plugin_site import ROOT
 
@@ -90,7 +92,17 @@ def test_loops_in_python_refuse_a_law_in_c(law: ControlLaw) -> None:
 
 
 def test_a_law_in_c_has_no_step_to_compare_with_python(law: ControlLaw) -> None:
-    assert differing_steps(law) == 0
+    assert law_parity(law) == (0, 0)
+
+
+def test_generate_says_that_a_law_in_c_is_not_compared(
+    law: ControlLaw, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(pil_commands, "controller_named", lambda _: law)
+    pil_commands.run_generate("rate-pd", tmp_path / "text", as_json=False)
+    assert capsys.readouterr().out.endswith("nothing to compare: the law is written in C\n")
+    pil_commands.run_generate("rate-pd", tmp_path / "json", as_json=True)
+    assert json.loads(capsys.readouterr().out)["steps_compared"] == 0
 
 
 def test_a_file_of_the_firmwares_name_is_refused(law: ControlLaw) -> None:

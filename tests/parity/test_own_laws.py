@@ -17,7 +17,7 @@ from flightstack.control.controller_loading import form_problem, load_controller
 from flightstack.control.loop_parameters import loop_numbers
 from flightstack.firmware.build import host_library
 from flightstack.firmware.c_loops import HostLoops
-from flightstack.firmware.law_parity import differing_steps
+from flightstack.firmware.law_parity import law_parity
 from flightstack.firmware.law_tree import firmware_for
 from flightstack.firmware.numbers import default_numbers, laws_with
 from flightstack.params.gains_file import BUILT_IN, open_gains
@@ -61,7 +61,7 @@ def test_own_laws_fly_in_c_with_the_bits_of_python() -> None:
 
 
 def test_own_laws_have_the_bits_of_python_on_random_steps() -> None:
-    assert differing_steps(cascade(), 200) == 0
+    assert law_parity(cascade(), 200) == (200 * len(cascade().own_laws), 0)
 
 
 def test_parameters_of_own_laws_are_the_vehicles() -> None:

@@ -86,6 +86,7 @@ class FreeLine:
 def device() -> Iterator[Target]:
     target = Target()
     target.poll()
+    target.run(-1)
     target.run(0)
     yield target
     target.close()
@@ -323,7 +324,11 @@ def test_octets_of_a_state_are_those_of_the_line_model(device: Target) -> None:
 
 @pytest.mark.parametrize(
     ("loops", "lockstep", "words"),
-    [("host,free", True, "requires --clock realtime"), ("host", False, "require lockstep")],
+    [
+        ("host,free", True, "requires --clock realtime"),
+        ("host", False, "require lockstep"),
+        ("emulated,free", False, "cannot run by its own timer"),
+    ],
 )
 def test_a_target_flies_on_its_own_clock_alone(loops: str, lockstep: bool, words: str) -> None:
     with pytest.raises(ConfigError, match=words):

@@ -12,12 +12,20 @@ from pathlib import Path
 
 import pytest
 
-from flightstack.core.errors import TargetError
+from flightstack.core.errors import ConfigError, TargetError
+from flightstack.firmware import targets
+from flightstack.firmware.choice import LoopsChoice
 from flightstack.firmware.line_rate import negotiate_baud
 from flightstack.firmware.pil_client import DEFAULT_TIMING
 from flightstack.firmware.target_loops import TargetLoops
+from flightstack.firmware.targets import make_loops
 from flightstack.transports.byte_link import LineError
 from flightstack.transports.serial_port import SerialPort
+from gcs_cli.errors import CliError
+from gcs_cli.pil import doctor
+from gcs_cli.pil.conformance import command
+from gcs_cli.pil.conformance.check import PASSED, Check
+from gcs_cli.pil.conformance.command import run_conformance
 from tests.firmware.app_support import START_BAUD, Target
 from tests.support.lossy_line import LossyLine
 from tests.support.pil_setups import HASH, setup
@@ -85,8 +93,55 @@ def test_the_first_rate_finds_a_target_at_another_one(device: Target) -> None:
     negotiated(line, FAST)
     line.set_baud(START_BAUD)
     assert negotiated(line, START_BAUD) is None
-    TargetLoops(line, setup().numbers(), clock_s=line.clock, expected_hash=HASH)
     assert device.baud == START_BAUD
+
+
+def test_a_free_running_target_needs_a_fast_line(device: Target, monkeypatch: pytest.MonkeyPatch) -> None:
+    line = RatedLine(device, START_BAUD)
+    monkeypatch.setattr(targets, "open_link", lambda _: line)
+    monkeypatch.setattr(targets, "negotiate_baud", lambda link, wanted, _: negotiated(link, wanted))
+    with pytest.raises(ConfigError, match="at 500 Hz requires at least 580000 baud"):
+        make_loops("serial:/dev/x,free", setup(), lockstep=False)
+    assert line.is_closed
+
+
+def test_doctor_measures_every_rate_a_second_time(device: Target, monkeypatch: pytest.MonkeyPatch) -> None:
+    line = RatedLine(device, START_BAUD)
+
+    def opened(choice: LoopsChoice) -> RatedLine:
+        line.is_closed = False
+        line.set_baud(choice.baud)
+        return line
+
+    monkeypatch.setattr(doctor, "open_link", opened)
+    serial = LoopsChoice("serial", "/dev/x")
+    for _ in range(2):
+        found = doctor.examine(serial, [START_BAUD, OTHER, FAST], 5, lambda _done, _total: None, line.clock)
+        assert [len(each.round_trips_s) for each in found] == [5, 5, 5]
+        assert device.baud == START_BAUD
+
+
+def test_conformance_negotiates_its_rate(
+    device: Target, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line, rates = RatedLine(device, OTHER), list[tuple[int, int]]()
+
+    def checks(*_: object) -> Iterator[Check]:
+        rates.append((line.baud, device.baud))
+        yield Check("hello", PASSED, "")
+        yield Check("losses", PASSED, "")
+
+    monkeypatch.setattr(command, "port_or_target", lambda *_: LoopsChoice("serial", "/dev/x"))
+    monkeypatch.setattr(command, "open_link", lambda _: line)
+    monkeypatch.setattr(command, "conformance", checks)
+    monkeypatch.setattr(command.time, "monotonic", line.clock)
+    run_conformance("/dev/x", None, [OTHER], as_json=True)
+    assert rates == [(OTHER, OTHER)]
+    assert device.baud == START_BAUD
+    line.is_closed = False
+    line.set_baud(2_000_000)
+    with pytest.raises(CliError, match="/dev/x: the target cannot run at 2000000 baud"):
+        run_conformance("/dev/x", None, [2_000_000], as_json=True)
 
 
 def test_a_rate_that_the_line_damages_falls_back(device: Target, tmp_path: Path) -> None:
@@ -113,6 +168,9 @@ def test_a_silent_line_stays_at_the_rate_of_the_user(device: Target) -> None:
     assert negotiated(line, FAST) is None
     assert line.baud == FAST
     assert line.now_s == pytest.approx(2.5)
+    line.set_baud(START_BAUD)
+    assert negotiated(line, START_BAUD) is None
+    assert line.now_s == pytest.approx(4.5)
 
 
 def test_a_broken_line_is_one_sentence(device: Target) -> None:

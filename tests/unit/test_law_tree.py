@@ -12,7 +12,7 @@ import pytest
 from flightstack.control.attitude_controller import AttitudeController
 from flightstack.control.controller_loading import load_controller
 from flightstack.core.errors import ConfigError
-from flightstack.firmware.law_parity import differing_steps
+from flightstack.firmware.law_parity import Parity, law_parity
 from flightstack.firmware.law_tree import firmware_for, generated_names, law_tree, write_tree
 from flightstack.firmware.sources import firmware_root, source_hash
 from gcs_cli.errors import CliError
@@ -116,7 +116,7 @@ def test_generate_writes_firmware_and_names_the_laws_files(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr(pil_commands, "controller_named", lambda _: lqr)
-    monkeypatch.setattr(pil_commands, "differing_steps", lambda _: 0)
+    monkeypatch.setattr(pil_commands, "law_parity", lambda _: Parity(1000, 0))
     pil_commands.run_generate("lqr", tmp_path / "out", as_json=True)
     told = json.loads(capsys.readouterr().out)
     assert told["files"] == ["lqr_controller.c", "lqr_controller.h"]
@@ -132,7 +132,7 @@ def test_generate_fails_if_the_bits_differ(
     lqr: AttitudeController, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(pil_commands, "controller_named", lambda _: lqr)
-    monkeypatch.setattr(pil_commands, "differing_steps", lambda _: 3)
+    monkeypatch.setattr(pil_commands, "law_parity", lambda _: Parity(1000, 3))
     with pytest.raises(CliError, match="differ in 3 of 1000 steps"):
         pil_commands.run_generate("lqr", tmp_path / "out", as_json=False)
 
@@ -144,4 +144,4 @@ def test_memory_of_other_types_than_float_is_refused(lqr: AttitudeController) ->
 
 @pytest.mark.skipif(not NIGHTLY, reason="compiles the law with Numba")
 def test_generated_step_has_the_bits_of_the_compiled_one(lqr: AttitudeController) -> None:
-    assert differing_steps(lqr) == 0
+    assert law_parity(lqr) == (1000, 0)

@@ -79,9 +79,13 @@ def test_deepest_path_has_the_largest_sum_of_frames() -> None:
     assert deepest(graph) == (("step", "other"), 164, True)
 
 
-def test_stack_has_no_bound_with_a_cycle_or_a_variable_frame() -> None:
+def test_stack_has_no_bound_with_a_cycle_a_pointer_or_a_variable_frame() -> None:
     cycle = OTHER.replace("}\n}", '}\nedge: { sourcename: "other" targetname: "step" label: "" }\n}')
     assert deepest(read_graphs([GRAPH, cycle]))[2] is False
+    pointer = OTHER.replace(
+        "}\n}", '}\nedge: { sourcename: "other" targetname: "__indirect_call" label: "" }\n}'
+    )
+    assert deepest(read_graphs([GRAPH, pointer]))[1:] == (164, False)
     dynamic = OTHER.replace("(static)", "(dynamic)")
     assert deepest(read_graphs([GRAPH, dynamic]))[1:] == (164, False)
 

@@ -191,7 +191,7 @@ def test_each_rate_is_given_the_time_that_flights_give_it(monkeypatch) -> None:
     given = []
 
     def noted(*arguments: Any) -> Measurement:
-        given.append(arguments[-1])
+        given.append(arguments[4])
         return of_counters(115_200, 0.03)
 
     monkeypatch.setattr(doctor, "open_link", lambda _choice: SilentLine())

@@ -15,6 +15,7 @@ from gcs_cli.pil.flight_samples import FlightSamples
 from gcs_cli.pil.junit import pil_junit
 from gcs_cli.pil.limits_file import read_limits
 from gcs_cli.pil.signals import BY_NAME, SIGNALS
+from gcs_cli.pil.ulps import ulp_of
 from gcs_cli.pil.verdict import DEFAULT_LIMITS, Limits, difference_checks
 from tests.support.flight_samples import flight
 
@@ -99,6 +100,14 @@ def test_a_gain_one_percent_off_fails_the_slope_within_other_limits() -> None:
     assert [check.name for check in failed] == ["A–B wrench slope"]
     assert failed[0].about == "torque 1: slope 1.010000"
     assert checks["A–B wrench rms"].unit == "ulp"
+
+
+def test_a_failed_check_without_tolerance_is_shown() -> None:
+    torque = of_torque(varied(), varied(gain=1.01))
+    thrust = torque._replace(signal="thrust", largest=0.5 * ulp_of(torque.full_scale))
+    limits = Limits({"torque": 1.1 * torque.ulps, "thrust": 0.0})
+    (failed,) = difference_checks("A–B", [torque, thrust], limits)
+    assert (failed.passed, failed.measured, failed.limit) == (False, 0.5, 0.0)
 
 
 def check(name: str, passed: bool, measured: float | None) -> dict[str, Any]:

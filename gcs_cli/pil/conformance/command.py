@@ -5,10 +5,12 @@ from __future__ import annotations
 import time
 from contextlib import closing
 
+from flightstack.core.errors import TargetError
 from flightstack.firmware.build import BuildError
-from flightstack.firmware.choice import EMULATED
+from flightstack.firmware.choice import DEFAULT_BAUD, EMULATED, LoopsChoice
+from flightstack.firmware.line_rate import RatedLink, negotiate_baud, restore_baud
 from flightstack.firmware.targets import open_link, timing_of
-from flightstack.transports.byte_link import LineError
+from flightstack.transports.byte_link import ByteLink, LineError
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
 from gcs_cli.output import Output
 from gcs_cli.pil.conformance import check
@@ -33,17 +35,28 @@ def run_conformance(port: str | None, target: str | None, bauds: list[int] | Non
     clock_s = None if choice.kind == EMULATED else time.monotonic
     with closing(link):
         try:
+            _bring_to_rate(link, choice)
             for each in conformance(link, timing_of(choice).timeout_s, clock_s):
                 count += 1
                 failed += [each.name] * (each.result == check.FAILED)
                 output.say("check", _sentence(each), **each._asdict())
+            if count > 1 and isinstance(link, RatedLink) and choice.baud != DEFAULT_BAUD:
+                restore_baud(link, timing_of(choice), time.monotonic)
         except BuildError as error:
             raise CliError(str(error), USAGE) from None
-        except OSError as error:  # LineError
+        except (OSError, TargetError) as error:
             raise CliError(str(error), NO_ANSWER) from None
     if failed:
         code = NO_ANSWER if count == 1 else FAILED
         raise CliError(f"the target does not conform: {', '.join(failed)}", code)
+
+
+def _bring_to_rate(link: ByteLink, choice: LoopsChoice) -> None:
+    """Bring a serial line and its target to the rate of ``choice``; raise CliError, TargetError."""
+    if not isinstance(link, RatedLink):
+        return
+    if (note := negotiate_baud(link, choice.baud, timing_of(choice), time.monotonic)) is not None:
+        raise CliError(f"{choice.device}: {note}", FAILED)
 
 
 def _sentence(each: check.Check) -> str:
