@@ -119,7 +119,7 @@ typedef struct {
     uint32_t steps, repeats, out_of_order, loop_overruns, safe_states;
 
     fs_line line;
-    fs_free free;
+    fs_free free_run;
     uint32_t uart_overruns, uart_errors, told_overruns; /* the last: of those that were complained about */
     const char *alarm;                                  /* a text that waits for room in the outbox; NULL: none */
     uint16_t alarm_severity;

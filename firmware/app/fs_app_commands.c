@@ -98,7 +98,7 @@ static uint16_t reboot(fs_app *app, float what)
 
     if (what != REBOOT) {
         result = FS_MAV_RESULT_DENIED; /* there is nothing else to reboot, and nothing to shut down */
-    } else if ((app->state == FS_APP_STEPPING) || (app->free.is_on != 0U)) {
+    } else if ((app->state == FS_APP_STEPPING) || (app->free_run.is_on != 0U)) {
         result = FS_MAV_RESULT_TEMPORARILY_REJECTED;
     } else {
         fs_app_forget_flight(app);

@@ -20,23 +20,23 @@ static void begin_window(fs_app *app)
 {
     static const fs_pil_timing blank = {0};
 
-    app->free.timing = blank;
-    app->free.aged = 0UL;
-    app->free.window_ms = app->now_ms;
+    app->free_run.timing = blank;
+    app->free_run.aged = 0UL;
+    app->free_run.window_ms = app->now_ms;
 }
 
 void fs_app_free_init(fs_app *app)
 {
     static const fs_free blank = {0};
 
-    app->free = blank;
+    app->free_run = blank;
     begin_window(app);
 }
 
 void fs_app_free_stop(fs_app *app)
 {
-    app->free.is_on = 0U;
-    app->free.is_flying = 0U;
+    app->free_run.is_on = 0U;
+    app->free_run.is_flying = 0U;
     if (app->state == FS_APP_FREE) {
         app->state = FS_APP_READY;
     }
@@ -44,7 +44,7 @@ void fs_app_free_stop(fs_app *app)
 
 static void begin_running(fs_app *app, uint16_t every, uint32_t timeout_us)
 {
-    fs_free *run = &app->free;
+    fs_free *run = &app->free_run;
 
     run->is_on = 1U;
     run->is_flying = 0U;
@@ -69,9 +69,9 @@ uint16_t fs_app_free_command(fs_app *app, float what, float every, float timeout
     } else if ((what != 1.0F) || !((every >= 1.0F) && (every <= MOST_TICKS)) ||
                !((timeout_ms >= 0.0F) && (timeout_ms <= MOST_TIMEOUT_MS))) {
         result = FS_MAV_RESULT_DENIED;
-    } else if (app->free.has_time == 0U) {
+    } else if (app->free_run.has_time == 0U) {
         result = FS_MAV_RESULT_UNSUPPORTED;
-    } else if ((app->state == FS_APP_STEPPING) || (app->free.is_flying != 0U)) {
+    } else if ((app->state == FS_APP_STEPPING) || (app->free_run.is_flying != 0U)) {
         result = FS_MAV_RESULT_TEMPORARILY_REJECTED;
     } else {
         begin_running(app, (uint16_t)every, (timeout_ms >= 1.0F) ? ((uint32_t)timeout_ms * 1000UL) : DEFAULT_TIMEOUT_US);
@@ -81,7 +81,7 @@ uint16_t fs_app_free_command(fs_app *app, float what, float every, float timeout
 
 static void stop_running(fs_app *app, const char *why)
 {
-    app->free.is_flying = 0U;
+    app->free_run.is_flying = 0U;
     if (app->state != FS_APP_SAFE) {
         app->state = FS_APP_SAFE;
         app->safe_states++;
@@ -91,7 +91,7 @@ static void stop_running(fs_app *app, const char *why)
 
 static void take_state(fs_app *app, const fs_pil_step *state)
 {
-    fs_free *run = &app->free;
+    fs_free *run = &app->free_run;
 
     if ((state->flags & FS_RESET) != 0UL) {
         run->is_flying = 1U;
@@ -113,19 +113,19 @@ void fs_app_on_state(fs_app *app)
     fs_pil_step state;
     const char *fault;
 
-    if (app->free.is_on == 0U) {
+    if (app->free_run.is_on == 0U) {
         return;
     }
     fs_pil_state_decode(app->frame.payload, app->frame.length, &message);
     fs_pil_from_state(&message, &state);
     fault = fs_pil_fault_of(&state, 0U);
-    app->free.timing.states++;
+    app->free_run.timing.states++;
     if ((message.flags & FS_PIL_REST) != 0UL) {
-        app->free.is_flying = 0U;
-    } else if ((app->free.is_flying == 0U) && ((message.flags & FS_RESET) == 0UL)) {
+        app->free_run.is_flying = 0U;
+    } else if ((app->free_run.is_flying == 0U) && ((message.flags & FS_RESET) == 0UL)) {
         /* nothing flies until RESET */
     } else if (fault != NULL) {
-        app->free.state.step = state.step; /* the host tells by it which flight was refused */
+        app->free_run.state.step = state.step; /* the host tells by it which flight was refused */
         stop_running(app, fault);
     } else {
         take_state(app, &state);
@@ -134,7 +134,7 @@ void fs_app_on_state(fs_app *app)
 
 static void run_loops(fs_app *app, fs_pil_report *report)
 {
-    fs_free *run = &app->free;
+    fs_free *run = &app->free_run;
     fs_loop_input input;
     fs_loop_output output;
     fs_loop_cost cost;
@@ -170,17 +170,17 @@ static void add_to_mean(float *mean, uint32_t value, uint32_t count)
 
 static void note_age(fs_app *app, uint32_t age_us)
 {
-    fs_pil_timing *timing = &app->free.timing;
+    fs_pil_timing *timing = &app->free_run.timing;
 
-    app->free.aged++;
-    add_to_mean(&timing->age_mean_us, age_us, app->free.aged);
+    app->free_run.aged++;
+    add_to_mean(&timing->age_mean_us, age_us, app->free_run.aged);
     if (age_us > timing->age_max_us) {
         timing->age_max_us = age_us;
     }
-    if (app->free.is_new == 0U) {
+    if (app->free_run.is_new == 0U) {
         timing->held++;
     }
-    app->free.is_new = 0U;
+    app->free_run.is_new = 0U;
 }
 
 static void send_drive(fs_app *app, const fs_pil_report *report, uint32_t age_us, uint32_t late_us)
@@ -191,7 +191,7 @@ static void send_drive(fs_app *app, const fs_pil_report *report, uint32_t age_us
     if (app->line.next != app->line.baud) { /* the line changes its rate as soon as the outbox is empty */
         return;
     }
-    drive.state_time_us = app->free.state.step;
+    drive.state_time_us = app->free_run.state.step;
     drive.status = report->status;
     drive.age_us = age_us;
     drive.late_us = late_us;
@@ -211,7 +211,7 @@ static void send_drive(fs_app *app, const fs_pil_report *report, uint32_t age_us
 static void tick(fs_app *app, uint32_t late_us)
 {
     static const fs_pil_report blank = {0};
-    fs_free *run = &app->free;
+    fs_free *run = &app->free_run;
     fs_pil_report report = blank;
     const uint32_t age_us = run->now_us - run->arrived_us;
 
@@ -248,7 +248,7 @@ static uint32_t period_us(const fs_app *app)
 
 void fs_app_run(fs_app *app, uint32_t now_us)
 {
-    fs_free *run = &app->free;
+    fs_free *run = &app->free_run;
     uint32_t late_us, missed;
 
     if (now_us != run->now_us) {
@@ -276,8 +276,8 @@ uint32_t fs_app_run_wait_us(const fs_app *app)
 {
     uint32_t left_us = 0xFFFFFFFFUL;
 
-    if (app->free.is_on != 0U) { /* what was due was done by the last fs_app_run */
-        left_us = (app->free.is_begun != 0U) ? (app->free.due_us - app->free.now_us) : 0UL;
+    if (app->free_run.is_on != 0U) { /* what was due was done by the last fs_app_run */
+        left_us = (app->free_run.is_begun != 0U) ? (app->free_run.due_us - app->free_run.now_us) : 0UL;
     }
     return left_us;
 }
@@ -285,19 +285,19 @@ uint32_t fs_app_run_wait_us(const fs_app *app)
 /* Once a period: the figures since the last time. Figures without room count in the next period. */
 static void tell_timing(fs_app *app)
 {
-    fs_pil_timing *timing = &app->free.timing;
+    fs_pil_timing *timing = &app->free_run.timing;
 
     timing->period_us = period_us(app);
     if (fs_outbox_put(&app->outbox, FS_PIL_TIMING_ID, app->payload, fs_pil_timing_encode(timing, app->payload),
                       FS_OUTBOX_ANSWER) != 0U) {
         begin_window(app);
     }
-    app->free.window_ms = app->now_ms;
+    app->free_run.window_ms = app->now_ms;
 }
 
 void fs_app_free_poll(fs_app *app)
 {
-    const fs_free *run = &app->free;
+    const fs_free *run = &app->free_run;
 
     if ((run->is_on != 0U) && (run->is_flying == 0U) &&
         ((app->now_ms - app->last_frame_ms) >= FS_APP_REST_TIMEOUT_MS)) {

@@ -155,7 +155,7 @@ static void take_step(fs_app *app, const fs_pil_step *step, uint16_t is_short)
     const char *fault = fs_pil_fault_of(step, is_short);
     uint16_t is_reset = ((step->flags & FS_RESET) != 0UL) ? 1U : 0U;
 
-    if ((app->free.is_on != 0U) && (app->free.is_flying == 0U) && (is_reset != 0U)) {
+    if ((app->free_run.is_on != 0U) && (app->free_run.is_flying == 0U) && (is_reset != 0U)) {
         fs_app_free_stop(app); /* the host that let it run is gone */
     }
     if (before != NULL) {
@@ -163,7 +163,7 @@ static void take_step(fs_app *app, const fs_pil_step *step, uint16_t is_short)
         send_report(app, &before->report, step->flags, is_short);
     } else if ((app->state == FS_APP_SAFE) && (is_reset == 0U)) {
         send_refusal(app, step->step, FS_APP_BAD_INPUT, is_short);
-    } else if ((app->free.is_on != 0U) ||
+    } else if ((app->free_run.is_on != 0U) ||
                ((is_reset == 0U) && ((app->state == FS_APP_RESTARTED) || (step->step != app->expected)))) {
         app->out_of_order++;
         send_refusal(app, app->expected, FS_APP_OUT_OF_ORDER, is_short);

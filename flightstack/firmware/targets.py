@@ -159,7 +159,7 @@ def connect(choice: LoopsChoice, numbers: dict[str, float]) -> TargetLoops | Fre
             note = negotiate_baud(link, choice.baud, timing)
         if choice.kind == SERIAL and choice.ending == FREE:
             _check_rate(
-                choice.where, choice.baud if note is None else DEFAULT_BAUD, numbers["FS_INNER_HZ"], note
+                choice.device, choice.baud if note is None else DEFAULT_BAUD, numbers["FS_INNER_HZ"], note
             )
         loops = TargetLoops(link, numbers, timing, short=choice.ending == SHORT, note=note)
         return FreeLoops(loops) if choice.ending == FREE else loops
