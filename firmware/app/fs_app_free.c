@@ -14,7 +14,7 @@
 #define TARGET_SIZE 5U
 #define MOST_TICKS 1000.0F
 #define MOST_TIMEOUT_MS 10000.0F
-#define DRIVE_RESERVE (FS_OUTBOX_SIZE - 192U) /* at most two wait: an old command is worth less than none */
+#define DRIVE_RESERVE (FS_OUTBOX_SIZE - 192U) /* at most two wait here, more in the port's ring */
 
 static void begin_window(fs_app *app)
 {

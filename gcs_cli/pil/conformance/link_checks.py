@@ -15,7 +15,7 @@ from gcs_cli.pil.conformance.line import Line, is_echo
 
 SEED = 1
 BURST = 12
-"""Frames in one piece: 288 bytes, and answers that fit into the target's outbox of 1024 bytes beside 320 in reserve."""
+"""Frames in one piece: 288 bytes, and answers that fit into the outbox of 2048 bytes beside 1344 in reserve."""
 NOISE_SIZE = 300
 LONGEST_PAYLOAD = 255
 CUT_SIZES = (3, 20, 60)
