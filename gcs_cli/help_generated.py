@@ -63,7 +63,7 @@ Commands:
   replay     Replay a log as a vehicle that any client can watch.
   report     Write the report page of a flight from its log.
   compare    Compare two or more flights.
-  estimate   Estimate the state of a vehicle from the sensors of its log.
+  estimate   Estimate attitude, velocity, position from a log.
   mission    Missions: files, and the vehicle's.
   fence      The vehicle's geofence.
   rally      The vehicle's rally points.

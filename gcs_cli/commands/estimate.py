@@ -46,7 +46,7 @@ def estimate(
     open_page: OpenOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Estimate attitude, velocity and position from the sensors of a log.
+    """Estimate attitude, velocity, position from a log.
 
     Compares the result with the log's own estimate, and with truth where the log has it. Delays of the sensors,
     declination and limits of GNSS accuracy are the log's parameters: EKF2_GPS_DELAY, EKF2_MAG_DELAY, EKF2_BARO_DELAY,

@@ -103,6 +103,11 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "gcs log download --all --output logs",
     ),
     "log erase": ("gcs log erase --yes",),
+    "estimate": (
+        "gcs estimate flight.ulg",
+        "gcs estimate flight.ulg.xz --json",
+        "gcs estimate flight.ulg --out estimate.html",
+    ),
     "log info": ("gcs log info flight.ulg", "gcs log info flight.tlog --json"),
     "log plot": (
         "gcs log plot flight.ulg vehicle_local_position.z",
@@ -119,6 +124,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "pil fly": ("gcs pil fly square", "gcs pil fly hop --target serial:/dev/ttyUSB1:921600 --open"),
     "pil replay": ("gcs pil replay flight.ulg", "gcs pil replay flight.ulg --target host --fail-over"),
     "pil vectors": ("gcs pil vectors excitation.csv", "gcs pil vectors flight.mat --log flight.ulg"),
+    "pil free-run": ("gcs pil free-run hop --target host",),
     "pil generate": (
         "gcs pil generate --controller lqr",
         "gcs pil generate --controller lqr --out build/lqr",

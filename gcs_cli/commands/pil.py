@@ -151,7 +151,7 @@ def build(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Build the firmware for a board, and write the file that is copied to its drive."""
+    """Build the firmware for a board: the file for its drive."""
     from gcs_cli.pil.board_build import run_build
 
     run_build(board, controller, baud, compiler, out, as_json)

@@ -68,7 +68,8 @@ class GcsGroup(LazyGroup):
         "report": LazyCommand("gcs_cli.commands.report", "Write the report page of a flight from its log."),
         "compare": LazyCommand("gcs_cli.commands.compare", "Compare two or more flights."),
         "estimate": LazyCommand(
-            "gcs_cli.commands.estimate", "Estimate the state of a vehicle from the sensors of its log."
+            "gcs_cli.commands.estimate",
+            "Estimate attitude, velocity, position from a log.",
         ),
     }
 
@@ -164,9 +165,7 @@ class PilGroup(LazyGroup):
         "replay": LazyCommand(_PIL, "Feed a target with the inputs of a flight log."),
         "vectors": LazyCommand(_PIL, "Write test vectors for a replay, as CSV or MATLAB."),
         "generate": LazyCommand(_PIL, "Write the firmware with your own controller as C."),
-        "build": LazyCommand(
-            _PIL, "Build the firmware for a board, and write the file that is copied to its drive."
-        ),
+        "build": LazyCommand(_PIL, "Build the firmware for a board: the file for its drive."),
         "doctor": LazyCommand(_PIL, "Measure the link to a target, and suggest settings."),
     }
 

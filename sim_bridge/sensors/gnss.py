@@ -64,8 +64,9 @@ class GnssReceiver:
         spread = np.array([horizontal, horizontal, vertical])
         gnss["decay"], share = gauss_markov(1.0 / float(gnss["rate_hz"]), float(gnss["drift_time_s"]))
         gnss["drift"], gnss["wander"] = spread * self._noise.first(4)[:3], share * spread
-        self._eph_m = math.sqrt(2.0) * math.hypot(horizontal, float(gnss["horizontal_noise_m"]))
-        self._epv_m = math.hypot(vertical, float(gnss["vertical_noise_m"]))
+        noise_m, vertical_noise_m = float(gnss["horizontal_noise_m"]), float(gnss["vertical_noise_m"])
+        self._eph_m = math.sqrt(2.0 * (horizontal * horizontal + noise_m * noise_m))
+        self._epv_m = math.sqrt(vertical * vertical + vertical_noise_m * vertical_noise_m)
         self._latency_us = round(float(gnss["latency_s"]) * 1e6)
         self._first_fix_us = round(float(gnss["first_fix_s"]) * 1e6)
         self._waiting: deque[tuple[int, Fix]] = deque()

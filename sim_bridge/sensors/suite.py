@@ -143,7 +143,12 @@ class SensorSuite:
         if ("mag", 0) in self._channels:
             sine, cosine = sin_cos(values.get(Kind.MAG_TURN, 0.0) * _DEGREE)
             turn = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-            self.mag.records[0]["matrix"] = self._mag_matrix @ turn
+            self.mag.records[0]["matrix"] = np.array(  # in this order on every processor, unlike BLAS
+                [
+                    [sum(float(a) * float(b) for a, b in zip(row, column, strict=True)) for column in turn.T]
+                    for row in self._mag_matrix
+                ]
+            )
         if ("gnss", 0) in self._channels:
             self.gnss.lost_share = values.get(Kind.GNSS_JAM, 0.0)
             self.gnss.records[0]["fault_rate"] = self._channels["gnss", 0].rate

@@ -12,7 +12,8 @@ from flightstack.firmware import build, sources
 from flightstack.firmware.build import BuildError, Compiler
 
 ROOT = Path(__file__).parents[2]
-COMPILED_HERE = (*sources.PORTABLE, "laws", "ports/host", "ports/cortex_m4")
+BOARD_PORTS = ("ports/bare", "ports/gnu", "ports/nucleo", "ports/pico2")
+COMPILED_HERE = (*sources.PORTABLE, "laws", "ports/host", "ports/cortex_m4", *BOARD_PORTS)
 
 
 def test_a_wheel_holds_all_sources_that_an_installation_compiles() -> None:

@@ -138,6 +138,7 @@ NOT_FLIGHT = (
 ALLOWED = {
     ("flightstack/params/vehicle.py", "linalg"),  # whether a vehicle is accepted: the rank of its rotors
     ("sim_bridge/plant/turbulence.py", "random"),  # PCG64, integers alone
+    ("sim_bridge/sensors/noise.py", "random"),  # PCG64, integers alone
 }
 
 
