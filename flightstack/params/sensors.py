@@ -87,9 +87,9 @@ _MAG = (
            _CALIBRATED),
     Number("current_gauss_a", "gauss/A", "standard deviation of the field of the current, each axis", 0.0, 1.0,
            0.0002, 0.0, "a compass on a mast"),
-    Number("range_gauss", "gauss", "full scale", 0.1, 1e3, 8.0, 1e3, "HMC5883L data sheet"),
+    Number("range_gauss", "gauss", "full scale", 0.1, 1e3, 8.0, 1e3, "class value of an HMC5883L, to be checked"),
     Number("resolution_gauss", "gauss", "step of the output, 0 for none", 0.0, 1.0, 0.00092, 0.0,
-           "HMC5883L data sheet: 0.92 mG at the default gain"),
+           "class value of an HMC5883L, to be checked"),
 )  # fmt: skip
 
 _BARO = (
@@ -104,11 +104,11 @@ _BARO = (
     Number("dynamic_share", "", "share of the dynamic pressure ½ρv² that the port feels", -2.0, 2.0, -0.05, 0.0,
            "a port in foam; PX4's EKF2_PCOEF parameters correct it"),
     Number("ground_effect_share", "", "share of the disc loading that the port feels half a rotor radius high",
-           -2.0, 2.0, 0.1, 0.0, "1 m at the ground, as seen on vehicles of this size"),
+           -2.0, 2.0, 0.1, 0.0, "estimate"),
     Number("resolution_hpa", "hPa", "step of the output, 0 for none", 0.0, 10.0, 0.0, 0.0),
 )  # fmt: skip
 
-_M8 = "u-blox NEO-M8 data sheet"
+_M8 = "class value of a u-blox NEO-M8, to be checked"
 _GNSS = (
     Number("rate_hz", "Hz", "rate", 0.5, 50.0, 10.0, 10.0, f"{_M8}: GPS and GLONASS"),
     Number("latency_s", "s", "from the measurement to the message", 0.0, 2.0, 0.11, 0.0,
@@ -128,18 +128,18 @@ _GNSS = (
 _RANGE = (
     Number("rate_hz", "Hz", "rate", 1.0, 1000.0, 50.0, 50.0),
     Number("position_frd_m", "m", "mounting; it looks along +z", -5.0, 5.0, _HERE, _HERE),
-    Number("noise_m", "m", "standard deviation", 0.0, 10.0, 0.01, 0.0, "LIDAR-Lite v3 manual"),
-    Number("noise_share", "", "standard deviation over the distance", 0.0, 1.0, 0.01, 0.0, "LIDAR-Lite v3 manual: 1 %"),
-    Number("min_m", "m", "shortest distance", 0.0, 100.0, 0.05, 0.0, "LIDAR-Lite v3 manual"),
-    Number("max_m", "m", "longest distance", 0.1, 1e4, 40.0, 1e4, "LIDAR-Lite v3 manual"),
-    Number("resolution_m", "m", "step of the output, 0 for none", 0.0, 10.0, 0.01, 0.0, "LIDAR-Lite v3 manual"),
+    Number("noise_m", "m", "standard deviation", 0.0, 10.0, 0.01, 0.0, "class value of a LIDAR-Lite v3, to be checked"),
+    Number("noise_share", "", "standard deviation over the distance", 0.0, 1.0, 0.01, 0.0, "class value of a LIDAR-Lite v3, to be checked: 1 %"),
+    Number("min_m", "m", "shortest distance", 0.0, 100.0, 0.05, 0.0, "class value of a LIDAR-Lite v3, to be checked"),
+    Number("max_m", "m", "longest distance", 0.1, 1e4, 40.0, 1e4, "class value of a LIDAR-Lite v3, to be checked"),
+    Number("resolution_m", "m", "step of the output, 0 for none", 0.0, 10.0, 0.01, 0.0, "class value of a LIDAR-Lite v3, to be checked"),
 )  # fmt: skip
 
 _FLOW = (
     Number("rate_hz", "Hz", "rate", 1.0, 1000.0, 50.0, 50.0),
     Number("noise_rad_s", "rad/s", "standard deviation", 0.0, 10.0, 0.05, 0.0),
-    Number("max_rate_rad_s", "rad/s", "largest flow", 0.1, 1e3, 7.4, 1e3, "PMW3901 data sheet"),
-    Number("min_height_m", "m", "height at which the lens begins to see", 0.0, 100.0, 0.08, 0.0, "PMW3901 data sheet"),
+    Number("max_rate_rad_s", "rad/s", "largest flow", 0.1, 1e3, 7.4, 1e3, "class value of a PMW3901, to be checked"),
+    Number("min_height_m", "m", "height at which the lens begins to see", 0.0, 100.0, 0.08, 0.0, "class value of a PMW3901, to be checked"),
 )  # fmt: skip
 
 TABLES: Mapping[str, tuple[Number, ...]] = MappingProxyType(
