@@ -108,6 +108,8 @@ _BARO = (
     Number("resolution_hpa", "hPa", "step of the output, 0 for none", 0.0, 10.0, 0.0, 0.0),
 )  # fmt: skip
 
+_LIDAR = "class value of a LIDAR-Lite v3, to be checked"
+_FLOW_CHIP = "class value of a PMW3901, to be checked"
 _M8 = "class value of a u-blox NEO-M8, to be checked"
 _GNSS = (
     Number("rate_hz", "Hz", "rate", 0.5, 50.0, 10.0, 10.0, f"{_M8}: GPS and GLONASS"),
@@ -128,18 +130,18 @@ _GNSS = (
 _RANGE = (
     Number("rate_hz", "Hz", "rate", 1.0, 1000.0, 50.0, 50.0),
     Number("position_frd_m", "m", "mounting; it looks along +z", -5.0, 5.0, _HERE, _HERE),
-    Number("noise_m", "m", "standard deviation", 0.0, 10.0, 0.01, 0.0, "class value of a LIDAR-Lite v3, to be checked"),
-    Number("noise_share", "", "standard deviation over the distance", 0.0, 1.0, 0.01, 0.0, "class value of a LIDAR-Lite v3, to be checked: 1 %"),
-    Number("min_m", "m", "shortest distance", 0.0, 100.0, 0.05, 0.0, "class value of a LIDAR-Lite v3, to be checked"),
-    Number("max_m", "m", "longest distance", 0.1, 1e4, 40.0, 1e4, "class value of a LIDAR-Lite v3, to be checked"),
-    Number("resolution_m", "m", "step of the output, 0 for none", 0.0, 10.0, 0.01, 0.0, "class value of a LIDAR-Lite v3, to be checked"),
+    Number("noise_m", "m", "standard deviation", 0.0, 10.0, 0.01, 0.0, _LIDAR),
+    Number("noise_share", "", "standard deviation over the distance", 0.0, 1.0, 0.01, 0.0, _LIDAR),
+    Number("min_m", "m", "shortest distance", 0.0, 100.0, 0.05, 0.0, _LIDAR),
+    Number("max_m", "m", "longest distance", 0.1, 1e4, 40.0, 1e4, _LIDAR),
+    Number("resolution_m", "m", "step of the output, 0 for none", 0.0, 10.0, 0.01, 0.0, _LIDAR),
 )  # fmt: skip
 
 _FLOW = (
     Number("rate_hz", "Hz", "rate", 1.0, 1000.0, 50.0, 50.0),
     Number("noise_rad_s", "rad/s", "standard deviation", 0.0, 10.0, 0.05, 0.0),
-    Number("max_rate_rad_s", "rad/s", "largest flow", 0.1, 1e3, 7.4, 1e3, "class value of a PMW3901, to be checked"),
-    Number("min_height_m", "m", "height at which the lens begins to see", 0.0, 100.0, 0.08, 0.0, "class value of a PMW3901, to be checked"),
+    Number("max_rate_rad_s", "rad/s", "largest flow", 0.1, 1e3, 7.4, 1e3, _FLOW_CHIP),
+    Number("min_height_m", "m", "height at which the lens begins to see", 0.0, 100.0, 0.08, 0.0, _FLOW_CHIP),
 )  # fmt: skip
 
 TABLES: Mapping[str, tuple[Number, ...]] = MappingProxyType(
