@@ -97,7 +97,7 @@ void fs_app_baud_poll(fs_app *app)
     } else if ((app->line.baud != app->port->baud) && (is_only_noise(app) != 0U)) {
         go_to(app, app->port->baud, app->port->baud);
     } else {
-        /* the rate is right, or nobody speaks */
+        /* the rate is right, or the line is silent */
     }
 }
 

@@ -15,7 +15,7 @@
 #define FS_OUTBOX_ALARM 0U   /* why the rotors are stopped: whoever listens has to know */
 #define FS_OUTBOX_REPORT 0U  /* reports of steps: what a host waits for in each step */
 #define FS_OUTBOX_ANSWER 1344U /* answers to requests, which are asked again when they are lost */
-#define FS_OUTBOX_NEWS 1664U  /* heartbeat, status, texts: nobody waits for one of them */
+#define FS_OUTBOX_NEWS 1664U  /* heartbeat, status, texts: a later one replaces them */
 
 typedef struct {
     fs_octet octets[FS_OUTBOX_SIZE];

@@ -24,7 +24,7 @@ STATE_TIMEOUT_MS = 250.0
 _REST_S = 0.1
 """Time on the ground between two states with REST, of which one may be lost."""
 _PAUSE_S = 1.0
-"""Time without a state on the ground after which the target is told to run again: it stops 5 s after the last frame."""
+"""Time without a state on the ground after which free-running is commanded again: the firmware ends it after 5 s."""
 _RESEND_S, _SET_ATTEMPTS = 0.03, 100
 """Timeout and attempts of a number, which is set while states are sent."""
 _MOST_READS = 20
