@@ -93,6 +93,8 @@ class _Rows:
         while at + MESSAGE_HEADER.size <= end:
             after = at + MESSAGE_HEADER.size + (content[at] | content[at + 1] << 8)
             kind = content[at + 2]
+            if after > end or (kind == DATA_TYPE and after < at + _ROW_AT):
+                return False
             if kind == DATA_TYPE:
                 number, row = content[at + 3] | content[at + 4] << 8, content[at + _ROW_AT : after]
                 time = row[7::-1]  # big-endian, so that bytes compare as numbers do
