@@ -107,7 +107,9 @@ class Stack(NamedTuple):
 def vehicle_of(config: StackConfig) -> Vehicle:
     """Load the vehicle; raise ConfigError."""
     if config.state not in STATES:
-        raise ConfigError("--state", config.state, f"is not one of {', '.join(STATES)}")
+        raise ConfigError(
+            "--state", config.state, f"is not one of {', '.join(STATES)}; the directory is --state-dir"
+        )
     vehicle = load_vehicle(config.vehicle)
     if config.state == ESTIMATED and not vehicle.sensors.numbers:
         raise ConfigError(

@@ -38,6 +38,10 @@ class Estimation:
         estimator.baro(BaroSample(0.0, math.nan, math.nan, math.nan))
         estimator.set_earth_field(Vector3(0.0, 0.0, 0.0))
 
+    def is_ready(self) -> bool:
+        """Return True if the vehicle may fly on the estimate."""
+        return self._now.has_state
+
     def update(self) -> None:
         """Take the measurements since the last call; once per tick."""
         now = self._now

@@ -171,7 +171,7 @@ def test_a_busy_port_is_named(start: Start) -> None:
     ],
 )
 def test_bad_arguments_are_one_sentence_and_exit_2(arguments: list[str], sentence: str) -> None:
-    done = flightstack_command("--state", "none", *arguments)
+    done = flightstack_command("--state-dir", "none", *arguments)
     assert (done.returncode, done.stdout) == (2, "")
     assert sentence in done.stderr
     assert done.stderr.count("\n") == 1
