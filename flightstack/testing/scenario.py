@@ -8,11 +8,10 @@ import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib import invalidate_caches
-from importlib.metadata import entry_points
 from pathlib import Path
 
 from flightstack.commander.failsafe import Failsafe
-from flightstack.control.controller_loading import ENTRY_POINT_GROUP, load_controller
+from flightstack.control.controller_loading import entry_points_of_controllers, load_controller
 from flightstack.core.enums import Mode
 from flightstack.core.errors import ConfigError
 from flightstack.params.config import DEFAULT_CONTROLLER, DEFAULT_HOME, DEFAULT_STATE, STATES, parse_home
@@ -189,7 +188,7 @@ def _beside(name: str, folder: Path) -> str:
 
 def forget_controllers() -> None:
     """Forget the modules of plug-in controllers: the next use imports them as they are then."""
-    tops = {point.module.partition(".")[0] for point in entry_points(group=ENTRY_POINT_GROUP)}
+    tops = {point.module.partition(".")[0] for point in entry_points_of_controllers()}
     plugins = tops - {__name__.partition(".")[0]}
     for name in [name for name in sys.modules if name.partition(".")[0] in plugins]:
         del sys.modules[name]
