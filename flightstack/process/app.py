@@ -229,7 +229,7 @@ class App:
     # ------------------------------------------------------------------ loops
 
     def _run(self, simulator: TcpClient, until: Callable[[], bool] | None = None) -> None:
-        """Run the loops until ``until`` is true at a new state, which stays unanswered."""
+        """Run the loops until ``until`` is true before an outer tick, whose state stays unanswered."""
         if self._lockstep:
             self._run_lockstep(simulator, until)
         else:
@@ -245,7 +245,7 @@ class App:
         fresh, began_ns, before_ns = True, 0, 0  # fresh: the state received before the start
         while True:
             if fresh:
-                if until is not None and until():
+                if until is not None and tick % divisor == 0 and until():
                     return
                 before_ns, began_ns = began_ns, clock_ns()
                 commands = lockstep.tick(began_ns)
