@@ -217,7 +217,7 @@ def _on_sensors(
     """Return the autopilot to tick; that of a vehicle on sensors estimates its state first."""
     if simulator.sensors is None:
         return parts.autopilot, None
-    estimation = Estimation(simulator.sensors, parts.places.frame, parts.now)
+    estimation = Estimation(simulator.sensors, parts.now, parts.area)
     estimation.warm_up()
     return SensorAutopilot(parts.autopilot, estimation), estimation
 
