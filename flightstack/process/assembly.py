@@ -107,7 +107,9 @@ class Stack(NamedTuple):
 def vehicle_of(config: StackConfig) -> Vehicle:
     """Load the vehicle; raise ConfigError."""
     if config.state not in STATES:
-        raise ConfigError("--state", config.state, f"is not one of {', '.join(STATES)}")
+        raise ConfigError(
+            "--state", config.state, f"is not one of {', '.join(STATES)}; the directory is --state-dir"
+        )
     vehicle = load_vehicle(config.vehicle)
     if config.state == ESTIMATED and not vehicle.sensors.numbers:
         raise ConfigError(
@@ -215,7 +217,7 @@ def _on_sensors(
     """Return the autopilot to tick; that of a vehicle on sensors estimates its state first."""
     if simulator.sensors is None:
         return parts.autopilot, None
-    estimation = Estimation(simulator.sensors, parts.places.frame, parts.now)
+    estimation = Estimation(simulator.sensors, parts.now, parts.area)
     estimation.warm_up()
     return SensorAutopilot(parts.autopilot, estimation), estimation
 
