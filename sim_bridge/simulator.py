@@ -106,7 +106,8 @@ class Simulator:
             seed = self._flight.options.seed
             self.sensors = SensorSuite(self.vehicle, home, seed, self._frame, self.plant, sender)
             self.sensors.set_interval_us(self._interval_us)
-            self.sensors.set_faults(self._schedule.active(self.time_us))
+            self.sensors.prime(self.time_us)
+            self.sensors.set_faults(self._schedule.active(self.time_us), self.time_us)
             self.sensors.measure(self.time_us)
         return self.sensors is not None
 
@@ -218,7 +219,7 @@ class Simulator:
         active = schedule.active(now_us)
         self.plant.set_faults(plant_faults(active))
         if self.sensors is not None:
-            self.sensors.set_faults(active)
+            self.sensors.set_faults(active, now_us)
         for event in events:
             if event.kind is Kind.BATTERY_LEVEL:
                 self.plant.set_charge(event.value)

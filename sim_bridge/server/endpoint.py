@@ -114,10 +114,10 @@ class FlightStackEndpoint:
         if self._requested == FS_PLANT_STATE_ID:
             return simulator.outgoing()
         data = simulator.battery_frame()
+        if self._sends_sensors and simulator.sensors is not None:
+            data += simulator.sensors.frames(simulator.stamp_us, clock_first=True)
         if self._requested and not simulator.drops_state:
             data += self._link.encode(hil_state(simulator, self._frame))
-        if self._sends_sensors and simulator.sensors is not None:
-            data += simulator.sensors.frames(simulator.stamp_us)
         return data
 
     def step(self) -> None:
