@@ -75,6 +75,16 @@ def channels_of(sensor: str, imu_count: int) -> list[tuple[str, int]]:
     return [(part, index) for part in parts for index in indices if name]
 
 
+def without(fault: Fault, sensor: str, imu_count: int) -> list[Fault]:
+    """Return what is left of a fault when it ends on ``sensor``: the fault, or one for each other sensor, or none."""
+    channels, ended = channels_of(fault.sensor, imu_count), channels_of(sensor, imu_count)
+    if not set(channels).intersection(ended):
+        return [fault]
+    return [
+        fault._replace(sensor=f"{name}{index + 1}") for name, index in channels if (name, index) not in ended
+    ]
+
+
 class Channel:
     """One sensor, or one part of the inertial sensor: its faults, and the way of its measurements to the link."""
 
@@ -137,7 +147,8 @@ class Channel:
         """Take the measurement ``out``, which is kept, and return the one that is sent at ``time_us``, or None."""
         if self._fault.loss == 0.0 or self._losses.next() >= self._fault.loss:
             self._waiting.append((time_us + self._latency_us + self._fault.late_us, out))
-        return self.due(time_us)
+        sent: T | None = self.due(time_us)
+        return sent
 
     def due(self, time_us: int) -> Any:
         """Return the newest measurement that is due, once, or None; older ones are dropped."""

@@ -334,6 +334,11 @@ def test_fault_of_a_sensor_that_is_not_there_is_refused(spec: str, problem: str)
         Simulator(X_QUAD).inject(parse_fault(spec, 4))
 
 
+def test_vibration_of_rotors_without_imbalance_is_refused() -> None:
+    with pytest.raises(UsageProblemError, match="the rotors of the vehicle x_quad have no imbalance"):
+        Simulator(IDEAL).inject(parse_fault("sensor:imu:vibration=10", 4))
+
+
 # ---------------------------------------------------------------------- failures that a client injects
 
 ACCEPTED, DENIED, UNSUPPORTED = (
@@ -396,6 +401,18 @@ def test_injected_failure_without_effect_is_answered() -> None:
     assert inject_failure(simulator, mavlink.FAILURE_UNIT_SENSOR_AIRSPEED, off, 0) == UNSUPPORTED
     assert inject_failure(simulator, mavlink.FAILURE_UNIT_SENSOR_MAG, off, math.nan) == DENIED
     assert simulator.faults == ()
+
+
+def test_client_ends_a_fault_of_all_sensors_on_one_of_them() -> None:
+    """The gyro of the second inertial sensor recovers; its accelerometer and the other gyro stay off."""
+    bench = Bench(with_sensors("ideal", imu={"count": 2.0}), "sensor:imu:off")
+    unit, ok = mavlink.FAILURE_UNIT_SENSOR_GYRO, mavlink.FAILURE_TYPE_OK
+    assert inject_failure(bench.simulator, unit, ok, 2) == ACCEPTED
+    sent = of_type(bench.run(0.1)[1:], "HIL_SENSOR")
+    assert {(m.id, m.fields_updated & (ACCEL | GYRO)) for m in sent} == {(0, 0), (1, GYRO)}
+    assert inject_failure(bench.simulator, unit, ok, 0) == ACCEPTED
+    sent = of_type(bench.run(0.1)[1:], "HIL_SENSOR")
+    assert {(m.id, m.fields_updated & (ACCEL | GYRO)) for m in sent} == {(0, GYRO), (1, GYRO)}
 
 
 def test_failure_of_a_sensor_is_unsupported_on_the_true_state() -> None:
