@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Protocol
 
 from flightstack.core.contract import FloatArray, Vector3, VehicleState
+from flightstack.core.earth_field import earth_field_ned_gauss
 from flightstack.core.geodesy import LocalFrame
 from flightstack.estimation.sensor_samples import (
     BaroSample,
@@ -66,9 +68,25 @@ class StateEstimator(Protocol):
         """Take a sample of the rangefinder."""
         ...
 
+    def set_earth_field(self, field_ned_gauss: Vector3) -> None:
+        """Set the Earth's magnetic field at the origin."""
+        ...
+
     def state(self) -> VehicleState:
         """Return the state at the time of the newest sample of the inertial sensor."""
         ...
+
+
+@dataclass(slots=True)
+class NewestSamples:
+    """Newest sample of each sensor; None before the first one."""
+
+    imu: ImuSample | None = None
+    mag: MagSample | None = None
+    baro: BaroSample | None = None
+    gnss: GnssSample | None = None
+    range: RangeSample | None = None
+    flow: FlowSample | None = None
 
 
 def hil_samples(time_s: float, report: HilReport) -> Iterator[ImuSample | MagSample | BaroSample]:
@@ -126,34 +144,50 @@ class SensorFeed:
         self._estimator, self._frame, self._state = estimator, frame, state
         self._origin = Vector3(0.0, 0.0, 0.0)  # of the estimator's frame in the vehicle's
         self._has_origin = False
+        self.newest = NewestSamples()
 
     def update(self, reports: list[Report]) -> bool:
         """Take the reports; return True if the state is known and was written."""
-        estimator = self._estimator
         for report in reports:
             for number, sample in samples_of(report):
                 if number == 0:
                     self._take(sample)
-        if not estimator.aligned:
+        if not self._estimator.aligned:
             return False
-        if not self._has_origin and estimator.frame is not None:
-            self._origin, self._has_origin = self._frame.to_ned(estimator.frame.origin), True
-        found, origin, state = estimator.state(), self._origin, self._state
-        position = found.position_ned_m
+        if not self._has_origin:
+            self._find_origin()
+        self._write(self._estimator.state())
+        return self._has_origin
+
+    def _find_origin(self) -> None:
+        """Take over the estimator's origin after the first fix, and give the estimator the Earth's field there."""
+        frame = self._estimator.frame
+        if frame is not None:
+            self._origin, self._has_origin = self._frame.to_ned(frame.origin), True
+            self._estimator.set_earth_field(earth_field_ned_gauss(frame.origin))
+
+    def _write(self, found: VehicleState) -> None:
+        position, origin, state = found.position_ned_m, self._origin, self._state
         state[0:3] = position.x + origin.x, position.y + origin.y, position.z + origin.z
         state[3:6], state[6:10] = found.velocity_ned_m_s, found.attitude
         state[10:13] = found.rates_frd_rad_s
-        return self._has_origin
 
     def _take(self, sample: Sample) -> None:
-        estimator = self._estimator
+        estimator, newest = self._estimator, self.newest
         if isinstance(sample, ImuSample):
+            newest.imu = sample
             estimator.imu(sample)
         elif isinstance(sample, MagSample):
+            newest.mag = sample
             estimator.mag(sample)
         elif isinstance(sample, BaroSample):
+            newest.baro = sample
             estimator.baro(sample)
         elif isinstance(sample, GnssSample):
+            newest.gnss = sample
             estimator.gnss(sample)
         elif isinstance(sample, RangeSample):
+            newest.range = sample
             estimator.range(sample)
+        else:
+            newest.flow = sample

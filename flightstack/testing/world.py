@@ -192,6 +192,14 @@ class World:
             f"{what} did not come true within {timeout_s:g} s of simulated time; {self.state}{self._last_texts()}"
         )
 
+    def wait_until_ready(self, timeout_s: float = 60.0) -> None:
+        """Run until the state is known: at once with the simulator's state, after seconds on sensors.
+
+        Raise ConditionTimeoutError after ``timeout_s`` of simulated time.
+        """
+        __tracebackhide__ = True
+        self.run_until(lambda _: self.engine.stack.now.has_state, timeout_s)
+
     def watch(self, callback: Callable[[], None]) -> None:
         """Call ``callback`` after every outer tick."""
         self._watches.append(callback)
