@@ -199,16 +199,18 @@ def estimator_report(memory: Record) -> EstimatorReport:
         height=height,
         field=tuple(field),
         range=range_finder,
-        horizontal_accuracy_m=math.sqrt(variances[POSITION] + variances[POSITION + 1]),
-        vertical_accuracy_m=math.sqrt(variances[POSITION + 2]),
+        horizontal_accuracy_m=_root(variances[POSITION] + variances[POSITION + 1]),
+        vertical_accuracy_m=_root(variances[POSITION + 2]),
         resets=_resets(memory["resets"].tolist()),
     )
 
 
 def _observation(row: Sequence[float]) -> Observation:
-    return Observation(
-        row[INNOVATION], row[INNOVATION_VARIANCE], math.sqrt(max(row[TEST_RATIO], 0.0)), row[FUSED_S]
-    )
+    return Observation(row[INNOVATION], row[INNOVATION_VARIANCE], _root(row[TEST_RATIO]), row[FUSED_S])
+
+
+def _root(square: float) -> float:
+    return math.nan if square < 0.0 else math.sqrt(square)
 
 
 def _nominal(x: Sequence[float]) -> Nominal:
@@ -299,7 +301,7 @@ def _solution(
     if not flags[ALIGNED]:
         return SolutionFlags(0)
     has_gnss = bool(flags[HAS_GNSS])
-    gnss = rows[GNSS_VELOCITY : GNSS_VELOCITY + 2] + rows[GNSS_POSITION : GNSS_POSITION + 2]
+    gnss = [*rows[GNSS_VELOCITY : GNSS_VELOCITY + 2], *rows[GNSS_POSITION : GNSS_POSITION + 2]]
     at_rest = bool(control & ControlFlags.VEHICLE_AT_REST)
     horizontal = has_gnss and (at_rest or _is_recent(gnss, now_s, DEAD_RECKONING_S))
     heights = [rows[BARO], rows[GNSS_POSITION + 2], rows[GNSS_VELOCITY + 2]]

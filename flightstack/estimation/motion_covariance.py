@@ -43,7 +43,8 @@ def upper_triangle(matrix: FloatArray) -> list[float]:
 
 
 def _transformed(memory: Record, jacobian: FloatArray) -> FloatArray:
-    result: FloatArray = jacobian @ memory["covariance"][:_USED, :_USED] @ jacobian.T
+    with np.errstate(all="ignore"):  # a diverged filter has infinite covariances
+        result: FloatArray = jacobian @ memory["covariance"][:_USED, :_USED] @ jacobian.T
     return result
 
 
@@ -63,7 +64,8 @@ def twist_covariance(memory: Record, attitude: Quaternion, velocity_ned_m_s: Vec
     into_body = _rotation(attitude).T
     jacobian = np.zeros((6, _USED))
     jacobian[:3, _part(VELOCITY)] = into_body
-    jacobian[:3, _part(ATTITUDE)] = into_body @ _cross(velocity_ned_m_s)
+    with np.errstate(all="ignore"):
+        jacobian[:3, _part(ATTITUDE)] = into_body @ _cross(velocity_ned_m_s)
     jacobian[3:, _part(GYRO_BIAS)] = -np.eye(3)
     return _transformed(memory, jacobian)
 
@@ -74,9 +76,10 @@ def motion_covariance(memory: Record, attitude: Quaternion, force_frd_m_s2: Vect
     ``force_frd_m_s2`` is the specific force without its bias. The acceleration is uncertain by the attitude, which
     turns the force, and by the accelerometer's bias.
     """
-    to_world = _rotation(attitude)
-    jacobian = np.zeros((9, _USED))
+    to_world, jacobian = _rotation(attitude), np.zeros((9, _USED))
     jacobian[:3, _part(POSITION)] = jacobian[3:6, _part(VELOCITY)] = np.eye(3)
-    jacobian[6:, _part(ATTITUDE)] = -_cross(Vector3(*(to_world @ np.array(force_frd_m_s2)).tolist()))
+    with np.errstate(all="ignore"):
+        force = to_world @ np.array(force_frd_m_s2)
+    jacobian[6:, _part(ATTITUDE)] = -_cross(Vector3(*force.tolist()))
     jacobian[6:, _part(ACCEL_BIAS)] = -to_world
     return _transformed(memory, jacobian)

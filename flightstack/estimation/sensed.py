@@ -2,36 +2,13 @@
 
 from __future__ import annotations
 
-from collections import deque
-from dataclasses import dataclass, field
 from functools import cached_property
 
 from flightstack.core.contract import FloatArray, Quaternion, Record, Vector3
 from flightstack.estimation.estimator_report import EstimatorReport, estimator_report
 from flightstack.estimation.motion_covariance import motion_covariance, pose_covariance, twist_covariance
-from flightstack.estimation.sensor_samples import (
-    BaroSample,
-    FlowSample,
-    GnssSample,
-    ImuSample,
-    MagSample,
-    RangeSample,
-)
-from flightstack.estimation.vibration import WINDOW, Vibration, vibration_of
-
-
-@dataclass(slots=True)
-class NewestSamples:
-    """Newest sample of each sensor; None before the first one."""
-
-    imu: ImuSample | None = None
-    mag: MagSample | None = None
-    baro: BaroSample | None = None
-    gnss: GnssSample | None = None
-    range: RangeSample | None = None
-    flow: FlowSample | None = None
-    past_imu: deque[ImuSample] = field(default_factory=lambda: deque(maxlen=WINDOW))
-    """The last samples of the inertial sensor."""
+from flightstack.estimation.sensor_feed import NewestSamples
+from flightstack.estimation.vibration import Vibration, vibration_of
 
 
 class Sensed:

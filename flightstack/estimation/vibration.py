@@ -32,8 +32,9 @@ def vibration_of(samples: Iterable[ImuSample]) -> Vibration:
     rows = np.array([(s.dt_s, *s.gyro_frd_rad_s, *s.accel_frd_m_s2) for s in samples])
     if len(rows) < 2:
         return STILL
-    angles = rows[:, 1:4] * rows[:, :1]
-    change = np.diff(rows[:, 1:], axis=0)
-    coning = np.linalg.norm(np.cross(angles[:-1], angles[1:]), axis=1)
-    gyro, accel = (np.linalg.norm(part, axis=1) for part in (change[:, :3], change[:, 3:]))
-    return Vibration(float(coning.mean()), float(gyro.mean()), float(accel.mean()))
+    with np.errstate(all="ignore"):  # absurd measurements
+        angles = rows[:, 1:4] * rows[:, :1]
+        change = np.diff(rows[:, 1:], axis=0)
+        coning = np.linalg.norm(np.cross(angles[:-1], angles[1:]), axis=1)
+        gyro, accel = (np.linalg.norm(part, axis=1) for part in (change[:, :3], change[:, 3:]))
+        return Vibration(float(coning.mean()), float(gyro.mean()), float(accel.mean()))

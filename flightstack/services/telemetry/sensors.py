@@ -10,7 +10,8 @@ from flightstack.core.contract import Quaternion, Vector3
 from flightstack.core.portable_math import atan2, distance
 from flightstack.estimation.estimator_report import ControlFlags, SolutionFlags
 from flightstack.estimation.motion_covariance import upper_triangle
-from flightstack.estimation.sensed import NewestSamples, Sensed
+from flightstack.estimation.sensed import Sensed
+from flightstack.estimation.sensor_feed import NewestSamples
 from flightstack.estimation.sensor_samples import (
     BaroSample,
     GnssFix,
@@ -161,7 +162,7 @@ def wind_cov(f: VehicleStatus, sensed: Sensed) -> tuple[Message, ...]:
     return (
         mavlink.MAVLink_wind_cov_message(
             f.time_us, wind.wind_north_m_s, wind.wind_east_m_s, NAN, variance, NAN, NAN,
-            math.sqrt(variance), NAN,
+            math.sqrt(abs(variance)), NAN,
         ),
     )  # fmt: skip
 

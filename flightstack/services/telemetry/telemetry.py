@@ -48,9 +48,7 @@ STREAMED = frozenset({*MAKERS, FS_LOOP_TIMING_ID})
 """Messages that can be sent at a rate."""
 SENSOR_STREAMED = STREAMED | SENSED.keys()
 """The same for a vehicle that flies on its sensors."""
-_REQUESTED = frozenset(
-    {mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES, mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED}
-)
+_REQUESTED = frozenset({mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES, mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED})
 """Further messages on request."""
 
 
