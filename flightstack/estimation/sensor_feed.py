@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from flightstack.core.contract import FloatArray, Vector3, VehicleState
@@ -17,6 +18,7 @@ from flightstack.estimation.sensor_samples import (
     MagSample,
     RangeSample,
 )
+from flightstack.estimation.vibration import WINDOW
 from flightstack.simulator_link.sensor_frames import (
     ACCEL,
     ACCEL_AT,
@@ -82,6 +84,8 @@ class NewestSamples:
     gnss: GnssSample | None = None
     range: RangeSample | None = None
     flow: FlowSample | None = None
+    past_imu: deque[ImuSample] = field(default_factory=lambda: deque(maxlen=WINDOW))
+    """The last samples of the inertial sensor, of which the vibration is computed."""
 
 
 def hil_samples(time_s: float, report: HilReport) -> Iterator[ImuSample | MagSample | BaroSample]:
@@ -157,6 +161,7 @@ class SensorFeed:
         estimator, newest = self._estimator, self.newest
         if isinstance(sample, ImuSample):
             newest.imu = sample
+            newest.past_imu.append(sample)
             estimator.imu(sample)
         elif isinstance(sample, MagSample):
             newest.mag = sample

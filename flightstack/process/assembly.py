@@ -200,9 +200,10 @@ def _join(
     vehicle_id = vehicle_info(vehicle, system_id, generic, parts.places.frame)
 
     def status() -> VehicleStatus:
-        return vehicle_status(vehicle_id, parts, simulator.battery)
+        sensed = None if estimation is None else estimation.sensed()
+        return vehicle_status(vehicle_id, parts, simulator.battery, sensed)
 
-    telemetry = Telemetry(status, lambda: parts.now.time_us, report.message)
+    telemetry = Telemetry(status, lambda: parts.now.time_us, report.message, estimation is not None)
     context = VehicleContext.of(parts, params, simulator, generic, logs)
     ground = GroundHub(context, parts, telemetry, vehicle_id)
     return Stack(

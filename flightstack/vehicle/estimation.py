@@ -7,6 +7,7 @@ import math
 from flightstack.core.contract import FloatArray, Vector3
 from flightstack.core.earth_field import earth_field_ned_gauss
 from flightstack.estimation.estimator import Estimator
+from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed
 from flightstack.estimation.sensor_samples import BaroSample, ImuSample
 from flightstack.simulator_link.sensor_inbox import SensorInbox
@@ -34,6 +35,10 @@ class Estimation:
     def samples(self) -> NewestSamples:
         """Newest sample of each sensor."""
         return self._feed.newest
+
+    def sensed(self) -> Sensed:
+        """Return what the estimator and its sensors know now; valid until the next update."""
+        return Sensed(self.estimator.memory[0], self._feed.newest)
 
     def warm_up(self) -> None:
         """Compile the kernels of the estimator, or load them from the cache."""
