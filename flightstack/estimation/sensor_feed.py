@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -143,8 +143,18 @@ def samples_of(report: Report) -> Iterator[tuple[int, Sample]]:
 class SensorFeed:
     """Feeds an estimator with the first sensor of each kind, and writes its state in the vehicle's local frame."""
 
-    def __init__(self, estimator: StateEstimator, frame: LocalFrame, state: FloatArray) -> None:
-        """``frame`` is the vehicle's; ``state`` is the array form of ``VehicleState`` to write."""
+    def __init__(
+        self,
+        estimator: StateEstimator,
+        frame: LocalFrame,
+        state: FloatArray,
+        record: Callable[[Sample], object] = lambda _: None,
+    ) -> None:
+        """``frame`` is the vehicle's; ``state`` is the array form of ``VehicleState`` to write.
+
+        ``record`` is called with each sample that the estimator takes.
+        """
+        self._record = record
         self._estimator, self._frame, self._state = estimator, frame, state
         self._origin = Vector3(0.0, 0.0, 0.0)  # of the estimator's frame in the vehicle's
         self._has_origin = False
@@ -156,6 +166,7 @@ class SensorFeed:
             for number, sample in samples_of(report):
                 if number == 0:
                     self._take(sample)
+                    self._record(sample)
         if not self._estimator.aligned:
             return False
         if not self._has_origin:

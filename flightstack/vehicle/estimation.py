@@ -10,6 +10,7 @@ from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed
 from flightstack.estimation.sensor_samples import BaroSample, ImuSample
+from flightstack.flight_log.sensor_recorder import SensorRecorder
 from flightstack.simulator_link.sensor_inbox import SensorInbox
 from flightstack.vehicle.autopilot import Autopilot
 from flightstack.vehicle.flight_state import FlightState
@@ -18,12 +19,23 @@ from flightstack.vehicle.flight_state import FlightState
 class Estimation:
     """Feeds the estimator with the new measurements, and writes the state of the flight."""
 
-    def __init__(self, sensors: SensorInbox, frame: LocalFrame, now: FlightState) -> None:
-        """``frame`` is the local frame of the vehicle; ``now.state`` is written in place."""
+    def __init__(
+        self,
+        sensors: SensorInbox,
+        frame: LocalFrame,
+        now: FlightState,
+        recorder: SensorRecorder,
+        truth: FloatArray,
+    ) -> None:
+        """``frame`` is the local frame of the vehicle; ``now.state`` is written in place.
+
+        ``truth`` is the simulator's state, which only ``recorder`` reads.
+        """
         self.estimator = Estimator()
         self._sensors = sensors
         self._now = now
-        self._feed = SensorFeed(self.estimator, frame, now.state)
+        self._feed = SensorFeed(self.estimator, frame, now.state, recorder.sample)
+        self._recorder, self._truth = recorder, truth
         self._landed = False
 
     @property
@@ -43,13 +55,14 @@ class Estimation:
         estimator.baro(BaroSample(0.0, math.nan, math.nan, math.nan))
         estimator.set_earth_field(Vector3(0.0, 0.0, 0.0))
 
-    def update(self) -> None:
-        """Take the measurements since the last call; once per tick."""
+    def update(self, time_us: int) -> None:
+        """Take the measurements since the last call; once per tick, at the time of the tick."""
         now = self._now
         if now.landed is not self._landed:
             self._landed = now.landed
             self.estimator.set_landed(now.landed)
         now.has_state = self._feed.update(self._sensors.take())
+        self._recorder.state(time_us, self._truth, self.sensed())
 
 
 class SensorAutopilot:
@@ -62,5 +75,5 @@ class SensorAutopilot:
 
     def tick(self, time_us: int) -> FloatArray:
         """Estimate the state and run one inner tick; return the rotor speed commands [rad/s], shape (8,)."""
-        self._estimation.update()
+        self._estimation.update(time_us)
         return self._autopilot.tick(time_us)
