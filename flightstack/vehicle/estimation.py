@@ -10,6 +10,7 @@ from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed
 from flightstack.estimation.sensor_samples import BaroSample, ImuSample
+from flightstack.flight_log.sensor_recorder import SensorRecorder
 from flightstack.simulator_link.sensor_inbox import SensorInbox
 from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.autopilot import Autopilot
@@ -22,13 +23,21 @@ class Estimation:
     The estimate of the first fix becomes the origin of the vehicle's local frame.
     """
 
-    def __init__(self, sensors: SensorInbox, now: FlightState, area: FlightArea) -> None:
-        """``now.state`` is written in place."""
+    def __init__(
+        self,
+        sensors: SensorInbox,
+        now: FlightState,
+        area: FlightArea,
+        recorder: SensorRecorder,
+        truth: FloatArray,
+    ) -> None:
+        """``now.state`` is written in place; ``truth`` is the simulator's state, which only ``recorder`` reads."""
         self.estimator = Estimator()
         self._sensors = sensors
         self._now = now
         self._area = area
-        self._feed = SensorFeed(self.estimator, now.state)
+        self._feed = SensorFeed(self.estimator, now.state, recorder.sample)
+        self._recorder, self._truth = recorder, truth
         self._landed = False
 
     @property
@@ -52,14 +61,15 @@ class Estimation:
         """Return True if the vehicle may fly on the estimate."""
         return self._now.has_state
 
-    def update(self) -> None:
-        """Take the measurements since the last call; once per tick."""
+    def update(self, time_us: int) -> None:
+        """Take the measurements since the last call; once per tick, at the time of the tick."""
         now = self._now
         if now.landed is not self._landed:
             self._landed = now.landed
             self.estimator.set_landed(now.landed)
         if self._feed.update(self._sensors.take()) and not now.has_state:
             self._find_origin()
+        self._recorder.state(time_us, self._truth, self.sensed())
 
     def _find_origin(self) -> None:
         frame = self.estimator.frame
@@ -79,5 +89,5 @@ class SensorAutopilot:
 
     def tick(self, time_us: int) -> FloatArray:
         """Estimate the state and run one inner tick; return the rotor speed commands [rad/s], shape (8,)."""
-        self._estimation.update()
+        self._estimation.update(time_us)
         return self._autopilot.tick(time_us)
