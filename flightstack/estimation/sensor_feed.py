@@ -82,6 +82,8 @@ class NewestSamples:
     gnss: GnssSample | None = None
     range: RangeSample | None = None
     flow: FlowSample | None = None
+    imu_repeats: int = 0
+    """Number of samples of the inertial sensor whose rates or forces equal those before."""
 
 
 def hil_samples(time_s: float, report: HilReport) -> Iterator[ImuSample | MagSample | BaroSample]:
@@ -156,7 +158,9 @@ class SensorFeed:
     def _take(self, sample: Sample) -> None:
         estimator, newest = self._estimator, self.newest
         if isinstance(sample, ImuSample):
-            newest.imu = sample
+            before, newest.imu = newest.imu, sample
+            repeats = before is not None and (before[2] == sample[2] or before[3] == sample[3])
+            newest.imu_repeats = newest.imu_repeats + 1 if repeats else 0
             estimator.imu(sample)
         elif isinstance(sample, MagSample):
             newest.mag = sample

@@ -38,7 +38,7 @@ from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.assembly import VehicleParts, assemble
 from flightstack.vehicle.autopilot import TickingAutopilot
-from flightstack.vehicle.estimation import Estimation, SensorAutopilot
+from flightstack.vehicle.estimation import Estimation, SensorAutopilot, Users
 from flightstack.vehicle.flight_state import FlightState
 from flightstack.vehicle.journal import Journal
 from flightstack.vehicle.parameters import (
@@ -82,6 +82,11 @@ class Stack(NamedTuple):
     autopilot: TickingAutopilot
     estimation: Estimation | None
     """None for a vehicle that flies on the simulator's state."""
+
+    @property
+    def is_ready(self) -> bool:
+        """True if the state is known well enough to take off: at once on the simulator's, after seconds on sensors."""
+        return self.estimation is None or self.estimation.is_ready()
 
     @property
     def now(self) -> FlightState:
@@ -217,7 +222,8 @@ def _on_sensors(
     """Return the autopilot to tick; that of a vehicle on sensors estimates its state first."""
     if simulator.sensors is None:
         return parts.autopilot, None
-    estimation = Estimation(simulator.sensors, parts.now, parts.area)
+    users = Users(parts.area, parts.failsafes, parts.navigator, parts.backend, parts.journal)
+    estimation = Estimation(simulator.sensors, parts.now, users)
     estimation.warm_up()
     return SensorAutopilot(parts.autopilot, estimation), estimation
 
