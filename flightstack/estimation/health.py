@@ -8,6 +8,7 @@ from typing import NamedTuple
 from flightstack.core.contract import Record
 from flightstack.estimation.error_state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION
 from flightstack.estimation.kalman import BARO, FUSED_S, GNSS_POSITION, GNSS_VELOCITY, MAG, TEST_RATIO
+from flightstack.estimation.memory import ALIGNED
 from flightstack.estimation.sensor_feed import NewestSamples
 from flightstack.estimation.sensor_samples import GnssFix
 
@@ -64,7 +65,7 @@ def estimate_health(
     ratios = (math.sqrt(max(row[TEST_RATIO] for row in rows[at : at + size])) for at, size in groups)
     means = (mean + SMOOTHING * (new - mean) for mean, new in zip(before[_RATIOS_AT:], ratios, strict=True))
     return EstimateHealth(
-        bool(memory["flags"][0]),
+        bool(memory["flags"][ALIGNED]),
         has_origin,
         math.inf if samples.imu is None else time_s - samples.imu.time_s,
         samples.imu_repeats >= STUCK_SAMPLES,

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from flightstack.core.contract import FloatArray, Vector3, VehicleState
@@ -17,6 +18,7 @@ from flightstack.estimation.sensor_samples import (
     MagSample,
     RangeSample,
 )
+from flightstack.estimation.vibration import WINDOW
 from flightstack.simulator_link.sensor_frames import (
     ACCEL,
     ACCEL_AT,
@@ -82,6 +84,8 @@ class NewestSamples:
     gnss: GnssSample | None = None
     range: RangeSample | None = None
     flow: FlowSample | None = None
+    past_imu: deque[ImuSample] = field(default_factory=lambda: deque(maxlen=WINDOW))
+    """The last samples of the inertial sensor, of which the vibration is computed."""
     imu_repeats: int = 0
     """Number of samples of the inertial sensor whose rates or forces equal those before."""
 
@@ -161,6 +165,7 @@ class SensorFeed:
             before, newest.imu = newest.imu, sample
             repeats = before is not None and (before[2] == sample[2] or before[3] == sample[3])
             newest.imu_repeats = newest.imu_repeats + 1 if repeats else 0
+            newest.past_imu.append(sample)
             estimator.imu(sample)
         elif isinstance(sample, MagSample):
             newest.mag = sample

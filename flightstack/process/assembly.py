@@ -54,7 +54,7 @@ _KERNELS = (
     "follow_rotors", "detect", "fence_step", "store_outer_row", "outer_heading", "euler_rad",
 )  # fmt: skip
 _LOOP_KERNELS = ("inner_kernel", "outer_kernel")
-_ESTIMATOR_KERNELS = ("imu_kernel", "push_kernel", "realign_kernel")
+_ESTIMATOR_KERNELS = ("imu_kernel", "push_kernel", "field_kernel")
 _REAL_TIME_KERNELS = ("stream_kernel",)
 """Kernels that a vehicle in lockstep compiles or loads at their first use."""
 
@@ -205,9 +205,10 @@ def _join(
     vehicle_id = vehicle_info(vehicle, system_id, generic, parts.places.frame)
 
     def status() -> VehicleStatus:
-        return vehicle_status(vehicle_id, parts, simulator.battery)
+        sensed = None if estimation is None else estimation.sensed()
+        return vehicle_status(vehicle_id, parts, simulator.battery, sensed)
 
-    telemetry = Telemetry(status, lambda: parts.now.time_us, report.message)
+    telemetry = Telemetry(status, lambda: parts.now.time_us, report.message, estimation is not None)
     context = VehicleContext.of(parts, params, simulator, generic, logs)
     ground = GroundHub(context, parts, telemetry, vehicle_id)
     return Stack(

@@ -12,8 +12,10 @@ from flightstack.core.contract import FloatArray, Vector3
 from flightstack.core.earth_field import earth_field_ned_gauss
 from flightstack.core.enums import Severity
 from flightstack.core.portable_math import distance
-from flightstack.estimation.estimator import POSITION_RESET, VELOCITY_RESET, YAW_RESET, Estimator
+from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.health import NO_HEALTH, estimate_health
+from flightstack.estimation.memory import POSITION_RESET, VELOCITY_RESET, YAW_RESET
+from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed
 from flightstack.estimation.sensor_samples import BaroSample, ImuSample
 from flightstack.guidance.navigator import Navigator
@@ -65,6 +67,10 @@ class Estimation:
     def samples(self) -> NewestSamples:
         """Newest sample of each sensor."""
         return self._feed.newest
+
+    def sensed(self) -> Sensed:
+        """Return what the estimator and its sensors know now; valid until the next update."""
+        return Sensed(self.estimator.memory[0], self._feed.newest)
 
     def warm_up(self) -> None:
         """Compile the kernels of the estimator, or load them from the cache."""
