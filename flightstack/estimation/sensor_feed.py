@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from flightstack.core.contract import FloatArray, Vector3, VehicleState
-from flightstack.core.earth_field import earth_field_ned_gauss
 from flightstack.core.geodesy import LocalFrame
 from flightstack.estimation.sensor_samples import (
     BaroSample,
@@ -68,10 +67,6 @@ class StateEstimator(Protocol):
 
     def range(self, sample: RangeSample) -> None:
         """Take a sample of the rangefinder."""
-        ...
-
-    def set_earth_field(self, field_ned_gauss: Vector3) -> None:
-        """Set the Earth's magnetic field at the origin."""
         ...
 
     def state(self) -> VehicleState:
@@ -141,23 +136,19 @@ def samples_of(report: Report) -> Iterator[tuple[int, Sample]]:
 
 
 class SensorFeed:
-    """Feeds an estimator with the first sensor of each kind, and writes its state in the vehicle's local frame."""
+    """Feeds an estimator with the first sensor of each kind, and writes its state."""
 
     def __init__(
         self,
         estimator: StateEstimator,
-        frame: LocalFrame,
         state: FloatArray,
         record: Callable[[Sample], object] = lambda _: None,
     ) -> None:
-        """``frame`` is the vehicle's; ``state`` is the array form of ``VehicleState`` to write.
+        """``state`` is the array form of ``VehicleState`` to write, in the estimator's local frame.
 
         ``record`` is called with each sample that the estimator takes.
         """
-        self._record = record
-        self._estimator, self._frame, self._state = estimator, frame, state
-        self._origin = Vector3(0.0, 0.0, 0.0)  # of the estimator's frame in the vehicle's
-        self._has_origin = False
+        self._estimator, self._state, self._record = estimator, state, record
         self.newest = NewestSamples()
 
     def update(self, reports: list[Report]) -> bool:
@@ -167,25 +158,13 @@ class SensorFeed:
                 if number == 0:
                     self._take(sample)
                     self._record(sample)
-        if not self._estimator.aligned:
+        estimator, state = self._estimator, self._state
+        if not estimator.aligned:
             return False
-        if not self._has_origin:
-            self._find_origin()
-        self._write(self._estimator.state())
-        return self._has_origin
-
-    def _find_origin(self) -> None:
-        """Take over the estimator's origin after the first fix, and give the estimator the Earth's field there."""
-        frame = self._estimator.frame
-        if frame is not None:
-            self._origin, self._has_origin = self._frame.to_ned(frame.origin), True
-            self._estimator.set_earth_field(earth_field_ned_gauss(frame.origin))
-
-    def _write(self, found: VehicleState) -> None:
-        position, origin, state = found.position_ned_m, self._origin, self._state
-        state[0:3] = position.x + origin.x, position.y + origin.y, position.z + origin.z
-        state[3:6], state[6:10] = found.velocity_ned_m_s, found.attitude
-        state[10:13] = found.rates_frd_rad_s
+        found = estimator.state()
+        state[0:3], state[3:6] = found.position_ned_m, found.velocity_ned_m_s
+        state[6:10], state[10:13] = found.attitude, found.rates_frd_rad_s
+        return estimator.frame is not None
 
     def _take(self, sample: Sample) -> None:
         estimator, newest = self._estimator, self.newest

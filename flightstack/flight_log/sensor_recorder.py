@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from flightstack.core.contract import FloatArray, Vector3
-from flightstack.core.geodesy import LocalFrame
+from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import Sample
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, ImuSample, MagSample, RangeSample
@@ -47,10 +47,11 @@ _FILLS: dict[type, tuple[Group, Callable[[FloatArray, Any], None]]] = {
 class SensorRecorder:
     """Records every sample, and at intervals the estimator and the truth, while a log is open."""
 
-    def __init__(self, recorder: FlightRecorder, frame: LocalFrame) -> None:
-        """``frame`` is the vehicle's local frame, that of the true state."""
+    def __init__(self, recorder: FlightRecorder, frame: LocalFrame, home: GeoPoint) -> None:
+        """``frame`` is the vehicle's local frame; ``home`` is the origin of the true position."""
         self._recorder = recorder
-        self._frame = frame
+        self._frame, self._true_frame = frame, LocalFrame(home)
+        self._offset_m = Vector3(0.0, 0.0, 0.0)  # of the true frame's origin in the vehicle's
         self._log: FlightLog | None = None  # to which the times below apply
         self._truth_us = self._global_us = self._estimator_us = 0
 
@@ -69,13 +70,16 @@ class SensorRecorder:
         if log is not self._log:
             self._log = log
             self._truth_us = self._global_us = self._estimator_us = time_us
+            self._offset_m = self._frame.to_ned(self._true_frame.origin)
         if time_us < self._truth_us:
             return
         self._truth_us = time_us + TRUTH_INTERVAL_US
-        log.sampled[TRUTH_GROUP.name].append(time_us)[:] = truth
+        row = log.sampled[TRUTH_GROUP.name].append(time_us)
+        row[:] = truth
+        row[:3] += self._offset_m
         if time_us >= self._global_us:
             self._global_us = time_us + GLOBAL_INTERVAL_US
-            place = self._frame.to_geo(Vector3(*truth[:3].tolist()))
+            place = self._true_frame.to_geo(Vector3(*truth[:3].tolist()))
             log.sampled[TRUTH_GLOBAL_GROUP.name].append(time_us)[:] = place
         if time_us >= self._estimator_us:
             self._estimator_us = time_us + ESTIMATOR_INTERVAL_US

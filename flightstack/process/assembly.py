@@ -16,6 +16,7 @@ from flightstack.control.controller import controller_of
 from flightstack.control.controller_loading import check_python, load_controller
 from flightstack.control.loop_parameters import loop_numbers
 from flightstack.core.errors import ConfigError
+from flightstack.core.geodesy import GeoPoint
 from flightstack.firmware.c_loops import LoopsSetup
 from flightstack.firmware.choice import PYTHON, parse_loops
 from flightstack.firmware.law_tree import law_tree, own_params
@@ -108,7 +109,9 @@ class Stack(NamedTuple):
 def vehicle_of(config: StackConfig) -> Vehicle:
     """Load the vehicle; raise ConfigError."""
     if config.state not in STATES:
-        raise ConfigError("--state", config.state, f"is not one of {', '.join(STATES)}")
+        raise ConfigError(
+            "--state", config.state, f"is not one of {', '.join(STATES)}; the directory is --state-dir"
+        )
     vehicle = load_vehicle(config.vehicle)
     if config.state == ESTIMATED and not vehicle.sensors.numbers:
         raise ConfigError(
@@ -192,7 +195,7 @@ def _join(
         simulator.state, simulator.rotor_speed_rad_s, simulator,
     )  # fmt: skip
     parts.warm_up(with_streams=not config.lockstep)
-    autopilot, estimation = _on_sensors(parts, simulator, recorder)
+    autopilot, estimation = _on_sensors(parts, simulator, recorder, config.home)
     connect_parameters(params, parts, recorder)
     timing = LoopTiming(round(1e9 / loop_rates.inner_hz))
     report = TimingReport(timing, loop_rates, config.lockstep)
@@ -213,14 +216,13 @@ def _join(
 
 
 def _on_sensors(
-    parts: VehicleParts, simulator: SimulatorEndpoint, recorder: FlightRecorder
+    parts: VehicleParts, simulator: SimulatorEndpoint, recorder: FlightRecorder, home: GeoPoint
 ) -> tuple[TickingAutopilot, Estimation | None]:
     """Return the autopilot to tick; that of a vehicle on sensors estimates its state first."""
     if simulator.sensors is None:
         return parts.autopilot, None
-    frame = parts.places.frame
-    sensor_recorder = SensorRecorder(recorder, frame)
-    estimation = Estimation(simulator.sensors, frame, parts.now, sensor_recorder, simulator.truth)
+    sensor_recorder = SensorRecorder(recorder, parts.places.frame, home)
+    estimation = Estimation(simulator.sensors, parts.now, parts.area, sensor_recorder, simulator.truth)
     estimation.warm_up()
     return SensorAutopilot(parts.autopilot, estimation), estimation
 

@@ -20,6 +20,7 @@ from typing import Any
 from flightstack.commander.failsafe import Failsafe
 from flightstack.core.contract import Vector3
 from flightstack.core.enums import Mode
+from flightstack.core.geodesy import LocalFrame
 from flightstack.plan import MissionItem, MissionType, Plan
 from flightstack.testing.client import Client, ConditionTimeoutError, Network, RefusedError
 from flightstack.testing.engine import Engine
@@ -135,7 +136,7 @@ class World:
     @property
     def state(self) -> State:
         """The present state."""
-        return state_of(self.engine.stack, self.engine.simulator, self.time_s)
+        return state_of(self.engine.stack, self.engine.simulator, self.setup.home, self.time_s)
 
     @property
     def texts(self) -> list[str]:
@@ -323,7 +324,7 @@ class World:
     def goto_command(self, north_m: float, east_m: float, alt_m: float = math.nan) -> calls.Command:
         """Return the command to fly to a position relative to home at the start."""
         stack = self.engine.stack
-        place = stack.places.frame.to_geo(Vector3(north_m, east_m, 0.0))
+        place = LocalFrame(self.setup.home).to_geo(Vector3(north_m, east_m, 0.0))
         amsl_m = stack.area.home.altitude_m + alt_m
         return calls.goto_command(place.latitude_deg, place.longitude_deg, amsl_m)
 

@@ -5,37 +5,39 @@ from __future__ import annotations
 import math
 
 from flightstack.core.contract import FloatArray, Vector3
-from flightstack.core.geodesy import LocalFrame
+from flightstack.core.earth_field import earth_field_ned_gauss
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed
 from flightstack.estimation.sensor_samples import BaroSample, ImuSample
 from flightstack.flight_log.sensor_recorder import SensorRecorder
 from flightstack.simulator_link.sensor_inbox import SensorInbox
+from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.autopilot import Autopilot
 from flightstack.vehicle.flight_state import FlightState
 
 
 class Estimation:
-    """Feeds the estimator with the new measurements, and writes the state of the flight."""
+    """Feeds the estimator with the new measurements, and writes the state of the flight.
+
+    The estimate of the first fix becomes the origin of the vehicle's local frame.
+    """
 
     def __init__(
         self,
         sensors: SensorInbox,
-        frame: LocalFrame,
         now: FlightState,
+        area: FlightArea,
         recorder: SensorRecorder,
         truth: FloatArray,
     ) -> None:
-        """``frame`` is the local frame of the vehicle; ``now.state`` is written in place.
-
-        ``truth`` is the simulator's state, which only ``recorder`` reads.
-        """
+        """``now.state`` is written in place. ``truth`` is the simulator's state, which only ``recorder`` reads."""
         self.estimator = Estimator()
         self._sensors = sensors
         self._now = now
-        self._feed = SensorFeed(self.estimator, frame, now.state, recorder.sample)
+        self._area = area
         self._recorder, self._truth = recorder, truth
+        self._feed = SensorFeed(self.estimator, now.state, recorder.sample)
         self._landed = False
 
     @property
@@ -55,14 +57,26 @@ class Estimation:
         estimator.baro(BaroSample(0.0, math.nan, math.nan, math.nan))
         estimator.set_earth_field(Vector3(0.0, 0.0, 0.0))
 
+    def is_ready(self) -> bool:
+        """Return True if the vehicle may fly on the estimate."""
+        return self._now.has_state
+
     def update(self, time_us: int) -> None:
         """Take the measurements since the last call; once per tick, at the time of the tick."""
         now = self._now
         if now.landed is not self._landed:
             self._landed = now.landed
             self.estimator.set_landed(now.landed)
-        now.has_state = self._feed.update(self._sensors.take())
+        if self._feed.update(self._sensors.take()) and not now.has_state:
+            self._find_origin()
         self._recorder.state(time_us, self._truth, self.sensed())
+
+    def _find_origin(self) -> None:
+        frame = self.estimator.frame
+        if frame is not None:
+            self.estimator.set_earth_field(earth_field_ned_gauss(frame.origin))
+            self._area.move_origin(frame.origin)
+            self._now.has_state = True
 
 
 class SensorAutopilot:

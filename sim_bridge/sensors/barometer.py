@@ -19,7 +19,7 @@ from flightstack.core.portable_math import exp, log
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.plant.dimensions import foot_z_m, propeller_radius_m
 from sim_bridge.sensors.layout import BARO, write_numbers
-from sim_bridge.sensors.noise import NormalStream, gauss_markov, quantised, with_fault
+from sim_bridge.sensors.noise import NormalStream, Wander, quantised, with_fault
 
 SEA_LEVEL_HPA, SEA_LEVEL_K, LAPSE_K_M = 1013.25, 288.15, 0.0065
 _EXPONENT = 9.80665 / (287.05287 * LAPSE_K_M)
@@ -87,9 +87,12 @@ class Barometer:
             baro["disc_loading"][index] = rotor.thrust_coefficient_n_s2 / area
         first, second = self._noise.first(2).tolist()
         baro["offset"], baro["drift"] = baro["turn_on_offset_hpa"] * first, baro["drift_hpa"] * second
-        baro["decay"], share = gauss_markov(1.0 / float(baro["rate_hz"]), float(baro["drift_time_s"]))
-        baro["wander"] = share * baro["drift_hpa"]
+        self._wander = Wander(baro, float(baro["drift_hpa"]), float(baro["drift_time_s"]))
 
-    def measure(self, state: FloatArray, airspeed_m_s: float, rotor_speed: FloatArray) -> None:
+    def measure(
+        self, time_us: int, state: FloatArray, airspeed_m_s: float, rotor_speed: FloatArray
+    ) -> FloatArray:
         """Measure at a state, an airspeed and the speeds [rad/s] of the rotors, shape (8,)."""
+        self._wander.follow(time_us)
         measure_baro(self.records, state, airspeed_m_s, rotor_speed, self._noise.row())
+        return self.out

@@ -47,6 +47,7 @@ class Magnetometer:
         mag["offset"] = mag["hard_iron_gauss"] * self._noise.first(4)[:3]
         mag["per_ampere"] = mag["current_gauss_a"] * self._noise.first(4)[:3]
 
-    def measure(self, state: FloatArray, current_a: float) -> None:
+    def measure(self, state: FloatArray, current_a: float) -> FloatArray:
         """Measure at a state; ``current_a`` is that of the battery."""
         measure_mag(self.records, state, current_a, self._noise.row())
+        return self.out
