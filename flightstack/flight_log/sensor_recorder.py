@@ -35,6 +35,8 @@ SENSOR_GROUPS = (
 )  # fmt: skip
 TRUTH_INTERVAL_US, GLOBAL_INTERVAL_US, ESTIMATOR_INTERVAL_US = 10_000, 100_000, 500_000
 """Intervals of PX4's logger."""
+ESTIMATOR_START = "estimator_start"
+"""Key of the information message with the estimator's snapshot at the start of the log."""
 _FILLS: dict[type, tuple[Group, Callable[[FloatArray, Any], None]]] = {
     ImuSample: (IMU_GROUP, fill_imu),
     MagSample: (MAG_GROUP, fill_mag),
@@ -52,26 +54,30 @@ class SensorRecorder:
         self._recorder = recorder
         self._frame, self._true_frame = frame, LocalFrame(home)
         self._offset_m = Vector3(0.0, 0.0, 0.0)  # of the true frame's origin in the vehicle's
-        self._log: FlightLog | None = None  # to which the times below apply
+        self._log: FlightLog | None = None
         self._truth_us = self._global_us = self._estimator_us = 0
+
+    def begin(self, estimator: Callable[[], bytes]) -> None:
+        """Record the estimator's snapshot in a new log; call before the estimator takes the next sample."""
+        log = self._recorder.log
+        if log is not self._log:
+            self._log = log
+            if log is not None:
+                self._offset_m = self._frame.to_ned(self._true_frame.origin)
+                self._truth_us = self._global_us = self._estimator_us = 0
+                log.information(ESTIMATOR_START, estimator())
 
     def sample(self, sample: Sample) -> None:
         """Record a sample that the estimator takes."""
-        log = self._recorder.log
+        log = self._log
         if log is not None and (known := _FILLS.get(type(sample))) is not None:
             group, fill = known
             fill(log.sampled[group.name].append(round(sample.time_s * 1e6)), sample)
 
     def state(self, time_us: int, truth: FloatArray, sensed: Sensed) -> None:
         """Record the true state, shape (13,), and what the vehicle knows, if they are due."""
-        log = self._recorder.log
-        if log is None:
-            return
-        if log is not self._log:
-            self._log = log
-            self._truth_us = self._global_us = self._estimator_us = time_us
-            self._offset_m = self._frame.to_ned(self._true_frame.origin)
-        if time_us < self._truth_us:
+        log = self._log
+        if log is None or time_us < self._truth_us:
             return
         self._truth_us = time_us + TRUTH_INTERVAL_US
         row = log.sampled[TRUTH_GROUP.name].append(time_us)

@@ -10,6 +10,7 @@ from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed
 from flightstack.estimation.sensor_samples import BaroSample, ImuSample
+from flightstack.estimation.snapshot import snapshot
 from flightstack.flight_log.sensor_recorder import SensorRecorder
 from flightstack.simulator_link.sensor_inbox import SensorInbox
 from flightstack.vehicle.area import FlightArea
@@ -57,6 +58,9 @@ class Estimation:
         estimator.baro(BaroSample(0.0, math.nan, math.nan, math.nan))
         estimator.set_earth_field(Vector3(0.0, 0.0, 0.0))
 
+    def _snapshot(self) -> bytes:
+        return snapshot(self.estimator)
+
     def is_ready(self) -> bool:
         """Return True if the vehicle may fly on the estimate."""
         return self._now.has_state
@@ -64,6 +68,7 @@ class Estimation:
     def update(self, time_us: int) -> None:
         """Take the measurements since the last call; once per tick, at the time of the tick."""
         now = self._now
+        self._recorder.begin(self._snapshot)
         if now.landed is not self._landed:
             self._landed = now.landed
             self.estimator.set_landed(now.landed)
