@@ -15,16 +15,6 @@ import numpy as np
 
 from flightstack.core.contract import Quaternion, Record, Vector3
 from flightstack.estimation.error_state import ATTITUDE, POSITION, WIND, Nominal
-from flightstack.estimation.estimator import (
-    ALIGNED,
-    HAS_BARO,
-    HAS_GNSS,
-    HAS_RANGE,
-    LANDED,
-    POSITION_RESET,
-    VELOCITY_RESET,
-    YAW_RESET,
-)
 from flightstack.estimation.kalman import (
     BARO,
     FUSED_S,
@@ -37,6 +27,16 @@ from flightstack.estimation.kalman import (
     RANGE,
     REST_VELOCITY,
     TEST_RATIO,
+)
+from flightstack.estimation.memory import (
+    ALIGNED,
+    HAS_BARO,
+    HAS_GNSS,
+    HAS_RANGE,
+    LANDED,
+    POSITION_RESET,
+    VELOCITY_RESET,
+    YAW_RESET,
 )
 from flightstack.mavlink.dialect import mavlink
 

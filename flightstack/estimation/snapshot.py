@@ -8,9 +8,12 @@ from zlib import crc32
 import numpy as np
 
 from flightstack.core.geodesy import GeoPoint, LocalFrame
-from flightstack.estimation.estimator import MEMORY, Estimator
+from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams
+from flightstack.estimation.memory import MEMORY
 
+ESTIMATOR_START = "estimator_start"
+"""Key of the snapshot at the start of a log, an information message."""
 _HEAD = struct.Struct("<I?3d")
 _LAYOUT = crc32(repr((MEMORY.descr, EstimatorParams._fields)).encode())
 """Names a layout of the memory: that of another version of the filter is refused."""

@@ -10,6 +10,7 @@ from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import Sample
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, ImuSample, MagSample, RangeSample
+from flightstack.estimation.snapshot import ESTIMATOR_START
 from flightstack.flight_log.estimator_topics import ESTIMATOR, WIND_GROUP, fill_estimator, fill_wind
 from flightstack.flight_log.flight_log import FlightLog
 from flightstack.flight_log.recorder import FlightRecorder
@@ -35,8 +36,6 @@ SENSOR_GROUPS = (
 )  # fmt: skip
 TRUTH_INTERVAL_US, GLOBAL_INTERVAL_US, ESTIMATOR_INTERVAL_US = 10_000, 100_000, 500_000
 """Intervals of PX4's logger."""
-ESTIMATOR_START = "estimator_start"
-"""Key of the information message with the estimator's snapshot at the start of the log."""
 _FILLS: dict[type, tuple[Group, Callable[[FloatArray, Any], None]]] = {
     ImuSample: (IMU_GROUP, fill_imu),
     MagSample: (MAG_GROUP, fill_mag),

@@ -218,7 +218,10 @@ def _join(
 def _on_sensors(
     parts: VehicleParts, simulator: SimulatorEndpoint, recorder: FlightRecorder, home: GeoPoint
 ) -> tuple[TickingAutopilot, Estimation | None]:
-    """Return the autopilot to tick; that of a vehicle on sensors estimates its state first."""
+    """Return the autopilot to tick; that of a vehicle on sensors estimates its state first.
+
+    ``home`` is the origin of the simulator's true state.
+    """
     if simulator.sensors is None:
         return parts.autopilot, None
     sensor_recorder = SensorRecorder(recorder, parts.places.frame, home)

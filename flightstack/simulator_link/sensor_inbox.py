@@ -123,7 +123,7 @@ class SensorInbox:
         if frame.number == 0:
             return True
         if frame.time_us == self._stamp_us:
-            self._report_sensor(self._time_us)
+            self._report(self._time_us, frame.number, frame.fields, tuple(frame.values.tolist()))
         else:
             self._wait(HilReport(frame.number, frame.fields, tuple(frame.values.tolist()), 0))
         return False
@@ -135,28 +135,26 @@ class SensorInbox:
 
     def stamp(self, time_us: int) -> None:
         """Give the messages since the last clock, and the clock's own measurements, their vehicle time."""
-        for content in self._waiting:
-            timed = self._timed(time_us, content) if isinstance(content, HilReport) else content
-            self._reports.append(Report(time_us, timed))
-        self._waiting.clear()
-        self._time_us, self._stamp_us = time_us, self._frame.time_us
-        self._report_sensor(time_us)
+        frame = self._frame
+        if self._waiting:
+            for content in self._waiting:
+                if isinstance(content, HilReport):
+                    self._report(time_us, *content[:3])
+                else:
+                    self._reports.append(Report(time_us, content))
+            self._waiting.clear()
+        self._time_us, self._stamp_us = time_us, frame.time_us
+        self._report(time_us, 0, frame.fields, tuple(frame.values.tolist()))
+        if len(self._reports) > MOST_WAITING:
+            self._drop(len(self._reports) - MOST_WAITING)
 
-    def _report_sensor(self, time_us: int) -> None:
-        """Report the newest HIL_SENSOR."""
-        frame, reports = self._frame, self._reports
-        report = HilReport(frame.number, frame.fields, tuple(frame.values.tolist()), 0)
-        reports.append(Report(time_us, self._timed(time_us, report)))
-        if len(reports) > MOST_WAITING:
-            self._drop(len(reports) - MOST_WAITING)
-
-    def _timed(self, time_us: int, report: HilReport) -> HilReport:
-        """Return the report with the duration of its inertial measurement."""
-        if report.fields & _IMU != _IMU:
-            return report
-        before_us = self._measured_us.get(report.number, time_us)
-        self._measured_us[report.number] = time_us
-        return report._replace(step_us=time_us - before_us)
+    def _report(self, time_us: int, number: int, fields: int, values: tuple[float, ...]) -> None:
+        """Report the measurements of a HIL_SENSOR with the duration of the inertial one."""
+        step_us = 0
+        if fields & _IMU == _IMU:
+            step_us = time_us - self._measured_us.get(number, time_us)
+            self._measured_us[number] = time_us
+        self._reports.append(Report(time_us, HilReport(number, fields, values, step_us)))
 
     def _drop(self, count: int) -> None:
         """Drop the oldest reports; the next inertial measurement of each sensor lasts as long as all of them."""

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from flightstack.core.compiled import compiled
+from flightstack.core.compiled import compiled, direct
 from flightstack.core.contract import FloatArray, RecordArray
 from flightstack.core.portable_math import exp, log
 from flightstack.params.vehicle import Vehicle
@@ -77,6 +77,7 @@ class Barometer:
         self.records: RecordArray = np.zeros(1, BARO)
         self.out: FloatArray = self.records["out"][0]
         """The last measurement."""
+        self._call = measure_baro
         baro, self._noise = self.records[0], NormalStream(seed, "baro", width=2)
         write_numbers(baro, vehicle.sensors.numbers["baro"])
         radius = propeller_radius_m(vehicle)
@@ -94,5 +95,8 @@ class Barometer:
     ) -> FloatArray:
         """Measure at a state, an airspeed and the speeds [rad/s] of the rotors, shape (8,)."""
         self._wander.follow(time_us)
-        measure_baro(self.records, state, airspeed_m_s, rotor_speed, self._noise.row())
+        noise = self._noise.row()
+        if self._call is measure_baro:
+            self._call = direct(measure_baro, self.records, state, airspeed_m_s, rotor_speed, noise)
+        self._call(self.records, state, airspeed_m_s, rotor_speed, noise)
         return self.out

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flightstack.core.compiled import compiled
+from flightstack.core.compiled import compiled, direct
 from flightstack.core.contract import FloatArray, RecordArray, Vector3
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.vehicle import Vehicle
@@ -69,6 +69,7 @@ class GnssReceiver:
         self._first_fix_us = round(float(gnss["first_fix_s"]) * 1e6)
         self.latency_us = round(float(gnss["latency_s"]) * 1e6)
         """Time from a measurement to its message."""
+        self._call = measure_gnss
         self.jam(0.0)
 
     def jam(self, lost_share: float) -> None:
@@ -81,7 +82,10 @@ class GnssReceiver:
     def measure(self, time_us: int, state: FloatArray) -> Fix:
         """Measure at a state."""
         self._wander.follow(time_us)
-        measure_gnss(self.records, state, self._noise.row())
+        noise = self._noise.row()
+        if self._call is measure_gnss:
+            self._call = direct(measure_gnss, self.records, state, noise)
+        self._call(self.records, state, noise)
         has_fix = self._satellites >= LEAST_SATELLITES and time_us >= self._first_fix_us
         kind = mavlink.GPS_FIX_TYPE_3D_FIX if has_fix else mavlink.GPS_FIX_TYPE_NO_FIX
         x, y, z, vx, vy, vz = self.records["out"][0].tolist()

@@ -48,6 +48,7 @@ from sim_bridge.sensors.barometer import Barometer
 from sim_bridge.sensors.faults import HEALTHY, NEVER_US, Channel, channel_faults
 from sim_bridge.sensors.gnss import Fix, GnssReceiver
 from sim_bridge.sensors.imu import ImuSet
+from sim_bridge.sensors.layout import SingleArray
 from sim_bridge.sensors.magnetometer import Magnetometer
 from sim_bridge.sensors.optical_flow import OpticalFlow
 from sim_bridge.sensors.rangefinder import Rangefinder
@@ -94,9 +95,8 @@ class SensorSuite:
         self._frames = [HilSensorFrame(*sender) for _ in range(count)]
         self._values = self._frames[0].values
         self._fields = [_IMU] * count
-        self._wires = [
-            (frame.values[:6], self.imus.records["wire"][index]) for index, frame in enumerate(self._frames)
-        ]
+        self._apart: SingleArray = np.zeros((count, 6), "<f4")  # measurements that go through channels
+        self._wires = self._values[:6].reshape(1, 6) if count == 1 else self._apart
         self._gps_seq = 0
         self._messages: list[bytes] = []
         self._channels: dict[tuple[str, int], Channel] = {}
@@ -174,7 +174,7 @@ class SensorSuite:
 
     def prime(self, time_us: int) -> None:
         """Measure once without a message, so that a sensor that is frozen from the start has a measurement."""
-        self.imus.measure(self._truth.state, self._truth.rotor_speed_rad_s)
+        self.imus.measure(self._truth.state, self._truth.rotor_speed_rad_s, self._apart)
         for sensor in self._sensors:
             sensor.measure(time_us)
 
@@ -183,13 +183,17 @@ class SensorSuite:
         if self._has_faults:
             for channel in self._channels.values():
                 channel.update(time_us)
-        self.imus.measure(self._truth.state, self._truth.rotor_speed_rad_s)
-        for index, (values, wire) in enumerate(self._wires):
-            if self._is_apart:
+        truth = self._truth
+        if self._is_apart:
+            self.imus.measure(truth.state, truth.rotor_speed_rad_s, self._apart)
+            for index in range(len(self._frames)):
                 self._pass_on_imu(time_us, index)
-            else:
-                values[:] = wire
-                self._fields[index] = _IMU
+        else:
+            self.imus.measure(truth.state, truth.rotor_speed_rad_s, self._wires)
+            self._fields[0] = _IMU
+            if len(self._frames) > 1:
+                for index, frame in enumerate(self._frames):
+                    frame.values[:6], self._fields[index] = self._wires[index], _IMU
         if time_us >= self._next_us:
             self._measure_slow(time_us)
 
@@ -295,11 +299,13 @@ class SensorSuite:
 
     # ------------------------------------------------------------------ messages
 
-    def frames(self, stamp_us: int, clock_first: bool = False) -> bytes:
-        """Return the messages of the present measurements.
+    def frames(self, stamp_us: int, clock_first: bool = False) -> bytes | memoryview:
+        """Return the messages of the present measurements, valid until the next call.
 
         HIL_SENSOR of the first inertial sensor is the last one, or with ``clock_first`` the first.
         """
+        if not self._messages and len(self._frames) == 1:
+            return self._frames[0].seal(stamp_us, self._fields[0], 0)
         others, self._messages = self._messages, []
         imus = [
             bytes(frame.seal(stamp_us, fields, number))
