@@ -16,7 +16,7 @@ from flightstack.control.controller import controller_of
 from flightstack.control.controller_loading import check_python, load_controller
 from flightstack.control.loop_parameters import loop_numbers
 from flightstack.core.errors import ConfigError
-from flightstack.core.geodesy import GeoPoint, LocalFrame
+from flightstack.core.geodesy import GeoPoint
 from flightstack.firmware.c_loops import LoopsSetup
 from flightstack.firmware.choice import PYTHON, parse_loops
 from flightstack.firmware.law_tree import law_tree, own_params
@@ -230,7 +230,7 @@ def _on_sensors(
     if simulator.sensors is None:
         return parts.autopilot, None
     users = Users(parts.area, parts.failsafes, parts.navigator, parts.backend, parts.journal)
-    sensor_recorder = SensorRecorder(recorder, LocalFrame(home))
+    sensor_recorder = SensorRecorder(recorder, parts.places.frame, home)
     estimation = Estimation(simulator.sensors, parts.now, users, sensor_recorder, simulator.truth)
     estimation.warm_up()
     return SensorAutopilot(parts.autopilot, estimation), estimation

@@ -18,6 +18,7 @@ from flightstack.estimation.memory import POSITION_RESET, VELOCITY_RESET, YAW_RE
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed
 from flightstack.estimation.sensor_samples import BaroSample, ImuSample
+from flightstack.estimation.snapshot import snapshot
 from flightstack.flight_log.sensor_recorder import SensorRecorder
 from flightstack.guidance.navigator import Navigator
 from flightstack.simulator_link.sensor_inbox import SensorInbox
@@ -56,20 +57,19 @@ class Estimation:
         recorder: SensorRecorder,
         truth: FloatArray,
     ) -> None:
-        """``now.state`` is written in place; ``truth`` is the simulator's state, which only ``recorder`` reads."""
+        """``now.state`` is written in place. ``truth`` is the simulator's state, which only ``recorder`` reads."""
         self.estimator = Estimator()
         self.health = NO_HEALTH
         """Newest health of the estimate."""
         self._sensors = sensors
         self._now = now
         self._users = users
-        self._feed = SensorFeed(self.estimator, now.state, recorder.sample)
         self._recorder, self._truth = recorder, truth
+        self._feed = SensorFeed(self.estimator, now.state, recorder.sample)
         self._landed = False
         self._health_due_us = 0
-        self._resets = self.estimator.memory["resets"][
-            0
-        ].data  # a number of an array takes four times as long to read
+        # as memory: a number of an array takes four times as long to read
+        self._resets = self.estimator.memory["resets"][0].data
         self._seen = (0.0, 0.0, 0.0)
 
     @property
@@ -89,6 +89,9 @@ class Estimation:
         estimator.baro(BaroSample(0.0, math.nan, math.nan, math.nan))
         estimator.set_earth_field(_NO_CHANGE)
 
+    def _snapshot(self) -> bytes:
+        return snapshot(self.estimator)
+
     def is_ready(self) -> bool:
         """Return True if the vehicle may take off on the estimate."""
         return self._now.has_state and not estimate_refusals(self.health)
@@ -96,6 +99,7 @@ class Estimation:
     def update(self, time_us: int) -> None:
         """Take the measurements since the last call; once per tick, at the time of the tick."""
         now, resets = self._now, self._resets
+        self._recorder.begin(self._snapshot)
         if now.landed is not self._landed:
             self._landed = now.landed
             self.estimator.set_landed(now.landed)
