@@ -65,7 +65,7 @@ class Estimation:
         self._now = now
         self._users = users
         self._recorder, self._truth = recorder, truth
-        self._feed = SensorFeed(self.estimator, now.state, recorder.sample)
+        self._feed = SensorFeed(self.estimator, now.state, recorder)
         self._landed = False
         self._health_due_us = 0
         # as memory: a number of an array takes four times as long to read
@@ -107,7 +107,7 @@ class Estimation:
         is_known = self._feed.update(reports)
         if is_known and not now.has_state:
             self._find_origin()
-        self._recorder.state(time_us, self._truth, self.sensed())
+        self._recorder.state(time_us, self._truth, self.sensed)
         if (resets[POSITION_RESET], resets[VELOCITY_RESET], resets[YAW_RESET]) != self._seen:
             self._follow_resets()
         if reports and reports[-1].time_us >= self._health_due_us:
