@@ -24,8 +24,9 @@ from gcs_cli.vehicle.view_types import VehicleView
 
 Value = TypeVar("Value")
 
-GATHER_S = 0.02
-"""Messages are received in batches of this time, except during a job: one wake-up costs as much as one message."""
+GATHER_S = 0.05
+"""Messages are received in batches of this time: a wake-up costs several messages. Not during a job, nor while the
+answer that measures the round trip is awaited."""
 _STEP_S = 0.05
 
 
@@ -169,7 +170,7 @@ class Feed:
 
     def _run(self) -> None:
         try:
-            while not self._stopping.wait(GATHER_S):
+            while not self._stopping.wait(self._pause_s()):
                 while self._jobs and not self.is_stopping:
                     self._execute(self._jobs.popleft())
                 self._connection.step(self.now_s + _STEP_S)
@@ -178,6 +179,9 @@ class Feed:
         finally:
             while self._jobs:
                 self._jobs.popleft().future.cancel()
+
+    def _pause_s(self) -> float:
+        return 0.0 if self._connection.session.awaits_round_trip(self.now_s) else GATHER_S
 
     def _serve(self) -> None:
         """Begin the actions, and follow the messages and the effects; after every step of the link, in jobs too.
