@@ -18,6 +18,7 @@ from gcs_cli.link.connection import Connection
 from gcs_cli.link.session import Session
 from gcs_cli.link.subscription import ROTORS_AND_TIMING
 from gcs_cli.tui.fly.history import History
+from gcs_cli.tui.map.traffic import MESSAGES as TRAFFIC_MESSAGES
 from gcs_cli.tui.map.traffic import Traffic
 from gcs_cli.tui.messages.message_log import MessageLog
 from gcs_cli.vehicle.view_types import VehicleView
@@ -166,7 +167,16 @@ class Feed:
     def _observe(self, message: Message) -> None:
         now_s = self.now_s
         self.history.record(message, now_s)
-        self.traffic.record(message, now_s)
+        if message.get_msgId() in TRAFFIC_MESSAGES:
+            self._observe_traffic(message, now_s)
+
+    def _observe_traffic(self, message: Message, now_s: float) -> None:
+        view = self.view
+        self.traffic.record(message, now_s, casts_parameters=view.autopilot.casts_parameters)
+        if view.identity is not None and view.identity.system_id == message.get_srcSystem():
+            request = self.traffic.own_address_request(message, now_s)
+            if request is not None and not self._connection.is_recording:
+                self._connection.send(request)
 
     def _run(self) -> None:
         try:
@@ -248,8 +258,6 @@ def result_text(action: Action, result: Result) -> str:
     """Return how an action ended, and when its effect was seen."""
     if result.outcome is Outcome.DONE:
         return f"{result.sentence} after {result.elapsed_s:.1f} s"
-    if result.outcome is Outcome.ACKNOWLEDGED:
-        return f"accepted: {action.doing}"
     return result.sentence
 
 
