@@ -73,6 +73,8 @@ def _sensor(fault: Fault, flight: Flight) -> str | None:
         return f"the vehicle {flight.vehicle.name} has no such sensor"
     if is_imu and number and int(number) > sensors.imu_count:
         return f"the vehicle {flight.vehicle.name} has inertial sensors 1 to {sensors.imu_count}"
+    if fault.kind is Kind.VIBRATION and not sensors.numbers["imu"]["rotor_imbalance_g_mm"]:
+        return f"the rotors of the vehicle {flight.vehicle.name} have no imbalance; set rotor_imbalance_g_mm"
     return None
 
 

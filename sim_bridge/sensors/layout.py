@@ -6,12 +6,14 @@ An angle of the file in degrees is in radians here, and its name ends in ``_rad`
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from flightstack.core.contract import MAX_ROTORS, Record
 from flightstack.params.sensors import TABLES, Numbers
+
+SingleArray: TypeAlias = "np.ndarray[Any, np.dtype[np.float32]]"
 
 IMU_NOISE = 12
 """Normal deviates for one measurement of an inertial sensor: six white ones, six of the biases."""
@@ -55,6 +57,7 @@ MOTION = np.dtype(
         ("attitude", "f8", 4),  # at the last measurement
         ("velocity", "f8", 3),  # of the mounting, m/s NED, then
         ("phase", "f8", MAX_ROTORS),  # angle of each rotor's imbalance, rad
+        ("turn", "f8", (MAX_ROTORS, 2)),  # sine and cosine of this angle
         ("speed", "f8", MAX_ROTORS),  # of each rotor at the last measurement, rad/s
         ("rotor_count", "i8"),
         ("rotor_position", "f8", (MAX_ROTORS, 3)),  # m FRD
@@ -83,7 +86,6 @@ IMU = _dtype(
     ("warming", "f8"),  # decay of its rest over one measurement
     ("fault_bias", "f8", 6),  # rad/s, m/s²
     ("out", "f8", 6),  # rates rad/s, specific force m/s², FRD
-    ("wire", "f4", 6),  # specific force and rates, as in HIL_SENSOR
     channels=(2,),
 )
 """One inertial sensor."""

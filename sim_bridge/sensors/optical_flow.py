@@ -45,11 +45,14 @@ class OpticalFlow:
 
     def __init__(self, vehicle: Vehicle, seed: int) -> None:
         self.records: RecordArray = np.zeros(1, FLOW)
+        self.out: FloatArray = self.records["out"][0]
+        """The last measurement."""
         self._noise = NormalStream(seed, "flow", width=2)
         self._origin: FloatArray = np.zeros(3)
         write_numbers(self.records[0], vehicle.sensors.numbers["flow"])
         self.records[0]["surface_z"] = foot_z_m(vehicle)
 
-    def measure(self, state: FloatArray) -> None:
+    def measure(self, state: FloatArray) -> FloatArray:
         """Measure at a state."""
         measure_flow(self.records, state, self._origin, self._noise.row())
+        return self.out

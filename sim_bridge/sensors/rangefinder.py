@@ -49,10 +49,13 @@ class Rangefinder:
 
     def __init__(self, vehicle: Vehicle, seed: int) -> None:
         self.records: RecordArray = np.zeros(1, RANGE)
+        self.out: FloatArray = self.records["out"][0]
+        """The last measurement."""
         self._noise = NormalStream(seed, "range", width=2)
         write_numbers(self.records[0], vehicle.sensors.numbers["range"])
         self.records[0]["surface_z"] = foot_z_m(vehicle)
 
-    def measure(self, state: FloatArray) -> None:
+    def measure(self, state: FloatArray) -> FloatArray:
         """Measure at a state."""
         measure_range(self.records, state, self._noise.row())
+        return self.out

@@ -108,6 +108,18 @@ def test_px4_receives_every_group_of_fields_and_the_truth() -> None:
     assert len(of_type(px4, "HIL_STATE_QUATERNION")) == STEPS
 
 
+def test_clock_of_px4_precedes_what_it_stamps_with_it() -> None:
+    """PX4 stamps a second inertial sensor, GPS and truth with the newest HIL_SENSOR of id 0."""
+    received = flown(with_sensors("consumer", imu={"count": 2.0})).received
+    clock_us = 0
+    for message in received:
+        if message.get_type() == "HIL_SENSOR" and message.id == 0:
+            clock_us = message.time_usec
+        elif message.get_type() in ("HIL_SENSOR", "HIL_GPS", "HIL_STATE_QUATERNION"):
+            assert message.time_usec == clock_us
+    assert sum(message.get_type() == "HIL_GPS" for message in received) > 30
+
+
 def test_px4_climbs_in_the_simulator() -> None:
     """Control 0.5 is half of the thrust of 2.2 weights: a climb with 0.1 g, seen by each sensor."""
     px4 = flown(with_sensors("ideal"))

@@ -269,6 +269,42 @@ def test_clock_that_goes_back_gives_samples_without_duration() -> None:
     assert (link.time_us, link.time_jumps) == (4000, 1)
 
 
+def test_lost_inertial_measurements_lengthen_the_next_one() -> None:
+    """The samples of an integrating filter cover the time that passed."""
+    link, codec = stack(), Link(1, 51)
+    for step, fields in enumerate((ALL_BITS, ALL_BITS, ACCEL | BARO, 0, ALL_BITS, ALL_BITS), 1):
+        receive(link, codec.encode(hil_sensor(4000 * step, fields)))
+    imus = [sample for _, sample in taken(link) if isinstance(sample, ImuSample)]
+    assert [sample.time_s for sample in imus] == pytest.approx([0.004, 0.016, 0.020])
+    assert [sample.dt_s for sample in imus] == pytest.approx([0.004, 0.012, 0.004])
+
+
+def test_untaken_inertial_measurements_lengthen_the_next_one() -> None:
+    link, codec = stack(), Link(1, 51)
+    for step in range(1, 202):
+        receive(
+            link,
+            codec.encode(hil_sensor(4000 * step, number=1)),
+            codec.encode(hil_sensor(4000 * step)),
+        )
+    samples = [(number, one.dt_s) for number, one in taken(link) if isinstance(one, ImuSample)]
+    for number in (0, 1):
+        assert sum(dt_s for own, dt_s in samples if own == number) == pytest.approx(0.8)
+
+
+def test_second_inertial_sensor_after_the_clock_has_its_time() -> None:
+    """As a simulator for PX4 sends it; the time of its reception would be one step too late."""
+    link, codec = stack(), Link(1, 51)
+    for step in (1, 2):
+        receive(
+            link,
+            codec.encode(hil_sensor(4000 * step)),
+            codec.encode(hil_sensor(4000 * step, number=1)),
+        )
+    imus = [(number, one.time_s, one.dt_s) for number, one in taken(link) if isinstance(one, ImuSample)]
+    assert imus == [(0, 0.004, 0.004), (1, 0.004, 0.004)]
+
+
 # ---------------------------------------------------------------------- the estimator's seam
 
 
@@ -292,10 +328,9 @@ class Notebook:
         )
 
 
-def test_feed_writes_the_estimate_in_the_frame_of_the_vehicle() -> None:
-    """The estimator's origin is its first fix, 10 m north and 2 m above the vehicle's."""
-    link, codec, notebook, frame = stack(), Link(1, 51), Notebook(), LocalFrame(HOME)
-    feed = SensorFeed(notebook, frame, link.state)
+def test_feed_writes_the_estimate_once_it_is_known() -> None:
+    link, codec, notebook = stack(), Link(1, 51), Notebook()
+    feed = SensorFeed(notebook, link.state)
     assert link.sensors is not None
 
     def step(time_us: int, number: int = 0) -> bool:
@@ -307,15 +342,15 @@ def test_feed_writes_the_estimate_in_the_frame_of_the_vehicle() -> None:
     assert link.state[6] == 1.0  # not aligned: the state is not written
     notebook.aligned = True
     assert not step(8000)  # attitude alone
-    notebook.frame = LocalFrame(frame.to_geo(Vector3(10.0, 0.0, -2.0)))
+    notebook.frame = LocalFrame(HOME)
     assert step(12_000)
-    expected = [11.0, 2.0, 1.0, 4.0, 5.0, 6.0, 0.6, 0.0, 0.8, 0.0, 0.1, 0.2, 0.3]
+    expected = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 0.6, 0.0, 0.8, 0.0, 0.1, 0.2, 0.3]
     assert link.state == pytest.approx(expected, abs=1e-6)
 
 
 def test_feed_takes_the_first_sensor_of_each_kind() -> None:
     link, codec, notebook = stack(), Link(1, 51), Notebook()
-    feed = SensorFeed(notebook, LocalFrame(HOME), link.state)
+    feed = SensorFeed(notebook, link.state)
     assert link.sensors is not None
     for step in range(1, 4):
         receive(link, codec.encode(hil_sensor(4000 * step, number=1)), codec.encode(hil_sensor(4000 * step)))
