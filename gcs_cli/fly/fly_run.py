@@ -35,7 +35,8 @@ from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.flight_data import Flight as FlightData
 from gcs_cli.report.flight_outcome import Code, Outcome, with_log
 from gcs_cli.report.page import write_report
-from gcs_cli.report.run_directory import (
+from gcs_cli.report.summary import RunInfo, summarise, write_summary
+from gcs_cli.run_directory import (
     LOG_NAME,
     REPORT_NAME,
     SIMULATOR,
@@ -44,7 +45,6 @@ from gcs_cli.report.run_directory import (
     TLOG_NAME,
     make_run_directory,
 )
-from gcs_cli.report.summary import RunInfo, summarise, write_summary
 from gcs_cli.vehicle_link import open_signing
 
 _STEP_S = 0.1

@@ -15,8 +15,8 @@ from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.compare_charts import overlaid_figures
 from gcs_cli.report.flight_data import Flight
 from gcs_cli.report.poses import Run
-from gcs_cli.report.run_directory import LOG_NAME, SUMMARY_NAME
 from gcs_cli.report.summary import RunInfo, max_overshoot_m, summarise
+from gcs_cli.run_directory import LOG_NAME, SUMMARY_NAME
 
 TEMPLATES = Path(__file__).parent / "templates"
 Summary = Mapping[str, Any]
