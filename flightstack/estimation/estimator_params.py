@@ -27,6 +27,8 @@ class EstimatorParams(NamedTuple):
     field_scale: float = 0.1
     """Error of the magnetometer's scale, which the filter counts as an error of the Earth's field along itself."""
     body_field_gauss: float = 0.01
+    declination_rad: float = 0.35
+    """Error of a declination that is not known."""
     # GNSS
     gnss_delay_s: float = 0.11
     gnss_velocity_noise_m_s: float = 0.05
@@ -56,11 +58,13 @@ class EstimatorParams(NamedTuple):
     mag_gate: float = 3.0
     mag_corrects_tilt: float = 0.0
     # at rest
-    rest_velocity_noise_m_s: float = 0.05
-    rest_rate_noise_rad_s: float = 0.02
+    rest_velocity_noise_m_s: float = 0.02
+    rest_rate_noise_rad_s: float = 0.006
     # timing
     delay_s: float = 0.12
     """Age of the state of the filter; measurements older than this are fused late."""
+    sensor_period_s: float = 0.02
+    """Least time between two measurements of magnetometer, barometer or range finder; samples between are averaged."""
     period_s: float = 0.008
     """Least time between two predictions of the filter."""
     output_s: float = 0.0

@@ -16,15 +16,26 @@ from flightstack.estimation.error_state import (
     write_nominal,
 )
 
-OBSERVATIONS = 19
+OBSERVATIONS = 23
 GNSS_VELOCITY, GNSS_POSITION, BARO, MAG, RANGE = 0, 3, 6, 7, 10
-REST_VELOCITY, REST_RATE, HOLD_POSITION = 11, 14, 17
+REST_VELOCITY, REST_RATE, HOLD_POSITION, KNOWN_FIELD, DECLINATION = 11, 14, 17, 19, 22
 """First row of each sensor in ``Filter.observations``."""
 
-INNOVATION, INNOVATION_VARIANCE, TEST_RATIO, FUSED_S, NOISE, LAGGED = 0, 1, 2, 3, 4, 5
-OBSERVATION_COLUMNS = 6
+INNOVATION, INNOVATION_VARIANCE, TEST_RATIO, FUSED_S, NOISE, LAGGED, FUSED, REFUSED, NIS_SUM = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+    7,
+    8,
+)
+OBSERVATION_COLUMNS = 9
 """Columns: innovation, its variance, squared ratio to the gate, time of the last accepted one, noise variance, mean
-product of successive innovations."""
+product of successive innovations; numbers of accepted and of refused measurements; sum of the squares of accepted
+innovations by their variance."""
 
 _ADAPTATION = 0.01
 """Share of an innovation in the estimate of the noise variance."""
@@ -121,7 +132,10 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
     ratio = innovation * innovation / (noise.gate * noise.gate * variance)
     o[row, INNOVATION], o[row, INNOVATION_VARIANCE], o[row, TEST_RATIO] = innovation, variance, ratio
     if not ratio <= 1.0:
+        o[row, REFUSED] += 1.0
         return False
+    o[row, FUSED] += 1.0
+    o[row, NIS_SUM] += innovation * innovation / variance
     estimate = innovation * innovation - projected
     o[row, LAGGED] += _ADAPTATION * (innovation * last - o[row, LAGGED])
     o[row, NOISE] = min(max(r + _ADAPTATION * (estimate - r), least), largest)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from flightstack.core.contract import FloatArray, Vector3, VehicleState
@@ -16,6 +18,7 @@ from flightstack.estimation.sensor_samples import (
     MagSample,
     RangeSample,
 )
+from flightstack.estimation.vibration import WINDOW
 from flightstack.simulator_link.sensor_frames import (
     ACCEL,
     ACCEL_AT,
@@ -71,6 +74,20 @@ class StateEstimator(Protocol):
         ...
 
 
+@dataclass(slots=True)
+class NewestSamples:
+    """Newest sample of each sensor; None before the first one."""
+
+    imu: ImuSample | None = None
+    mag: MagSample | None = None
+    baro: BaroSample | None = None
+    gnss: GnssSample | None = None
+    range: RangeSample | None = None
+    flow: FlowSample | None = None
+    past_imu: deque[ImuSample] = field(default_factory=lambda: deque(maxlen=WINDOW))
+    """The last samples of the inertial sensor, of which the vibration is computed."""
+
+
 def hil_samples(time_s: float, report: HilReport) -> Iterator[ImuSample | MagSample | BaroSample]:
     """Yield the samples in a HIL_SENSOR: those of which all bits are set, as PX4 takes them.
 
@@ -119,41 +136,44 @@ def samples_of(report: Report) -> Iterator[tuple[int, Sample]]:
 
 
 class SensorFeed:
-    """Feeds an estimator with the first sensor of each kind, and writes its state in the vehicle's local frame."""
+    """Feeds an estimator with the first sensor of each kind, and writes its state."""
 
-    def __init__(self, estimator: StateEstimator, frame: LocalFrame, state: FloatArray) -> None:
-        """``frame`` is the vehicle's; ``state`` is the array form of ``VehicleState`` to write."""
-        self._estimator, self._frame, self._state = estimator, frame, state
-        self._origin = Vector3(0.0, 0.0, 0.0)  # of the estimator's frame in the vehicle's
-        self._has_origin = False
+    def __init__(self, estimator: StateEstimator, state: FloatArray) -> None:
+        """``state`` is the array form of ``VehicleState`` to write, in the estimator's local frame."""
+        self._estimator, self._state = estimator, state
+        self.newest = NewestSamples()
 
     def update(self, reports: list[Report]) -> bool:
         """Take the reports; return True if the state is known and was written."""
-        estimator = self._estimator
         for report in reports:
             for number, sample in samples_of(report):
                 if number == 0:
                     self._take(sample)
+        estimator, state = self._estimator, self._state
         if not estimator.aligned:
             return False
-        if not self._has_origin and estimator.frame is not None:
-            self._origin, self._has_origin = self._frame.to_ned(estimator.frame.origin), True
-        found, origin, state = estimator.state(), self._origin, self._state
-        position = found.position_ned_m
-        state[0:3] = position.x + origin.x, position.y + origin.y, position.z + origin.z
-        state[3:6], state[6:10] = found.velocity_ned_m_s, found.attitude
-        state[10:13] = found.rates_frd_rad_s
-        return self._has_origin
+        found = estimator.state()
+        state[0:3], state[3:6] = found.position_ned_m, found.velocity_ned_m_s
+        state[6:10], state[10:13] = found.attitude, found.rates_frd_rad_s
+        return estimator.frame is not None
 
     def _take(self, sample: Sample) -> None:
-        estimator = self._estimator
+        estimator, newest = self._estimator, self.newest
         if isinstance(sample, ImuSample):
+            newest.imu = sample
+            newest.past_imu.append(sample)
             estimator.imu(sample)
         elif isinstance(sample, MagSample):
+            newest.mag = sample
             estimator.mag(sample)
         elif isinstance(sample, BaroSample):
+            newest.baro = sample
             estimator.baro(sample)
         elif isinstance(sample, GnssSample):
+            newest.gnss = sample
             estimator.gnss(sample)
         elif isinstance(sample, RangeSample):
+            newest.range = sample
             estimator.range(sample)
+        else:
+            newest.flow = sample

@@ -142,6 +142,10 @@ class FlightRecorder:
         self._home = (home, position_ned_m)
         self._write_home(time_us)
 
+    def set_origin(self, origin: GeoPoint) -> None:
+        """Set the origin of the local frame of the next logs."""
+        self._origin = origin
+
     def _write_home(self, time_us: int) -> None:
         if self._log is None:
             return

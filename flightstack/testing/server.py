@@ -147,7 +147,7 @@ class Server:
         simulator = [*passed(options, TO_SIMULATOR), at]
         stack = [
             *passed(options, TO_STACK), at, f"--outer-hz={outer_rate_hz(options)!r}", f"--log={self.log}",
-            "--params=none", "--state=none", "--overwrite",
+            "--params=none", "--state-dir=none", "--overwrite",
         ]  # fmt: skip
         command = own_program(
             "flightstack.testing.server_guard", str(self.folder), json.dumps(simulator), json.dumps(stack)

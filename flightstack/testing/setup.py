@@ -16,7 +16,13 @@ from flightstack.core.geodesy import GeoPoint
 from flightstack.firmware.c_loops import LoopsSetup
 from flightstack.firmware.choice import PYTHON, parse_loops
 from flightstack.firmware.targets import make_loops
-from flightstack.params.config import DEFAULT_CONTROLLER, DEFAULT_HOME, DEFAULT_INNER_HZ, StackConfig
+from flightstack.params.config import (
+    DEFAULT_CONTROLLER,
+    DEFAULT_HOME,
+    DEFAULT_INNER_HZ,
+    DEFAULT_STATE,
+    StackConfig,
+)
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
 from flightstack.params.vehicle import DEFAULT_VEHICLE, Vehicle, load_vehicle
 from flightstack.plan import Plan, load_plan
@@ -48,6 +54,8 @@ class Setup:
     """A built-in set of gains, or the path of a gains file."""
     loops: str = "python"
     """``python``, ``c``, ``host`` or ``emulated``; see docs/reference/cli-flightstack.md."""
+    state: str = DEFAULT_STATE
+    """``estimated`` to fly on the vehicle's sensors, ``truth`` on the simulator's state."""
     plant: str = "rigid"
     """``rigid``, ``multibody`` or ``paper``."""
     wind: Sequence[float] = (0.0, 0.0)
@@ -110,6 +118,7 @@ class Setup:
             loops=self.loops,
             inner_hz=self.inner_hz,
             outer_hz=nearest_outer_hz(self.inner_hz) if self.outer_hz is None else self.outer_hz,
+            state=self.state,
             ideal_rotors=self.ideal_rotors,
             home=self.home,
             params=tuple(f"{name}={value!r}" for name, value in self.params.items()),

@@ -102,7 +102,7 @@ def params_of(log: Recording) -> tuple[EstimatorParams, GnssLimits, float]:
         get("EKF2_REQ_SACC", least.speed_accuracy_m_s),
         get("EKF2_REQ_NSATS", least.satellites),
     )
-    return params, limits, math.radians(get("EKF2_MAG_DECL", 0.0))
+    return params, limits, math.radians(get("EKF2_MAG_DECL", math.nan))
 
 
 def _rows(topic: Topic, names: list[str]) -> FloatArray | None:

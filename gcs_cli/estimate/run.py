@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -42,7 +43,8 @@ def run(log: Recording) -> Estimate:
     """Run the filter; raise CliError if the log's sensors do not suffice."""
     params, limits, declination_rad = params_of(log)
     estimator = Estimator(params, limits)
-    estimator.set_declination(declination_rad)
+    if math.isfinite(declination_rad):
+        estimator.set_declination(declination_rad)
     keeper = _Keeper(estimator)
     year = log.year or FIELD_YEAR
     for sample in samples_of(log):

@@ -101,6 +101,7 @@ def check_options(options: FlyOptions, home: GeoPoint) -> None:
             loops=options.loops,
             inner_hz=options.inner_hz,
             outer_hz=outer_rate_hz(options),
+            state=options.state,
             ideal_rotors=options.ideal_rotors,
             home=home,
             system_id=system_id(options.instance),
@@ -160,7 +161,7 @@ def stack_arguments(options: FlyOptions, home: GeoPoint, folder: Path, ground_po
         f"--exit-on-gcs-loss={GCS_LOSS_S:g}",
         f"--params={options.params or 'none'}",
         *(["--clock=realtime"] if runs_freely(options) else []),
-        "--state=none",  # a flight depends on its command line alone
+        "--state-dir=none",  # a flight depends on its command line alone
         "--wait-for-start",
         *signing,
     ]

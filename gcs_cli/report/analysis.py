@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import math
-import os
-import struct
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from pyulog import ULog, ULogException
 
 from flightstack.core.contract import MAX_ROTORS, FloatArray
 from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import GeoPoint
 from flightstack.core.geometry_bulk import euler_from_quaternions
-from flightstack.flight_log.ulog import HEADER_SIZE, MESSAGE_HEADER, MESSAGE_TYPES
+from gcs_cli.logs.ulog_parser import DAMAGE, ParsedLog, parse_ulog
 from gcs_cli.report.flight_data import (
     Flight,
     LoopTiming,
@@ -32,11 +27,8 @@ from gcs_cli.report.flight_data import (
     series,
 )
 
-__all__ = ["Flight", "flight_in", "flight_of", "parse_ulog", "read_flight"]
-
 _ARMED = 2  # vehicle_status.arming_state
 _TIMING_FIELDS = LoopTiming._fields[2:8]  # execution and lateness
-_DAMAGE = (ULogException, struct.error, ValueError, KeyError, IndexError, OverflowError, TypeError)
 _TOPICS = [
     "vehicle_local_position",
     "trajectory_setpoint",
@@ -53,27 +45,6 @@ _TOPICS = [
 ]
 
 
-class LogBytes(io.BytesIO):
-    """A log in memory for pyulog, which seeks back by a message's size even where the file ended before.
-
-    It would go back further each time, and never end. ``seek`` goes back by no more than the last ``read`` has read.
-    """
-
-    _missing = 0
-
-    def read(self, size: int | None = -1, /) -> bytes:
-        """Return up to ``size`` bytes."""
-        data = super().read(size)
-        self._missing = max(0, (size or 0) - len(data))
-        return data
-
-    def seek(self, offset: int, whence: int = 0, /) -> int:
-        """Move; return the position."""
-        if whence == os.SEEK_CUR and offset < 0:
-            offset = min(0, offset + self._missing)
-        return super().seek(offset, whence)
-
-
 def read_flight(path: Path) -> Flight:
     """Read a ULog file, complete or cut off; raise ConfigError when it is none."""
     try:
@@ -85,26 +56,16 @@ def read_flight(path: Path) -> Flight:
 
 def flight_of(content: bytes, source: object) -> Flight:
     """Read the bytes of a ULog file, complete or cut off; raise ConfigError, which names ``source``."""
-    return flight_in(parse_ulog(content, source, _TOPICS), content, source)
+    return flight_in(parse_ulog(content, source, _TOPICS), source)
 
 
-def flight_in(log: Any, content: bytes, source: object) -> Flight:
-    """Read the flight of a log that ``parse_ulog`` made of ``content``; raise ConfigError, which names ``source``."""
+def flight_in(parsed: ParsedLog, source: object) -> Flight:
+    """Read the flight of a parsed log; raise ConfigError, which names ``source``."""
     try:
-        flight = _Reader(log).flight()
-    except _DAMAGE as error:
+        flight = _Reader(parsed.log).flight()
+    except DAMAGE as error:
         raise ConfigError(source, "", f"is not a readable flight log: {error}") from error
-    return replace(flight, damaged=log.file_corruption or not is_whole(content))
-
-
-def parse_ulog(content: bytes, source: object, topics: list[str] | None = None) -> Any:
-    """Return pyulog's view of the bytes of a ULog file, of all ``topics`` by default; raise ConfigError."""
-    try:
-        # pyulog reports damage on stdout, which belongs to the command's own output
-        with contextlib.redirect_stdout(io.StringIO()):
-            return ULog(LogBytes(content), topics)
-    except _DAMAGE as error:
-        raise ConfigError(source, "", f"is not a readable flight log: {error}") from error
+    return replace(flight, damaged=parsed.damaged)
 
 
 class _Reader:
@@ -207,17 +168,3 @@ class _Reader:
 
 def _elements(name: str, count: int) -> list[str]:
     return [f"{name}[{index}]" for index in range(count)]
-
-
-def is_whole(log: bytes) -> bool:
-    """Return True if messages of known types fill a ULog file to its last byte. Damage inside one is not detected.
-
-    The format has no end mark and no checksums.
-    """
-    at, end = HEADER_SIZE, len(log)
-    while at + MESSAGE_HEADER.size <= end:
-        size, kind = MESSAGE_HEADER.unpack_from(log, at)
-        if kind not in MESSAGE_TYPES:
-            return False
-        at += MESSAGE_HEADER.size + size
-    return at == end

@@ -13,9 +13,10 @@ from flightstack.core.contract import FloatArray, Vector3
 from flightstack.core.geodesy import LocalFrame
 from flightstack.core.geometry import conjugate, quaternion_product, rotation_vector
 from flightstack.estimation.error_state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY
-from flightstack.estimation.estimator import POSITION_RESET, VELOCITY_RESET, Estimator
+from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import GNSS_VELOCITY, INNOVATION, INNOVATION_VARIANCE
+from flightstack.estimation.memory import POSITION_RESET, VELOCITY_RESET
 from flightstack.estimation.sensor_samples import GnssSample, ImuSample, MagSample
 from tests.support import flown_sensors as flown
 from tests.support.flown_sensors import Faults
