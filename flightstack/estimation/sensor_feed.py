@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from flightstack.core.contract import FloatArray, Vector3, VehicleState
+from flightstack.core.contract import FloatArray, Vector3
 from flightstack.core.geodesy import LocalFrame
 from flightstack.estimation.sensor_samples import (
     BaroSample,
@@ -69,8 +69,8 @@ class StateEstimator(Protocol):
         """Take a sample of the rangefinder."""
         ...
 
-    def state(self) -> VehicleState:
-        """Return the state at the time of the newest sample of the inertial sensor."""
+    def write_state(self, out: FloatArray) -> None:
+        """Write the state at the time of the newest sample of the inertial sensor, as ``VehicleState``, shape (13,)."""
         ...
 
 
@@ -152,9 +152,7 @@ class SensorFeed:
         estimator, state = self._estimator, self._state
         if not estimator.aligned:
             return False
-        found = estimator.state()
-        state[0:3], state[3:6] = found.position_ned_m, found.velocity_ned_m_s
-        state[6:10], state[10:13] = found.attitude, found.rates_frd_rad_s
+        estimator.write_state(state)
         return estimator.frame is not None
 
     def _take(self, sample: Sample) -> None:

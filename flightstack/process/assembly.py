@@ -192,7 +192,7 @@ def _join(
         simulator.state, simulator.rotor_speed_rad_s, simulator,
     )  # fmt: skip
     parts.warm_up(with_streams=not config.lockstep)
-    autopilot, estimation = _on_sensors(parts, simulator)
+    autopilot, estimation = _on_sensors(parts, simulator, params)
     connect_parameters(params, parts, recorder)
     timing = LoopTiming(round(1e9 / loop_rates.inner_hz))
     report = TimingReport(timing, loop_rates, config.lockstep)
@@ -213,12 +213,12 @@ def _join(
 
 
 def _on_sensors(
-    parts: VehicleParts, simulator: SimulatorEndpoint
+    parts: VehicleParts, simulator: SimulatorEndpoint, params: ParamStore
 ) -> tuple[TickingAutopilot, Estimation | None]:
     """Return the autopilot to tick; that of a vehicle on sensors estimates its state first."""
     if simulator.sensors is None:
         return parts.autopilot, None
-    estimation = Estimation(simulator.sensors, parts.now, parts.area)
+    estimation = Estimation(simulator.sensors, parts.now, parts.area, params)
     estimation.warm_up()
     return SensorAutopilot(parts.autopilot, estimation), estimation
 

@@ -7,9 +7,12 @@ import math
 from flightstack.core.contract import FloatArray, Vector3
 from flightstack.core.earth_field import earth_field_ned_gauss
 from flightstack.estimation.estimator import Estimator
+from flightstack.estimation.estimator_params import tuning_of
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed
 from flightstack.estimation.sensor_samples import BaroSample, ImuSample
+from flightstack.params.estimator import ESTIMATOR_SPECS
+from flightstack.params.store import ParamStore
 from flightstack.simulator_link.sensor_inbox import SensorInbox
 from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.autopilot import Autopilot
@@ -22,9 +25,11 @@ class Estimation:
     The estimate of the first fix becomes the origin of the vehicle's local frame.
     """
 
-    def __init__(self, sensors: SensorInbox, now: FlightState, area: FlightArea) -> None:
-        """``now.state`` is written in place."""
-        self.estimator = Estimator()
+    def __init__(self, sensors: SensorInbox, now: FlightState, area: FlightArea, store: ParamStore) -> None:
+        """``now.state`` is written in place; ``store`` has the parameters of the estimator (EKF2_…)."""
+        self.estimator = Estimator(*tuning_of(store.values()))
+        self._store = store
+        store.subscribe(self._on_parameter)
         self._sensors = sensors
         self._now = now
         self._area = area
@@ -39,6 +44,10 @@ class Estimation:
     def sensed(self) -> Sensed:
         """Return what the estimator and its sensors know now; valid until the next update."""
         return Sensed(self.estimator.memory[0], self._feed.newest)
+
+    def _on_parameter(self, name: str, value: float) -> None:
+        if name in ESTIMATOR_SPECS:
+            self.estimator.set_params(*tuning_of({**self._store.values(), name: value}))
 
     def warm_up(self) -> None:
         """Compile the kernels of the estimator, or load them from the cache."""

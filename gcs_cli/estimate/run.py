@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,9 +40,9 @@ class Estimate:
     resets: FloatArray
 
 
-def run(log: Recording) -> Estimate:
-    """Run the filter; raise CliError if the log's sensors do not suffice."""
-    params, limits, declination_rad = params_of(log)
+def run(log: Recording, given: Mapping[str, float]) -> Estimate:
+    """Run the filter with parameters ``given`` by name; raise CliError if the log's sensors do not suffice."""
+    params, limits, declination_rad = params_of(log, given)
     estimator = Estimator(params, limits)
     if math.isfinite(declination_rad):
         estimator.set_declination(declination_rad)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flightstack.core.contract import Quaternion, Vector3, VehicleState
+from flightstack.core.contract import FloatArray, Vector3
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.estimation.sensor_feed import SensorFeed, samples_of
 from flightstack.estimation.sensor_samples import (
@@ -319,13 +319,8 @@ class Notebook:
     def __getattr__(self, name: str) -> Any:
         return self.samples.append
 
-    def state(self) -> VehicleState:
-        return VehicleState(
-            Vector3(1.0, 2.0, 3.0),
-            Vector3(4.0, 5.0, 6.0),
-            Quaternion(0.6, 0.0, 0.8, 0.0),
-            Vector3(0.1, 0.2, 0.3),
-        )
+    def write_state(self, out: FloatArray) -> None:
+        out[:] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 0.6, 0.0, 0.8, 0.0, 0.1, 0.2, 0.3]
 
 
 def test_feed_writes_the_estimate_once_it_is_known() -> None:
