@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -86,6 +86,8 @@ class NewestSamples:
     flow: FlowSample | None = None
     past_imu: deque[ImuSample] = field(default_factory=lambda: deque(maxlen=WINDOW))
     """The last samples of the inertial sensor, of which the vibration is computed."""
+    imu_repeats: int = 0
+    """Number of samples of the inertial sensor whose rates or forces equal those before."""
 
 
 def hil_samples(time_s: float, report: HilReport) -> Iterator[ImuSample | MagSample | BaroSample]:
@@ -138,9 +140,17 @@ def samples_of(report: Report) -> Iterator[tuple[int, Sample]]:
 class SensorFeed:
     """Feeds an estimator with the first sensor of each kind, and writes its state."""
 
-    def __init__(self, estimator: StateEstimator, state: FloatArray) -> None:
-        """``state`` is the array form of ``VehicleState`` to write, in the estimator's local frame."""
-        self._estimator, self._state = estimator, state
+    def __init__(
+        self,
+        estimator: StateEstimator,
+        state: FloatArray,
+        record: Callable[[Sample], object] = lambda _: None,
+    ) -> None:
+        """``state`` is the array form of ``VehicleState`` to write, in the estimator's local frame.
+
+        ``record`` is called with each sample that the estimator takes.
+        """
+        self._estimator, self._state, self._record = estimator, state, record
         self.newest = NewestSamples()
 
     def update(self, reports: list[Report]) -> bool:
@@ -149,6 +159,7 @@ class SensorFeed:
             for number, sample in samples_of(report):
                 if number == 0:
                     self._take(sample)
+                    self._record(sample)
         estimator, state = self._estimator, self._state
         if not estimator.aligned:
             return False
@@ -158,7 +169,9 @@ class SensorFeed:
     def _take(self, sample: Sample) -> None:
         estimator, newest = self._estimator, self.newest
         if isinstance(sample, ImuSample):
-            newest.imu = sample
+            before, newest.imu = newest.imu, sample
+            repeats = before is not None and (before[2] == sample[2] or before[3] == sample[3])
+            newest.imu_repeats = newest.imu_repeats + 1 if repeats else 0
             newest.past_imu.append(sample)
             estimator.imu(sample)
         elif isinstance(sample, MagSample):
