@@ -192,7 +192,7 @@ def estimator_report(memory: Record) -> EstimatorReport:
         solution=_solution(now_s, flags, rows, control, rejected),
         control=control,
         rejected=rejected,
-        nominal=_nominal(memory["nominal"].tolist()),
+        nominal=nominal_of(memory),
         variances=variances,
         velocity=tuple(velocity),
         position=tuple(position),
@@ -213,7 +213,9 @@ def _root(square: float) -> float:
     return math.nan if square < 0.0 else math.sqrt(square)
 
 
-def _nominal(x: Sequence[float]) -> Nominal:
+def nominal_of(memory: Record) -> Nominal:
+    """Return the state at the horizon of a record of the estimator's ``MEMORY``."""
+    x = memory["nominal"].tolist()
     return Nominal(
         Quaternion(*x[0:4]), Vector3(*x[4:7]), Vector3(*x[7:10]), Vector3(*x[10:13]), Vector3(*x[13:16]),
         Vector3(*x[16:19]), Vector3(*x[19:22]), x[22], x[23], x[24], Vector3(*x[25:28]),
@@ -244,22 +246,22 @@ def _control(
     has_gnss = bool(flags[HAS_GNSS])
     at_rest = bool(flags[LANDED]) and fused(REST_VELOCITY, 3)
     has_position, has_velocity = has_gnss and fused(GNSS_POSITION, 2), has_gnss and fused(GNSS_VELOCITY, 2)
-    is_true = {
-        ControlFlags.TILT_ALIGN: max(variances[ATTITUDE : ATTITUDE + 2]) < _TILT_RAD**2,
-        ControlFlags.YAW_ALIGN: variances[ATTITUDE + 2] < _YAW_RAD**2,
-        ControlFlags.GNSS_POSITION: has_position,
-        ControlFlags.MAG_3D: fused(MAG, 3),
-        ControlFlags.IN_AIR: not flags[LANDED],
-        ControlFlags.WIND: max(variances[WIND : WIND + 2]) < _WIND_VARIANCE,
-        ControlFlags.BARO_HEIGHT: bool(flags[HAS_BARO]) and fused(BARO),
-        ControlFlags.RANGE_HEIGHT: bool(flags[HAS_RANGE]) and fused(RANGE),
-        ControlFlags.GNSS_HEIGHT: has_gnss and fused(GNSS_POSITION + 2),
-        ControlFlags.VEHICLE_AT_REST: at_rest,
-        ControlFlags.INERTIAL_DEAD_RECKONING: not (has_position or has_velocity or at_rest),
-        ControlFlags.FAKE_POSITION: fused(HOLD_POSITION, 2),
-        ControlFlags.GNSS_VELOCITY: has_velocity,
-    }
-    return ControlFlags(sum(flag for flag, value in is_true.items() if value))
+    is_true = (
+        (ControlFlags.TILT_ALIGN, max(variances[ATTITUDE : ATTITUDE + 2]) < _TILT_RAD**2),
+        (ControlFlags.YAW_ALIGN, variances[ATTITUDE + 2] < _YAW_RAD**2),
+        (ControlFlags.GNSS_POSITION, has_position),
+        (ControlFlags.MAG_3D, fused(MAG, 3)),
+        (ControlFlags.IN_AIR, not flags[LANDED]),
+        (ControlFlags.WIND, max(variances[WIND : WIND + 2]) < _WIND_VARIANCE),
+        (ControlFlags.BARO_HEIGHT, bool(flags[HAS_BARO]) and fused(BARO)),
+        (ControlFlags.RANGE_HEIGHT, bool(flags[HAS_RANGE]) and fused(RANGE)),
+        (ControlFlags.GNSS_HEIGHT, has_gnss and fused(GNSS_POSITION + 2)),
+        (ControlFlags.VEHICLE_AT_REST, at_rest),
+        (ControlFlags.INERTIAL_DEAD_RECKONING, not (has_position or has_velocity or at_rest)),
+        (ControlFlags.FAKE_POSITION, fused(HOLD_POSITION, 2)),
+        (ControlFlags.GNSS_VELOCITY, has_velocity),
+    )
+    return ControlFlags(sum(flag for flag, value in is_true if value))
 
 
 def _rejected(
@@ -272,17 +274,17 @@ def _rejected(
     def beyond(rows: Sequence[Observation]) -> bool:
         return any(row.ratio > 1.0 for row in rows)
 
-    is_true = {
-        RejectionFlags.VELOCITY_HORIZONTAL: beyond(velocity[:2]),
-        RejectionFlags.VELOCITY_VERTICAL: beyond(velocity[2:]),
-        RejectionFlags.POSITION_HORIZONTAL: beyond(position[:2]),
-        RejectionFlags.POSITION_VERTICAL: beyond([height, *position[2:]]),
-        RejectionFlags.MAG_X: beyond(field[:1]),
-        RejectionFlags.MAG_Y: beyond(field[1:2]),
-        RejectionFlags.MAG_Z: beyond(field[2:]),
-        RejectionFlags.HEIGHT_ABOVE_GROUND: range_finder is not None and beyond([range_finder]),
-    }
-    return RejectionFlags(sum(flag for flag, value in is_true.items() if value))
+    is_true = (
+        (RejectionFlags.VELOCITY_HORIZONTAL, beyond(velocity[:2])),
+        (RejectionFlags.VELOCITY_VERTICAL, beyond(velocity[2:])),
+        (RejectionFlags.POSITION_HORIZONTAL, beyond(position[:2])),
+        (RejectionFlags.POSITION_VERTICAL, beyond([height, *position[2:]])),
+        (RejectionFlags.MAG_X, beyond(field[:1])),
+        (RejectionFlags.MAG_Y, beyond(field[1:2])),
+        (RejectionFlags.MAG_Z, beyond(field[2:])),
+        (RejectionFlags.HEIGHT_ABOVE_GROUND, range_finder is not None and beyond([range_finder])),
+    )
+    return RejectionFlags(sum(flag for flag, value in is_true if value))
 
 
 _GNSS_REJECTIONS = (
@@ -307,20 +309,21 @@ def _solution(
     heights = [rows[BARO], rows[GNSS_POSITION + 2], rows[GNSS_VELOCITY + 2]]
     vertical = _is_recent(heights, now_s, DEAD_RECKONING_S)
     fall = rows[GNSS_VELOCITY + 2].innovation * -rows[BARO].innovation  # of one sign if the IMU is wrong
-    is_true = {
-        SolutionFlags.ATTITUDE: bool(control & ControlFlags.TILT_ALIGN),
-        SolutionFlags.VELOCITY_HORIZONTAL: horizontal,
-        SolutionFlags.VELOCITY_VERTICAL: vertical,
-        SolutionFlags.POSITION_RELATIVE: horizontal,
-        SolutionFlags.POSITION_ABSOLUTE: horizontal,
-        SolutionFlags.HEIGHT_ABSOLUTE: vertical,
-        SolutionFlags.HEIGHT_ABOVE_GROUND: bool(control & ControlFlags.RANGE_HEIGHT),
-        SolutionFlags.CONSTANT_POSITION: not horizontal,
-        SolutionFlags.PREDICTED_RELATIVE: horizontal,
-        SolutionFlags.PREDICTED_ABSOLUTE: horizontal,
-        SolutionFlags.GNSS_GLITCH: bool(rejected & _GNSS_REJECTIONS) and not rejected & _FIELD_REJECTIONS,
-        SolutionFlags.ACCEL_ERROR: fall > 0.0
-        and rows[GNSS_VELOCITY + 2].ratio > 1.0
-        and rows[BARO].ratio > 1.0,
-    }
-    return SolutionFlags(sum(flag for flag, value in is_true.items() if value))
+    is_true = (
+        (SolutionFlags.ATTITUDE, bool(control & ControlFlags.TILT_ALIGN)),
+        (SolutionFlags.VELOCITY_HORIZONTAL, horizontal),
+        (SolutionFlags.VELOCITY_VERTICAL, vertical),
+        (SolutionFlags.POSITION_RELATIVE, horizontal),
+        (SolutionFlags.POSITION_ABSOLUTE, horizontal),
+        (SolutionFlags.HEIGHT_ABSOLUTE, vertical),
+        (SolutionFlags.HEIGHT_ABOVE_GROUND, bool(control & ControlFlags.RANGE_HEIGHT)),
+        (SolutionFlags.CONSTANT_POSITION, not horizontal),
+        (SolutionFlags.PREDICTED_RELATIVE, horizontal),
+        (SolutionFlags.PREDICTED_ABSOLUTE, horizontal),
+        (SolutionFlags.GNSS_GLITCH, bool(rejected & _GNSS_REJECTIONS) and not rejected & _FIELD_REJECTIONS),
+        (
+            SolutionFlags.ACCEL_ERROR,
+            fall > 0.0 and rows[GNSS_VELOCITY + 2].ratio > 1.0 and rows[BARO].ratio > 1.0,
+        ),
+    )
+    return SolutionFlags(sum(flag for flag, value in is_true if value))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -140,9 +140,17 @@ def samples_of(report: Report) -> Iterator[tuple[int, Sample]]:
 class SensorFeed:
     """Feeds an estimator with the first sensor of each kind, and writes its state."""
 
-    def __init__(self, estimator: StateEstimator, state: FloatArray) -> None:
-        """``state`` is the array form of ``VehicleState`` to write, in the estimator's local frame."""
-        self._estimator, self._state = estimator, state
+    def __init__(
+        self,
+        estimator: StateEstimator,
+        state: FloatArray,
+        record: Callable[[Sample], object] = lambda _: None,
+    ) -> None:
+        """``state`` is the array form of ``VehicleState`` to write, in the estimator's local frame.
+
+        ``record`` is called with each sample that the estimator takes.
+        """
+        self._estimator, self._state, self._record = estimator, state, record
         self.newest = NewestSamples()
 
     def update(self, reports: list[Report]) -> bool:
@@ -151,6 +159,7 @@ class SensorFeed:
             for number, sample in samples_of(report):
                 if number == 0:
                     self._take(sample)
+                    self._record(sample)
         estimator, state = self._estimator, self._state
         if not estimator.aligned:
             return False

@@ -16,12 +16,14 @@ from flightstack.control.controller import controller_of
 from flightstack.control.controller_loading import check_python, load_controller
 from flightstack.control.loop_parameters import loop_numbers
 from flightstack.core.errors import ConfigError
+from flightstack.core.geodesy import GeoPoint
 from flightstack.firmware.c_loops import LoopsSetup
 from flightstack.firmware.choice import PYTHON, parse_loops
 from flightstack.firmware.law_tree import law_tree, own_params
 from flightstack.firmware.targets import make_loops
 from flightstack.flight_log.flight_log import vehicle_fields
 from flightstack.flight_log.recorder import FlightRecorder, OpenLog
+from flightstack.flight_log.sensor_recorder import SENSOR_GROUPS, SensorRecorder
 from flightstack.guidance.safe_places import SafePlaces
 from flightstack.params.config import AUTOPILOT, ESTIMATED, GENERIC, STATES, SYSTEM_ID, StackConfig
 from flightstack.params.gains_file import open_gains
@@ -191,13 +193,14 @@ def _join(
         vehicle, config.home, config.lockstep, system_id, loop_rates.interval_us,
         uses_sensors=config.state == ESTIMATED,
     )  # fmt: skip
-    recorder = FlightRecorder(open_log, info, params.values, config.home, lambda: simulator.battery)
+    groups = () if simulator.sensors is None else SENSOR_GROUPS
+    recorder = FlightRecorder(open_log, info, params.values, config.home, lambda: simulator.battery, groups)
     parts = assemble(
         vehicle, backend, behaviour, config.home, loop_rates.divisor, loop_rates.outer_hz, recorder,
         simulator.state, simulator.rotor_speed_rad_s, simulator,
     )  # fmt: skip
     parts.warm_up(with_streams=not config.lockstep)
-    autopilot, estimation = _on_sensors(parts, simulator)
+    autopilot, estimation = _on_sensors(parts, simulator, recorder, config.home)
     connect_parameters(params, parts, recorder)
     timing = LoopTiming(round(1e9 / loop_rates.inner_hz))
     report = TimingReport(timing, loop_rates, config.lockstep)
@@ -218,13 +221,17 @@ def _join(
 
 
 def _on_sensors(
-    parts: VehicleParts, simulator: SimulatorEndpoint
+    parts: VehicleParts, simulator: SimulatorEndpoint, recorder: FlightRecorder, home: GeoPoint
 ) -> tuple[TickingAutopilot, Estimation | None]:
-    """Return the autopilot to tick; that of a vehicle on sensors estimates its state first."""
+    """Return the autopilot to tick; that of a vehicle on sensors estimates its state first.
+
+    ``home`` is the origin of the simulator's true state.
+    """
     if simulator.sensors is None:
         return parts.autopilot, None
     users = Users(parts.area, parts.failsafes, parts.navigator, parts.backend, parts.journal)
-    estimation = Estimation(simulator.sensors, parts.now, users)
+    sensor_recorder = SensorRecorder(recorder, parts.places.frame, home)
+    estimation = Estimation(simulator.sensors, parts.now, users, sensor_recorder, simulator.truth)
     estimation.warm_up()
     return SensorAutopilot(parts.autopilot, estimation), estimation
 

@@ -132,7 +132,9 @@ class FileSaver:
     def _sentence(self, error: Exception | None) -> str | None:
         if error is None:
             return None
-        reason = error.strerror if isinstance(error, OSError) else f"{type(error).__name__}: {error}"
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        if not isinstance(error, OSError | ConfigError):
+            reason = f"{type(error).__name__}: {error}"
         return f"{self._failure}: {reason or error}"
 
     def take_error(self) -> str | None:

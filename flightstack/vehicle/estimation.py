@@ -18,6 +18,8 @@ from flightstack.estimation.memory import POSITION_RESET, VELOCITY_RESET, YAW_RE
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed
 from flightstack.estimation.sensor_samples import BaroSample, ImuSample
+from flightstack.estimation.snapshot import snapshot
+from flightstack.flight_log.sensor_recorder import SensorRecorder
 from flightstack.guidance.navigator import Navigator
 from flightstack.simulator_link.sensor_inbox import SensorInbox
 from flightstack.vehicle.area import FlightArea
@@ -47,20 +49,27 @@ class Estimation:
     estimate without a movement of the vehicle.
     """
 
-    def __init__(self, sensors: SensorInbox, now: FlightState, users: Users) -> None:
-        """``now.state`` is written in place."""
+    def __init__(
+        self,
+        sensors: SensorInbox,
+        now: FlightState,
+        users: Users,
+        recorder: SensorRecorder,
+        truth: FloatArray,
+    ) -> None:
+        """``now.state`` is written in place. ``truth`` is the simulator's state, which only ``recorder`` reads."""
         self.estimator = Estimator()
         self.health = NO_HEALTH
         """Newest health of the estimate."""
         self._sensors = sensors
         self._now = now
         self._users = users
-        self._feed = SensorFeed(self.estimator, now.state)
+        self._recorder, self._truth = recorder, truth
+        self._feed = SensorFeed(self.estimator, now.state, recorder.sample)
         self._landed = False
         self._health_due_us = 0
-        self._resets = self.estimator.memory["resets"][
-            0
-        ].data  # a number of an array takes four times as long to read
+        # as memory: a number of an array takes four times as long to read
+        self._resets = self.estimator.memory["resets"][0].data
         self._seen = (0.0, 0.0, 0.0)
 
     @property
@@ -80,13 +89,17 @@ class Estimation:
         estimator.baro(BaroSample(0.0, math.nan, math.nan, math.nan))
         estimator.set_earth_field(_NO_CHANGE)
 
+    def _snapshot(self) -> bytes:
+        return snapshot(self.estimator)
+
     def is_ready(self) -> bool:
         """Return True if the vehicle may take off on the estimate."""
         return self._now.has_state and not estimate_refusals(self.health)
 
-    def update(self) -> None:
-        """Take the measurements since the last call; once per tick."""
+    def update(self, time_us: int) -> None:
+        """Take the measurements since the last call; once per tick, at the time of the tick."""
         now, resets = self._now, self._resets
+        self._recorder.begin(self._snapshot)
         if now.landed is not self._landed:
             self._landed = now.landed
             self.estimator.set_landed(now.landed)
@@ -94,6 +107,7 @@ class Estimation:
         is_known = self._feed.update(reports)
         if is_known and not now.has_state:
             self._find_origin()
+        self._recorder.state(time_us, self._truth, self.sensed())
         if (resets[POSITION_RESET], resets[VELOCITY_RESET], resets[YAW_RESET]) != self._seen:
             self._follow_resets()
         if reports and reports[-1].time_us >= self._health_due_us:
@@ -149,5 +163,5 @@ class SensorAutopilot:
 
     def tick(self, time_us: int) -> FloatArray:
         """Estimate the state and run one inner tick; return the rotor speed commands [rad/s], shape (8,)."""
-        self._estimation.update()
+        self._estimation.update(time_us)
         return self._autopilot.tick(time_us)

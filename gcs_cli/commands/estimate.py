@@ -59,7 +59,8 @@ def estimate(
         check_new(page, overwrite)
     recording = read_log(log)
     replaced = _replaced(param or ())
-    recording = replace(recording, parameters={**recording.parameters, **replaced})
+    if replaced:
+        recording = replace(recording, parameters={**recording.parameters, **replaced}, info=recording.facts)
     result = estimate_log(recording)
     if page is not None:
         write_text_atomically(page, render(result, recording))

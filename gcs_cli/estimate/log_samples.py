@@ -30,6 +30,9 @@ class Landed(NamedTuple):
     is_landed: bool
 
 
+_ORDER: dict[type, int] = {ImuSample: 1, Landed: 2}
+"""At equal times, measurements precede the IMU, whose step may fuse them, and the land detector, which reads the state,
+comes last."""
 READ_PARAMETERS = (
     "EKF2_GPS_DELAY", "EKF2_MAG_DELAY", "EKF2_BARO_DELAY", "EKF2_RNG_DELAY", "EKF2_MAG_DECL",
     "EKF2_REQ_EPH", "EKF2_REQ_EPV", "EKF2_REQ_SACC", "EKF2_REQ_NSATS",
@@ -42,6 +45,8 @@ _IN_AIR_BIT = 1 << 7
 """``estimator_status.control_mode_flags`` of PX4."""
 _HORIZON_MARGIN_S = 0.012
 _LONGEST_IMU_STEP_S = 0.1
+_ROUNDING_S = 1e-7
+"""Difference of two times that is one of their rounding: the stated step is exact."""
 
 
 def topic_of(log: Recording, *names: str) -> Topic | None:
@@ -70,8 +75,7 @@ def samples_of(log: Recording) -> list[Sample | Landed]:
     found += _gnss_samples(log)
     found += _range_samples(log)
     found += _landed(log)
-    # at equal times, measurements precede the IMU, whose step may fuse them
-    return sorted(found, key=lambda sample: (sample.time_s, isinstance(sample, ImuSample)))
+    return sorted(found, key=lambda sample: (sample.time_s, _ORDER.get(type(sample), 0)))
 
 
 def params_of(log: Recording) -> tuple[EstimatorParams, GnssLimits, float]:
@@ -119,6 +123,9 @@ def _imu_samples(topic: Topic) -> Iterator[ImuSample]:
     if gyro is None or accel is None:
         raise CliError("sensor_combined: the log lacks gyro_rad or accelerometer_m_s2")
     steps = np.diff(times, prepend=times[0] - np.median(np.diff(times)))
+    if (stated := topic.fields.get("gyro_integral_dt")) is not None:
+        stated_s = stated.astype(np.float64) * 1e-6
+        steps = np.where(np.abs(steps - stated_s) < _ROUNDING_S, stated_s, steps)
     rows = zip(times.tolist(), steps.tolist(), gyro.tolist(), accel.tolist(), strict=True)
     for time_s, dt_s, rate, force in rows:
         if dt_s > 0.0 and all(map(math.isfinite, (*rate, *force))):

@@ -112,7 +112,7 @@ class MultibodyPlant(RecordPlant):
         """Set the fixed integration step [s]."""
         super().set_step(step_s)
         self._model.opt.timestep = step_s
-        self._model.geom_solref[:] = contact_solref(self._vehicle, step_s)
+        self._model.pair_solref[:] = contact_solref(self._vehicle, step_s)
         self._rest_depth_m = self._find_rest_depth_m()
         self._drive[0]["sink"] = self._rest_depth_m
 

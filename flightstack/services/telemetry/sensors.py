@@ -71,7 +71,7 @@ def _ms(time_s: float) -> int:
 
 def highres_imu(_f: VehicleStatus, sensed: Sensed) -> tuple[Message, ...]:
     """HIGHRES_IMU: the newest measurements less the estimated biases; none before the first measurement."""
-    samples, bias = sensed.samples, sensed.report.nominal
+    samples, bias = sensed.samples, sensed.nominal
     imu, mag, baro = samples.imu, samples.mag or _NO_MAG, samples.baro or _NO_BARO
     if imu is None:
         return ()
@@ -120,7 +120,7 @@ def scaled_pressure(_f: VehicleStatus, sensed: Sensed) -> tuple[Message, ...]:
 
 def gps_raw(_f: VehicleStatus, sensed: Sensed) -> tuple[Message, ...]:
     """GPS_RAW_INT as the receiver reports it, also while the estimator refuses its measurements."""
-    gnss, now_s = sensed.samples.gnss, sensed.report.time_s
+    gnss, now_s = sensed.samples.gnss, sensed.time_s
     if gnss is None or now_s - gnss.time_s > GNSS_SILENT_S:
         return (GPS_RAW_INT(_us(now_s), mavlink.GPS_FIX_TYPE_NO_GPS, 0, 0, 0, *[UNKNOWN_SPEED] * 4, 0),)
     north, east, _ = gnss.velocity_ned_m_s
@@ -194,7 +194,7 @@ def reset_counter(sensed: Sensed) -> int:
 
 def local_position_cov(f: VehicleStatus, sensed: Sensed) -> tuple[Message, ...]:
     """LOCAL_POSITION_NED_COV: position, velocity and acceleration, with their covariance."""
-    imu, bias = sensed.samples.imu, sensed.report.nominal.accel_bias_m_s2
+    imu, bias = sensed.samples.imu, sensed.nominal.accel_bias_m_s2
     if imu is None:
         return ()
     x = f.state
@@ -223,7 +223,7 @@ _Timed: TypeAlias = ImuSample | MagSample | BaroSample | GnssSample | RangeSampl
 
 def sensor_health(sensed: Sensed) -> tuple[int, int]:
     """Return the bits of MAV_SYS_STATUS_SENSOR of the sensors that are present, and of the healthy ones."""
-    samples, now_s = sensed.samples, sensed.report.time_s
+    samples, now_s = sensed.samples, sensed.time_s
     present = healthy = mavlink.MAV_SYS_STATUS_AHRS | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
     if not sensed.report.solution & SolutionFlags.ATTITUDE:
         healthy &= ~mavlink.MAV_SYS_STATUS_AHRS
