@@ -13,6 +13,7 @@ from flightstack.core.earth_field import earth_field_ned_gauss
 from flightstack.core.enums import Severity
 from flightstack.core.portable_math import distance
 from flightstack.estimation.estimator import Estimator
+from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.health import NO_HEALTH, estimate_health
 from flightstack.estimation.memory import POSITION_RESET, VELOCITY_RESET, YAW_RESET
 from flightstack.estimation.sensed import Sensed
@@ -21,6 +22,7 @@ from flightstack.estimation.sensor_samples import BaroSample, ImuSample
 from flightstack.estimation.snapshot import snapshot
 from flightstack.flight_log.sensor_recorder import SensorRecorder
 from flightstack.guidance.navigator import Navigator
+from flightstack.params.vehicle import GRAVITY_M_S2
 from flightstack.simulator_link.sensor_inbox import SensorInbox
 from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.autopilot import Autopilot
@@ -29,6 +31,8 @@ from flightstack.vehicle.journal import Journal
 
 HEALTH_US = 50_000
 """Interval of the health, in the time of the sensors."""
+_PARAMS = EstimatorParams(gravity_m_s2=GRAVITY_M_S2)
+"""The filter and the vehicle's model, which the simulator flies, have the same gravity."""
 _NO_CHANGE = Vector3(0.0, 0.0, 0.0)
 
 
@@ -58,14 +62,14 @@ class Estimation:
         truth: FloatArray,
     ) -> None:
         """``now.state`` is written in place. ``truth`` is the simulator's state, which only ``recorder`` reads."""
-        self.estimator = Estimator()
+        self.estimator = Estimator(_PARAMS)
         self.health = NO_HEALTH
         """Newest health of the estimate."""
         self._sensors = sensors
         self._now = now
         self._users = users
         self._recorder, self._truth = recorder, truth
-        self._feed = SensorFeed(self.estimator, now.state, recorder.sample)
+        self._feed = SensorFeed(self.estimator, now.state, recorder)
         self._landed = False
         self._health_due_us = 0
         # as memory: a number of an array takes four times as long to read
@@ -107,7 +111,7 @@ class Estimation:
         is_known = self._feed.update(reports)
         if is_known and not now.has_state:
             self._find_origin()
-        self._recorder.state(time_us, self._truth, self.sensed())
+        self._recorder.state(time_us, self._truth, self.sensed)
         if (resets[POSITION_RESET], resets[VELOCITY_RESET], resets[YAW_RESET]) != self._seen:
             self._follow_resets()
         if reports and reports[-1].time_us >= self._health_due_us:
