@@ -153,10 +153,13 @@ class Estimation:
         yaw_rad = x[YAW_RESET + 1] if turned else 0.0
         users.navigator.shift(position_m, velocity_m_s, yaw_rad)
         if turned:  # the reference attitude of the loops has the old yaw
-            users.backend.reset(self._now.state)
-            self._now.loops_reset = True
+            self._reset_loops()
         step = f"{distance(*position_m):.1f} m, {distance(*velocity_m_s):.1f} m/s, {math.degrees(yaw_rad):.0f} degrees"
         users.journal.say(Severity.NOTICE, f"Estimate reset by {step}")
+
+    def _reset_loops(self) -> None:
+        self._users.backend.reset(self._now.state)
+        self._now.loops_reset = True
 
     def _update_health(self, time_us: int) -> None:
         now, users = self._now, self._users
@@ -164,7 +167,11 @@ class Estimation:
         record = self.estimator.memory[0]
         self.health = estimate_health(self.health, record, self._feed.newest, now.has_state, time_us * 1e-6)
         users.failsafes.take_health(self.health)
-        users.navigator.set_position_known(users.failsafes.position_is_known)
+        failsafes = users.failsafes
+        changed = users.navigator.set_known(failsafes.position_is_known, failsafes.velocity_is_known)
+        if changed and now.flying:  # reference and integrators hold what followed from the position
+            users.navigator.reset_reference(now.state)
+            self._reset_loops()
 
 
 class SensorAutopilot:
