@@ -73,8 +73,8 @@ class SensorRecorder:
             group, fill = known
             fill(log.sampled[group.name].append(round(sample.time_s * 1e6)), sample)
 
-    def state(self, time_us: int, truth: FloatArray, sensed: Sensed) -> None:
-        """Record the true state, shape (13,), and what the vehicle knows, if they are due."""
+    def state(self, time_us: int, truth: FloatArray, sense: Callable[[], Sensed]) -> None:
+        """Record the true state, shape (13,), and what ``sense`` returns, if they are due."""
         log = self._log
         if log is None or time_us < self._truth_us:
             return
@@ -88,6 +88,7 @@ class SensorRecorder:
             log.sampled[TRUTH_GLOBAL_GROUP.name].append(time_us)[:] = place
         if time_us >= self._estimator_us:
             self._estimator_us = time_us + ESTIMATOR_INTERVAL_US
+            sensed = sense()
             fill_estimator(log.sampled[ESTIMATOR.name].append(time_us), sensed)
             if sensed.report.wind_is_observed:
                 fill_wind(log.sampled[WIND_GROUP.name].append(time_us), sensed)

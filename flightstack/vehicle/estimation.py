@@ -74,7 +74,7 @@ class Estimation:
             self.estimator.set_landed(now.landed)
         if self._feed.update(self._sensors.take()) and not now.has_state:
             self._find_origin()
-        self._recorder.state(time_us, self._truth, self.sensed())
+        self._recorder.state(time_us, self._truth, self.sensed)
 
     def _find_origin(self) -> None:
         frame = self.estimator.frame
