@@ -29,6 +29,11 @@ WATCHED = {
     "ATTITUDE": "roll or pitch beyond `FD_FAIL_R`, `FD_FAIL_P`, or the thrust axis off its reference by `FS_ATT_ERR`",
     "ROTOR": "a measured rotor speed differs from its command by `FS_ROT_ERR` for `FD_ACT_MOT_TOUT`",
     "BATTERY_EMERGENCY": "charge at or below `BAT_EMERGEN_THR`",
+    "IMU_FAULT": "no measurement of the inertial sensor for 0.04 s, or 100 equal ones",
+    "ATTITUDE_DOUBTFUL": "standard deviation of the estimated tilt above `FS_TILT_DEV`",
+    "POSITION_LOST": "dead reckoning for `FS_DEAD_RECK_T`, or standard deviation of the estimated position above "
+    "`COM_POS_FS_EPH`",
+    "GNSS_REFUSED": "positions of GNSS are refused for 1 s",
     "FENCE": "outside the geofence, `GF_MAX_HOR_DIST` or `GF_MAX_VER_DIST`",
     "POSITION_ERROR": "the position differs from its setpoint by `FS_POS_ERR` for `FS_POS_ERR_T`",
     "BATTERY_CRITICAL": "charge at or below `BAT_CRIT_THR`",

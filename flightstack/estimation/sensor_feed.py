@@ -86,6 +86,8 @@ class NewestSamples:
     flow: FlowSample | None = None
     past_imu: deque[ImuSample] = field(default_factory=lambda: deque(maxlen=WINDOW))
     """The last samples of the inertial sensor, of which the vibration is computed."""
+    imu_repeats: int = 0
+    """Number of samples of the inertial sensor whose rates or forces equal those before."""
 
 
 def hil_samples(time_s: float, report: HilReport) -> Iterator[ImuSample | MagSample | BaroSample]:
@@ -169,7 +171,9 @@ class SensorFeed:
     def _take(self, sample: Sample) -> None:
         estimator, newest = self._estimator, self.newest
         if isinstance(sample, ImuSample):
-            newest.imu = sample
+            before, newest.imu = newest.imu, sample
+            repeats = before is not None and (before[2] == sample[2] or before[3] == sample[3])
+            newest.imu_repeats = newest.imu_repeats + 1 if repeats else 0
             newest.past_imu.append(sample)
             estimator.imu(sample)
         elif isinstance(sample, MagSample):

@@ -30,13 +30,15 @@ from flightstack.core.portable_math import sin_cos
 from flightstack.guidance.land_detector import DESCENT_M_S, LandMemory, land_detector_step, lift_share
 from flightstack.guidance.manual import manual_step
 from flightstack.guidance.mission import mission_goal, mission_step, with_landing_descent
-from flightstack.guidance.mode_target import RETURN, advance_return, target_goal
+from flightstack.guidance.mode_target import LAND, RETURN, advance_return, target_goal
 from flightstack.guidance.offboard import attitude_step, point_step
 from flightstack.guidance.params import GuidanceParams
 from flightstack.guidance.setpoints import ATTITUDE
 from flightstack.guidance.trajectory import Trajectory, TrajectoryLimits, setpoint_of, trajectory_step
 from flightstack.params.vehicle import GRAVITY_M_S2
 
+DESCEND = 64
+"""Number of the mode LAND without a position: the vehicle stays level, and drifts with the wind."""
 MISSION, OFFBOARD, POSITION = int(Mode.MISSION), int(Mode.OFFBOARD), int(Mode.POSITION)
 
 TRAJECTORY_SIZE = 11
@@ -62,6 +64,13 @@ def _limit_sink_lead(last: Trajectory, reference: Trajectory, state: VehicleStat
     if t.z <= lowest_m or state.velocity_ned_m_s.z >= 0.5 * t.vz:
         return t
     return Trajectory(t.x, t.y, lowest_m, t.vx, t.vy, t.vz, t.ax, t.ay, t.az, t.yaw_rad, t.yaw_rate_rad_s)
+
+
+@compiled
+def _level(reference: Trajectory, state: VehicleState) -> Trajectory:
+    """Return the reference with the vehicle's horizontal position and velocity, so that it demands no tilt."""
+    t, p, v = reference, state.position_ned_m, state.velocity_ned_m_s
+    return Trajectory(p.x, p.y, t.z, v.x, v.y, t.vz, 0.0, 0.0, t.az, t.yaw_rad, t.yaw_rate_rad_s)
 
 
 @compiled
@@ -182,9 +191,11 @@ def goal_kernel(
     else:
         if mode == RETURN:
             advance_return(a, state, params)
-        goal = target_goal(mode, a, params)
+        goal = target_goal(LAND if mode == DESCEND else mode, a, params)
     goal = with_landing_descent(goal, state.position_ned_m.z, params)
     reference = _limit_sink_lead(last, trajectory_step(last, goal, _limits(params), dt_s), state)
+    if mode == DESCEND:
+        reference = _level(reference, state)
     loop_target = attitude_target(last_target)
     _finish(last, reference, state, trajectory, land, loop_target, params, reference.vz, dt_s, setpoint)
 
