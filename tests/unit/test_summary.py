@@ -35,6 +35,7 @@ REQUIRED = {
     "battery_start_percent", "battery_capacity_mah", "battery_drain", "faults", "ideal_rotors",
     "params", "force_n", "torque_n_m", "param", "outcome_text", "drag_n_s_m", "faults_not_begun", "flight_time_s",
     "rms_attitude_error_deg", "max_attitude_error_deg", "rms_torque_n_m", "rms_rotor_command_rate_rad_s2",
+    "estimate_error",
 }  # fmt: skip
 
 
