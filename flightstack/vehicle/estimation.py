@@ -68,9 +68,8 @@ class Estimation:
         self._feed = SensorFeed(self.estimator, now.state, recorder.sample)
         self._landed = False
         self._health_due_us = 0
-        self._resets = self.estimator.memory["resets"][
-            0
-        ].data  # a number of an array takes four times as long to read
+        # as memory: a number of an array takes four times as long to read
+        self._resets = self.estimator.memory["resets"][0].data
         self._seen = (0.0, 0.0, 0.0)
 
     @property
