@@ -10,9 +10,10 @@ import numpy as np
 from flightstack.core.contract import FloatArray, Quaternion, RecordArray, Vector3, VehicleState
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.portable_math import atan2
-from flightstack.estimation.delayed_filter import IMU_SIZE, field_kernel, imu_kernel, push_kernel
+from flightstack.estimation.delayed_filter import field_kernel, imu_kernel, push_kernel
 from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits
 from flightstack.estimation.fusion import GNSS_SIZE
+from flightstack.estimation.imu_track import IMU_SIZE
 from flightstack.estimation.memory import ALIGNED, LANDED, MEMORY
 from flightstack.estimation.rings import BARO_RING, GNSS_RING, MAG_RING, RANGE_RING
 from flightstack.estimation.sensor_samples import (
@@ -23,6 +24,9 @@ from flightstack.estimation.sensor_samples import (
     MagSample,
     RangeSample,
 )
+
+_STATE_AT = np.array([8, 9, 10, 5, 6, 7, 1, 2, 3, 4, 11, 12, 13])
+"""Places of position, velocity, attitude and rates in the output."""
 
 
 class Estimator:
@@ -39,6 +43,7 @@ class Estimator:
         record["earth"][3] = math.nan
         self.frame: LocalFrame | None = None
         self._record = record
+        self._flags, self._output = record["flags"], record["output"]
         self._imu = np.zeros(IMU_SIZE)
         self._gnss = np.zeros(GNSS_SIZE)
         self._mag = np.zeros(4)
@@ -47,11 +52,11 @@ class Estimator:
     @property
     def aligned(self) -> bool:
         """True if the filter has an attitude."""
-        return bool(self._record["flags"][ALIGNED])
+        return bool(self._flags[ALIGNED])
 
     def set_landed(self, landed: bool) -> None:
         """Tell the filter whether the vehicle stands on the ground."""
-        self._record["flags"][LANDED] = landed
+        self._flags[LANDED] = landed
 
     def set_declination(self, declination_rad: float) -> None:
         """Set the magnetic declination, which holds until the Earth's field is known."""
@@ -69,6 +74,10 @@ class Estimator:
         x[0], x[1] = sample.time_s, sample.dt_s
         x[2:5], x[5:8] = sample.gyro_frd_rad_s, sample.accel_frd_m_s2
         imu_kernel(self.memory, x)
+
+    def imu_row(self, row: FloatArray) -> None:
+        """Take a sample of the IMU in its array form, shape (8,)."""
+        imu_kernel(self.memory, row)
 
     def mag(self, sample: MagSample) -> None:
         """Take a sample of the magnetometer."""
@@ -120,6 +129,10 @@ class Estimator:
         """Return the output at the time of the latest IMU sample."""
         x = self._record["output"].tolist()
         return VehicleState(Vector3(*x[8:11]), Vector3(*x[5:8]), Quaternion(*x[1:5]), Vector3(*x[11:14]))
+
+    def write_state(self, state: FloatArray) -> None:
+        """Write the output at the time of the latest IMU sample in the array form of ``VehicleState``, shape (13,)."""
+        self._output.take(_STATE_AT, None, state, "clip")
 
     def deviations(self) -> FloatArray:
         """Return the standard deviation of each error state, shape (27,)."""

@@ -60,15 +60,15 @@ def estimate_health(
     fused = [row[FUSED_S] for row in rows]
     position_s = min(fused[GNSS_POSITION : GNSS_POSITION + 2])
     velocity_s = min(fused[GNSS_VELOCITY : GNSS_VELOCITY + 2])
-    fix_age_s = _fix_age_s(samples, time_s)
+    fix_age_s, imu = _fix_age_s(samples, time_s), samples.imu
     groups = ((GNSS_VELOCITY, 3), (GNSS_POSITION, 2), (BARO, 1), (MAG, 3))
     ratios = (math.sqrt(max(row[TEST_RATIO] for row in rows[at : at + size])) for at, size in groups)
     means = (mean + SMOOTHING * (new - mean) for mean, new in zip(before[_RATIOS_AT:], ratios, strict=True))
     return EstimateHealth(
         bool(memory["flags"][ALIGNED]),
         has_origin,
-        math.inf if samples.imu is None else time_s - samples.imu.time_s,
-        samples.imu_repeats >= STUCK_SAMPLES,
+        math.inf if imu is None else time_s - imu.time_s,
+        samples.imu_track.repeats >= STUCK_SAMPLES,
         math.inf if samples.mag is None else time_s - samples.mag.time_s,
         math.inf if samples.baro is None else time_s - samples.baro.time_s,
         fix_age_s,

@@ -65,7 +65,7 @@ class Estimation:
         self._now = now
         self._users = users
         self._recorder, self._truth = recorder, truth
-        self._feed = SensorFeed(self.estimator, now.state, recorder.sample)
+        self._feed = SensorFeed(self.estimator, now.state, recorder)
         self._landed = False
         self._health_due_us = 0
         # as memory: a number of an array takes four times as long to read
