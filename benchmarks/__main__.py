@@ -23,10 +23,22 @@ from benchmarks import (
     step_costs,
     three_processes,
     transfers,
+    watching,
 )
 from benchmarks.measure import OtherLoad
 
-SECTIONS = ("steps", "flights", "emulated", "multibody", "realtime", "load", "transfers", "start", "startup")
+SECTIONS = (
+    "steps",
+    "flights",
+    "emulated",
+    "multibody",
+    "realtime",
+    "load",
+    "transfers",
+    "start",
+    "startup",
+    "watch",
+)
 
 
 def _arguments() -> argparse.Namespace:
@@ -90,6 +102,10 @@ def main() -> int:
         )
     if "startup" in wanted:
         results["startup"] = _measured("commands of gcs", lambda: startup.startup(3 if quick else 20))
+    if "watch" in wanted:
+        results["watch"] = _measured(
+            "the screens of gcs watch", lambda: watching.watching(*((1, 3.0) if quick else (3, 10.0)))
+        )
     machine = {
         "system": f"{platform.system()} {platform.machine()}",
         "cores": os.cpu_count(),
