@@ -40,6 +40,9 @@ SECTIONS = (
     "watch",
 )
 
+_LONG = ("watch",)
+"""Sections that run only if selected."""
+
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
@@ -57,7 +60,7 @@ def _measured(name: str, measure: Callable[[], Any]) -> Any:
 def main() -> int:
     """Measure and print; return the exit code."""
     arguments = _arguments()
-    wanted = arguments.only or SECTIONS
+    wanted = arguments.only or [section for section in SECTIONS if section not in _LONG]
     quick = arguments.quick
     rounds, seconds = (2, 0.01) if quick else (7, 0.05)
     load = OtherLoad()
