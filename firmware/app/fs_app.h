@@ -87,7 +87,7 @@ typedef struct {
 /* Free-running; see fs_app_free.c. */
 typedef struct {
     uint16_t is_on, is_flying;
-    uint16_t has_time; /* the microseconds of fs_app_run have changed */
+    uint16_t has_reading, has_time; /* fs_app_run was called; its microseconds have changed since */
     uint16_t is_begun; /* a deadline is set */
     uint16_t is_reset; /* the next tick resets the loops */
     uint16_t is_new;   /* no tick has used the state yet */

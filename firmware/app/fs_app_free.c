@@ -251,9 +251,10 @@ void fs_app_run(fs_app *app, uint32_t now_us)
     fs_free *run = &app->free_run;
     uint32_t late_us, missed;
 
-    if (now_us != run->now_us) {
+    if ((run->has_reading != 0U) && (now_us != run->now_us)) {
         run->has_time = 1U;
     }
+    run->has_reading = 1U;
     run->now_us = now_us;
     if (run->is_on == 0U) {
         return;

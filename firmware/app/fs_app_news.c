@@ -56,6 +56,7 @@ uint16_t fs_app_send_status(fs_app *app, uint16_t reserve)
     message.stack_size = app->port->stack_size;
     message.stack_high_water = (app->port->stack_high_water != NULL) ? app->port->stack_high_water() : 0UL;
     message.state = app->state;
+    message.time_us = app->free_run.now_us;
     length = fs_pil_status_encode(&message, app->payload);
     return fs_outbox_put(&app->outbox, FS_PIL_STATUS_ID, app->payload, length, reserve);
 }

@@ -379,6 +379,7 @@ uint16_t fs_pil_status_encode(const fs_pil_status *m, fs_octet *payload)
     fs_put_u32(&payload[48], m->stack_size);
     fs_put_u32(&payload[52], m->stack_high_water);
     fs_put_octet(&payload[56], m->state);
+    fs_put_u32(&payload[57], m->time_us);
     return fs_trimmed(payload, FS_PIL_STATUS_LENGTH);
 }
 
@@ -399,6 +400,7 @@ void fs_pil_status_decode(const fs_octet *payload, uint16_t length, fs_pil_statu
     m->stack_size = fs_get_u32(payload, length, 48U);
     m->stack_high_water = fs_get_u32(payload, length, 52U);
     m->state = fs_get_octet(payload, length, 56U);
+    m->time_us = fs_get_u32(payload, length, 57U);
 }
 
 uint16_t fs_pil_identity_encode(const fs_pil_identity *m, fs_octet *payload)

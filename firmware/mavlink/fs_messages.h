@@ -204,7 +204,7 @@ void fs_pil_report_decode(const fs_octet *payload, uint16_t length, fs_pil_repor
 
 /* FS_PIL_STATUS */
 #define FS_PIL_STATUS_ID 53012U
-#define FS_PIL_STATUS_LENGTH 57U
+#define FS_PIL_STATUS_LENGTH 61U
 typedef struct {
     uint32_t time_boot_ms; /* ms */
     uint32_t steps;
@@ -221,6 +221,7 @@ typedef struct {
     uint32_t stack_size;
     uint32_t stack_high_water;
     fs_octet state;
+    uint32_t time_us; /* us */
 } fs_pil_status;
 uint16_t fs_pil_status_encode(const fs_pil_status *m, fs_octet *payload);
 void fs_pil_status_decode(const fs_octet *payload, uint16_t length, fs_pil_status *m);

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import re
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from flightstack.core.kernel_cache import is_own
+from flightstack.control.law_sources import LawSources, law_sources
 from flightstack.params.toml_file import Table
 from flightstack.params.tunable import Tunable
 from flightstack.params.vehicle import Vehicle
@@ -53,18 +52,23 @@ class ControlLaw(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Name and source hash, so that a change of the law invalidates its cached kernel."""
-        digest = hashlib.sha256()
-        for source in self.sources:
+        """Name and hash of sources and constants, so that a change of the law invalidates its cached kernel."""
+        used = self._used
+        digest = hashlib.sha256("\n".join(used.constants).encode())
+        for source in used.files:
             digest.update(source.read_bytes())
         return f"{re.sub(r'[^0-9A-Za-z]', '_', self.name)}_{digest.hexdigest()[:12]}"
 
     @property
     def sources(self) -> list[Path]:
-        """The source files of the law."""
+        """The source files of the law and of the functions that it calls, but for those of this project."""
+        return self._used.files
+
+    @property
+    def _used(self) -> LawSources:
         if isinstance(self.step, CStep):
-            return [self.step.header, *self.step.sources]
-        return _sources(self.step.__module__)
+            return LawSources([self.step.header, *self.step.sources], [])
+        return law_sources(self.step, (self.memory_type, self.params_type))
 
 
 class NoMemory(NamedTuple):
@@ -88,14 +92,3 @@ def c_law(
 ) -> ControlLaw:
     """Return a law written in C; see ``CStep`` and ``ControlLaw``."""
     return ControlLaw(name, step, NoMemory, params_type, (0.0,), read_params, tunables)
-
-
-def _sources(module_name: str) -> list[Path]:
-    """Return the module's file and, in a package, all files of its directory tree, which the law may use."""
-    module = sys.modules[module_name]
-    if module.__file__ is None:
-        return []
-    path = Path(module.__file__)
-    if not module.__package__ or is_own(module_name):  # the key of the cache directory covers its imports
-        return [path]
-    return sorted(path.parent.rglob("*.py"))

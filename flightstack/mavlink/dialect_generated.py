@@ -204,6 +204,7 @@ LAYOUTS = (
             Field("stack_size", "I", 1, False, "uint32_t", "", 12),
             Field("stack_high_water", "I", 1, False, "uint32_t", "", 13),
             Field("state", "B", 1, False, "uint8_t", "", 14),
+            Field("time_us", "I", 1, False, "uint32_t", "us", 15, True),
         ),
     ),
     Layout(

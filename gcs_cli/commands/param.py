@@ -237,7 +237,8 @@ def load(
 ) -> None:
     """Set the parameters that a file has; the others stay as they are.
 
-    If the vehicle is armed, asks first on a terminal; elsewhere it needs --yes.
+    The order in the file does not matter. If the vehicle refuses a value, none is changed; parameters that it does not
+    have are named and left out. If the vehicle is armed, asks first on a terminal; elsewhere it needs --yes.
     """
     wanted = load_parameters(file)
     with connect_vehicle(context, link) as connection:
@@ -249,8 +250,10 @@ def load(
     output_of(context, link).say("loaded", sentence, file=str(file), changed=changed, parameters=len(wanted))
     for failure in result.failures:
         typer.echo(f"gcs: {failure}", err=True)
+    if result.is_undone:
+        raise CliError(f"no parameter of {file} was set")
     if result.failures:
-        raise CliError(f"{len(result.failures)} parameters of {file} were not set")
+        raise CliError(f"{len(result.failures)} of {len(wanted)} parameters of {file} were not set")
 
 
 @app.command()
@@ -288,13 +291,19 @@ def diff(
 
 def _reset_some(connection: Connection, names: Iterable[str], output: Output) -> None:
     infos = param_calls.fetch_metadata(connection)
+    before, defaults = dict[str, Parameter](), dict[str, float]()
     for name in names:
-        before = _fetch(connection, name)
-        info = infos.get(name, UNKNOWN)
-        if info.default is None:
+        before[name] = _fetch(connection, name)
+        default = infos.get(name, UNKNOWN).default
+        if default is None:
             raise CliError(f"{name}: the vehicle does not send its default: use `gcs param set {name} VALUE`")
-        after = param_calls.change(connection, name, info.default)
-        _say_change(output, before, after, infos)
+        defaults[name] = default
+    result = param_calls.change_all(connection, defaults, before)
+    if result.failures:
+        raise CliError(result.failures[0])
+    after = before | {parameter.name: parameter for parameter in result.changed}
+    for name in before:
+        _say_change(output, before[name], after[name], infos)
 
 
 def _show(

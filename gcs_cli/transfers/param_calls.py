@@ -27,6 +27,8 @@ class Changes(NamedTuple):
     changed: tuple[Parameter, ...]
     failures: tuple[str, ...]
     """The reasons of those that were not set."""
+    is_undone: bool = False
+    """True if a refused parameter has undone the change of the others."""
 
 
 def fetch_all(connection: Connection, show: Progress | None = None) -> tuple[Parameter, ...]:
@@ -70,29 +72,46 @@ def change_all(
     present: Mapping[str, Parameter],
     show: Progress | None = None,
 ) -> Changes:
-    """Set the parameters that differ from ``present``.
+    """Set the parameters that differ from ``present``: all that the vehicle has, or none if it refuses one.
 
     Raise CliError if the vehicle does not answer, or if another one is selected meanwhile.
     """
-    session = connection.session
-    changed: list[Parameter] = []
-    failures: list[str] = []
-    for number, (name, value) in enumerate(wanted.items(), 1):
-        if show is not None:
-            show(number, len(wanted))
-        if connection.session is not session:
-            raise CliError(f"{name}: vehicle {session.target[0]} is no longer selected")
-        if name in present and number_text(present[name].value) == number_text(value):
-            continue
-        try:
-            if name not in present:
-                raise CliError(f"{name}: the vehicle has no such parameter")
-            changed.append(change(connection, name, value))
-        except CliError as error:
-            if error.exit_code != FAILED:
-                raise
-            failures.append(str(error))
-    return Changes(tuple(changed), tuple(failures))
+    unknown = [f"{name}: the vehicle has no such parameter" for name in wanted if name not in present]
+    different = {
+        name: value
+        for name, value in wanted.items()
+        if name in present and number_text(present[name].value) != number_text(value)
+    }
+    changed, refused = _change_in_any_order(connection, different, show)
+    if not refused:
+        return Changes(tuple(changed), tuple(unknown))
+    before = {parameter.name: present[parameter.name].value for parameter in changed}
+    _, kept = _change_in_any_order(connection, before, None)
+    return Changes((), (*unknown, *refused, *kept), is_undone=True)
+
+
+def _change_in_any_order(
+    connection: Connection, wanted: Mapping[str, float], show: Progress | None
+) -> tuple[list[Parameter], list[str]]:
+    """Set parameters, refused ones again after the others, which may limit them; return changes and refusals."""
+    session, left = connection.session, dict(wanted)
+    changed = list[Parameter]()
+    while True:
+        refused = dict[str, str]()
+        for name, value in left.items():
+            if show is not None:
+                show(len(changed) + len(refused) + 1, len(wanted))
+            if connection.session is not session:
+                raise CliError(f"{name}: vehicle {session.target[0]} is no longer selected")
+            try:
+                changed.append(change(connection, name, value))
+            except CliError as error:
+                if error.exit_code != FAILED:
+                    raise
+                refused[name] = str(error)
+        if len(refused) in (0, len(left)):
+            return changed, list(refused.values())
+        left = {name: wanted[name] for name in refused}
 
 
 def fetch_metadata(connection: Connection) -> dict[str, ParamInfo]:

@@ -16,6 +16,7 @@ C = Path(__file__).parent / "c"
 FAULTS = (
     "SMALL_RING", "NO_TIME", "SLOW_TIME", "FAST_TIME", "TIME_RUNS_BACK", "NO_CYCLES", "CYCLES_COUNT_DOWN",
     "SEVEN_BITS", "XON_XOFF", "NEW_LINES", "DROPS_SENT", "ECHO", "STACK_FULL", "WAS_WATCHDOG", "NOISE",
+    "NO_US", "US_STAND_STILL", "US_SLOW", "US_RUN_BACK", "US_WRAP_EARLY", "US_WRAP",
 )  # fmt: skip
 """Faults of bare_bench.c, counted from 1."""
 

@@ -59,13 +59,14 @@ def free_run(target: Target, *values: float) -> int:
     return int(next(answer.result for answer in answers if answer.get_type() == "COMMAND_ACK"))
 
 
-def test_microseconds_that_stand_still_are_unsupported() -> None:
+@pytest.mark.parametrize("stuck_us", [0, 1, -1])
+def test_microseconds_that_stand_still_are_unsupported(stuck_us: int) -> None:
     target = Target()
     for _ in range(3):
         target.poll(1)
-        target.run(0)
+        target.run(stuck_us)
     assert free_run(target, 1, 1) == mavlink.MAV_RESULT_UNSUPPORTED
-    target.run(1)
+    target.run(stuck_us + 1)
     assert free_run(target, 1, 1) == ACCEPTED
     target.close()
 

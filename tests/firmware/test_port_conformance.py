@@ -11,6 +11,7 @@ import pytest
 from gcs_cli.errors import DONE, NO_ANSWER, USAGE
 from gcs_cli.pil.conformance.check import FAILED, NOT_CHECKED, PASSED, Check
 from gcs_cli.pil.conformance.run import conformance
+from gcs_cli.pil.conformance.time_checks import Sample, microseconds
 from tests.firmware.bare_support import FAULTS, BareLink
 from tests.firmware.static_support import FIRMWARE, INCLUDES, LANGUAGE, TARGETS, WARNINGS, ZIG, available, run
 from tests.support.commands import gcs
@@ -28,8 +29,8 @@ NAMES = [
         "cut frames",
         "time base",
     ),
-    *("heartbeats", "parameter list", "parameter read-back", "loops", "subnormal numbers", "cost counter"),
-    *("safe state", "stack", "losses"),
+    *("microseconds", "heartbeats", "parameter list", "parameter read-back", "loops", "subnormal numbers"),
+    *("cost counter", "safe state", "stack", "losses"),
 ]
 
 
@@ -68,6 +69,10 @@ PLANTED = {
     "ECHO": {"losses"},
     "STACK_FULL": {"stack"},
     "NOISE": {"hello"},
+    "US_STAND_STILL": {"microseconds"},
+    "US_SLOW": {"microseconds"},
+    "US_RUN_BACK": {"microseconds"},
+    "US_WRAP_EARLY": {"microseconds"},
 }
 
 
@@ -79,11 +84,38 @@ def test_each_planted_fault_fails_with_advice(fault: str) -> None:
 
 
 def test_every_planted_fault_is_in_the_table() -> None:
-    assert {*PLANTED, "WAS_WATCHDOG"} == set(FAULTS)
+    assert {*PLANTED, "WAS_WATCHDOG", "NO_US", "US_WRAP"} == set(FAULTS)
 
 
 def test_a_restart_by_the_watchdog_is_recognised() -> None:
     assert checks("WAS_WATCHDOG")["watchdog"].result == PASSED
+
+
+def test_microseconds_that_wrap_after_71_minutes_pass() -> None:
+    found = checks("US_WRAP")
+    assert not failed(found), found
+
+
+def test_a_port_without_microseconds_is_not_checked_for_them() -> None:
+    assert checks("NO_US")["microseconds"].result == NOT_CHECKED
+
+
+@pytest.mark.parametrize(
+    ("uptime_ms", "offset_us", "result"),
+    [
+        (3_600_000, 0, PASSED),
+        (30_000, -(2**32 // 168), FAILED),  # a counter of 168 MHz, divided by 168, has wrapped once
+        (3_600_000, -140 * (2**32 // 168), FAILED),
+        (5_000_000, 0, PASSED),  # beyond the wrap
+        (900_000_000, 123_456_789, PASSED),  # ten days: clocks within 2 % may be anywhere
+    ],
+)
+def test_an_early_wrap_before_the_check_is_recognised(uptime_ms: int, offset_us: int, result: str) -> None:
+    samples = [
+        Sample(at_ms / 1e3, 0.001, uptime_ms + at_ms, (1000 * (uptime_ms + at_ms) + offset_us) % 2**32)
+        for at_ms in range(0, 3200, 400)
+    ]
+    assert microseconds(samples).result == result
 
 
 @pytest.mark.parametrize(

@@ -136,6 +136,57 @@ def test_an_edit_is_noticed(site: Path) -> None:
         sys.modules.pop(name, None)
 
 
+HELPERS = {
+    "beside.py": """from pathlib import Path
+from numba import njit
+import beside_too
+def limited(x): return min(x, beside_too.LIMIT) + WEIGHTS[0]
+SCALE = 1.0
+WEIGHTS = (float(Path(__file__).with_name("weight.txt").read_text()),)
+@njit
+def scaled(x): return SCALE * limited(x)
+""",
+    "beside_too.py": "LIMIT = 5.0\n",
+    "weight.txt": "0.25",
+}
+"""A module beside a law, another one that it uses, and a file that it reads."""
+HELPED = MODULE.replace(
+    "from __future__ import annotations\n", "from __future__ import annotations\nimport beside\n"
+).replace("return memory, ", "beside.scaled(dt_s)\n    return memory, ")
+
+
+@pytest.mark.parametrize(
+    ("name", "before", "after"),
+    [
+        ("beside.py", "SCALE = 1.0", "SCALE = 2.0"),
+        ("beside.py", "min(x,", "max(x,"),
+        ("beside_too.py", "LIMIT = 5.0", "LIMIT = 6.0"),
+        ("weight.txt", "0.25", "0.26"),
+    ],
+)
+def test_an_edit_of_a_module_beside_the_law_is_noticed(
+    site: Path, name: str, before: str, after: str
+) -> None:
+    assert "beside.scaled" in HELPED
+
+    def key() -> str:
+        importlib.invalidate_caches()
+        for module in ("lqr_controller", "beside", "beside_too"):
+            sys.modules.pop(module, None)
+        return load_controller("lqr").attitude.key
+
+    install(site)
+    for file, text in {**HELPERS, "lqr_controller.py": HELPED}.items():
+        (site / file).write_text(text)
+    first = key()
+    assert key() == first
+    (site / "neighbour.py").write_text("X = 1\n")
+    assert key() == first
+    (site / name).write_text(HELPERS[name].replace(before, after))
+    os.utime(site / name, (1e9, 1e9))  # the same size: bytecode is stale by its time
+    assert key() != first
+
+
 # ---------------------------------------------------------------------- its parameters
 
 

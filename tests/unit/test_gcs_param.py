@@ -4,16 +4,37 @@ from __future__ import annotations
 
 import json
 import time
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.signing import timestamp_of
 from gcs_cli.clients.param_client import ParamTiming
-from gcs_cli.vehicle.param_info import load_parameters
+from gcs_cli.vehicle.param_info import UNKNOWN, load_parameters
 from tests.support.commands import Ended, gcs
 from tests.support.fake_vehicle import serve
 from tests.support.param_vehicle import ParamVehicle
+
+PAIR = ("MPC_THR_LEAST", "MPC_THR_MOST")
+
+
+@dataclass
+class PairVehicle(ParamVehicle):
+    """Keeps one parameter below another."""
+
+    has_metadata: bool = False
+    values: dict[str, float] = field(default_factory=lambda: {"MPC_THR_LEAST": 10.0, "MPC_THR_MOST": 20.0})
+
+    def _on_param_set(self, message: Any) -> None:
+        wanted = {**self.values, message.param_id: message.param_value}
+        if wanted["MPC_THR_LEAST"] <= wanted["MPC_THR_MOST"]:
+            self.values = wanted
+        else:
+            self._out.append(mavlink.MAVLink_param_error_message(255, 190, message.param_id.encode(), -1, 2))
+        self._send_value(message.param_id)
 
 
 @pytest.fixture
@@ -181,6 +202,18 @@ def test_reset_of_some(vehicle: ParamVehicle) -> None:
     assert (vehicle.values["MPC_XY_CRUISE"], vehicle.values["MPC_YAW_MODE"]) == (4.0, 5)
 
 
+@pytest.mark.parametrize("names", [PAIR, PAIR[::-1]])
+def test_parameters_that_limit_each_other_reset_in_any_order(
+    names: tuple[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    infos = {name: UNKNOWN._replace(default=default) for name, default in zip(PAIR, (1.0, 2.0), strict=True)}
+    monkeypatch.setattr("gcs_cli.transfers.param_calls.fetch_metadata", lambda _connection: infos)
+    vehicle = PairVehicle()
+    result = told(vehicle, "reset", *names)
+    assert (result.stderr, result.returncode) == ("", 0)
+    assert vehicle.values == {"MPC_THR_LEAST": 1.0, "MPC_THR_MOST": 2.0}
+
+
 def test_reset_of_all(vehicle: ParamVehicle) -> None:
     vehicle.values.update(MPC_XY_CRUISE=9.0, MPC_YAW_MODE=5)
     assert told(vehicle, "reset", "--all").stdout == "all parameters have their defaults\n"
@@ -220,18 +253,59 @@ def test_what_was_saved_is_loaded(vehicle: ParamVehicle, tmp_path: Path) -> None
     assert told(other, "load", file).stdout == "0 of 3 parameters changed\n"
 
 
-def test_what_cannot_be_loaded_is_named_and_the_rest_is_loaded(vehicle: ParamVehicle, tmp_path: Path) -> None:
-    file = tmp_path / "other.params"
-    file.write_text("1\t1\tFOREIGN\t1\t9\n1\t1\tMPC_XY_CRUISE\t99\t9\n1\t1\tMPC_YAW_MODE\t5\t6\n")
+def written(folder: Path, **values: float) -> Path:
+    """Write a parameter file."""
+    file = folder / "other.params"
+    kinds = {"MPC_YAW_MODE": 6}
+    file.write_text(
+        "".join(f"1\t1\t{name}\t{value:g}\t{kinds.get(name, 9)}\n" for name, value in values.items())
+    )
+    return file
+
+
+def test_unknown_parameters_are_named_and_the_rest_is_loaded(vehicle: ParamVehicle, tmp_path: Path) -> None:
+    file = written(tmp_path, FOREIGN=1, MPC_YAW_MODE=5)
     result = told(vehicle, "load", file)
-    assert result.returncode == 1
-    assert result.stdout == "1 of 3 parameters changed\n"
+    assert (result.returncode, result.stdout) == (1, "1 of 2 parameters changed\n")
+    assert result.stderr.splitlines() == [
+        "gcs: FOREIGN: the vehicle has no such parameter",
+        f"gcs: 1 of 2 parameters of {file} were not set",
+    ]
+    assert vehicle.values["MPC_YAW_MODE"] == 5
+
+
+def test_a_refused_value_undoes_the_load(vehicle: ParamVehicle, tmp_path: Path) -> None:
+    before = dict(vehicle.values)
+    file = written(tmp_path, FOREIGN=1, MPC_YAW_MODE=5, MPC_XY_CRUISE=99, ROLL_P=0.5)
+    result = told(vehicle, "load", file)
+    assert (result.returncode, result.stdout) == (1, "0 of 4 parameters changed\n")
     assert result.stderr.splitlines() == [
         "gcs: FOREIGN: the vehicle has no such parameter",
         "gcs: MPC_XY_CRUISE = 99 refused: 99 is outside 0.1 to 20",
-        f"gcs: 2 parameters of {file} were not set",
+        f"gcs: no parameter of {file} was set",
     ]
-    assert vehicle.values["MPC_YAW_MODE"] == 5
+    assert vehicle.values == before
+
+
+@pytest.mark.parametrize("names", [PAIR, PAIR[::-1]])
+@pytest.mark.parametrize("values", [(30.0, 40.0), (1.0, 2.0)])
+def test_parameters_that_limit_each_other_load_in_any_order(
+    names: tuple[str, str], values: tuple[float, float], tmp_path: Path
+) -> None:
+    vehicle = PairVehicle()
+    wanted = dict(zip(PAIR, values, strict=True))
+    file = written(tmp_path, **{name: wanted[name] for name in names})
+    result = told(vehicle, "load", file)
+    assert (result.stderr, result.returncode) == ("", 0)
+    assert result.stdout == "2 of 2 parameters changed\n"
+    assert vehicle.values == wanted
+
+
+def test_a_crossed_pair_is_refused_and_undone(tmp_path: Path) -> None:
+    vehicle = PairVehicle()
+    result = told(vehicle, "load", written(tmp_path, MPC_THR_LEAST=15.0, MPC_THR_MOST=12.0))
+    assert result.returncode == 1
+    assert vehicle.values == {"MPC_THR_LEAST": 10.0, "MPC_THR_MOST": 20.0}
 
 
 def test_diff_from_the_defaults(vehicle: ParamVehicle) -> None:

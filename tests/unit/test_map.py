@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from flightstack.core.contract import Vector3
 from flightstack.mavlink.dialect import mavlink
 from flightstack.plan import Command, FenceCommand, Plan
+from gcs_cli.charts.canvas import rows_of_text
 from gcs_cli.tui.fly.history import History
 from gcs_cli.tui.map.drawing import distance_text, draw_map, place_text
 from gcs_cli.tui.map.model import MapModel
@@ -28,7 +29,6 @@ from gcs_cli.tui.map.scene import (
 )
 from gcs_cli.tui.map.viewport import LARGEST_M_PER_DOT, SMALLEST_M_PER_DOT, Viewport, round_step
 from gcs_cli.tui.palette import DARK
-from gcs_cli.tui.widgets.canvas import rows_of_text
 from gcs_cli.vehicle.view_types import GeoPosition, Identity, Setpoint, Vector
 from tests.support.map_views import FRAME, VIEW, item
 from tests.support.telemetry_frames import received

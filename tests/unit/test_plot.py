@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flightstack.mavlink.dialect import mavlink
+from gcs_cli.charts.canvas import rows_of_text
 from gcs_cli.tui.fly.history import History
 from gcs_cli.tui.palette import DARK
 from gcs_cli.tui.plot.drawing import (
@@ -27,7 +28,6 @@ from gcs_cli.tui.plot.drawing import (
     value_text,
 )
 from gcs_cli.tui.plot.fields import FIRST_FIELDS, MOST_FIELDS, PlotFields, field_choices, value_note
-from gcs_cli.tui.widgets.canvas import rows_of_text
 from gcs_cli.tui.widgets.fuzzy import search
 from gcs_cli.vehicle.field_units import enum_text, field_unit, shown_unit, shown_values
 from tests.support.telemetry_frames import attitude, received

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gcs_cli.tui.widgets.canvas import DASHED, Canvas, circle_vertices, rows_of_text
+from gcs_cli.charts.canvas import DASHED, Canvas, circle_vertices, rows_of_text
 
 pytestmark = pytest.mark.unit
 

@@ -11,6 +11,7 @@ import pytest
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Link
+from flightstack.mavlink.param_values import Parameter
 from flightstack.transports.udp import UdpSocket
 from gcs_cli.actions import in_flight, on_vehicle
 from gcs_cli.clients.param_client import ParamClient
@@ -148,7 +149,7 @@ def test_transfer_stays_on_its_vehicle_if_the_selection_moves() -> None:
             assert first._service is None
             connection.fleet.selection = (None, first)
             with pytest.raises(CliError, match="vehicle 1 is no longer selected"):
-                change_all(connection, {"NONE": 1.0}, {}, move)
+                change_all(connection, {"NONE": 1.0}, {"NONE": Parameter("NONE", 0.0, False, 0, 1)}, move)
 
         feed.submit(job).result()
 

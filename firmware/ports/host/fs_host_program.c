@@ -139,7 +139,7 @@ static struct timespec time_left(const fs_app *app)
 static int serve(line *ends, fs_app *app)
 {
     static pending waiting;
-    const uint32_t began_ms = fs_host_milliseconds();
+    const uint32_t began_ms = fs_host_milliseconds(), began_us = fs_host_microseconds();
     struct timespec wait;
     int is_open = 1;
 
@@ -151,7 +151,7 @@ static int serve(line *ends, fs_app *app)
             {.fd = ends->parent, .events = 0}, /* only its end is of interest */
         };
 
-        fs_app_run(app, fs_host_microseconds());
+        fs_app_run(app, fs_host_microseconds() - began_us);
         if (send_octets(ends, app, &waiting) != 0) {
             break;
         }
@@ -160,7 +160,7 @@ static int serve(line *ends, fs_app *app)
         if (ppoll(watched, 3, &wait, NULL) < 0 && errno != EINTR) {
             return fail("poll");
         }
-        fs_app_run(app, fs_host_microseconds()); /* before the octets: their time is now */
+        fs_app_run(app, fs_host_microseconds() - began_us); /* before the octets: their time is now */
         fs_app_poll(app, fs_host_milliseconds() - began_ms); /* what is received now came after the wait */
         if ((watched[0].revents & (POLLIN | POLLHUP | POLLERR)) != 0) {
             is_open = (receive_octets(ends, app) == 0);

@@ -9,7 +9,8 @@
 
 enum {
     SMALL_RING = 1, NO_TIME, SLOW_TIME, FAST_TIME, TIME_RUNS_BACK, NO_CYCLES, CYCLES_COUNT_DOWN, SEVEN_BITS, XON_XOFF,
-    NEW_LINES, DROPS_SENT, ECHO, STACK_FULL, WAS_WATCHDOG, NOISE
+    NEW_LINES, DROPS_SENT, ECHO, STACK_FULL, WAS_WATCHDOG, NOISE, NO_US, US_STAND_STILL, US_SLOW, US_RUN_BACK, US_WRAP_EARLY,
+    US_WRAP
 };
 #define RING 4096U
 #define US_PER_PASS 50U
@@ -19,7 +20,8 @@ static volatile fs_octet received_octets[RING], sent_octets[32768];
 static fs_ring received, sent;
 /* The firmware measures the cost of a reading at its start; later there is work between two of them. */
 #define START_READINGS 32U
-static uint32_t now_us, cycles, readings, overruns, octets_sent;
+static uint64_t now_us;
+static uint32_t cycles, readings, overruns, octets_sent;
 
 void bench_start(int fault);
 void bench_receive(const unsigned char *octets, uint32_t count);
@@ -31,7 +33,7 @@ void bench_start(int fault)
     bench_fault = fault;
     fs_ring_init(&received, received_octets, (fault == SMALL_RING) ? 64U : RING);
     fs_ring_init(&sent, sent_octets, 32768U);
-    now_us = 0U;
+    now_us = (fault == US_WRAP) ? (1ULL << 32) - 8000000ULL : 0ULL;
     cycles = 0U;
     readings = 0U;
     overruns = 0U;
@@ -141,7 +143,7 @@ uint32_t fs_board_errors(void)
 
 uint32_t fs_board_now_ms(void)
 {
-    const uint32_t ms = now_us / 1000U;
+    const uint32_t ms = (uint32_t)(now_us / 1000U);
 
     switch (bench_fault) {
     case NO_TIME:
@@ -159,7 +161,20 @@ uint32_t fs_board_now_ms(void)
 
 uint32_t fs_board_now_us(void)
 {
-    return now_us;
+    switch (bench_fault) {
+    case NO_US:
+        return 0U;
+    case US_STAND_STILL:
+        return 77U;
+    case US_SLOW:
+        return (uint32_t)(now_us / 8U);
+    case US_RUN_BACK:
+        return (uint32_t)(now_us % 700000U);
+    case US_WRAP_EARLY: /* as a counter of cycles divided down does */
+        return (uint32_t)(now_us % 2000000U);
+    default:
+        return (uint32_t)now_us;
+    }
 }
 
 uint32_t fs_board_cycles(void)
