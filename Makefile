@@ -10,6 +10,8 @@ export PYTHONDONTWRITEBYTECODE :=
 INSTALL := $(BIN)/python -m pip install -q --no-compile --disable-pip-version-check -e
 # test processes side by side: twice the cores, because flights in real time wait most of theirs
 WORKERS ?= 4
+# the quick tests never wait
+CORES := $(shell getconf _NPROCESSORS_ONLN)
 # files in order: those of firmware, interop and processes, which take longest, come first
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 .DEFAULT_GOAL := help
@@ -41,7 +43,7 @@ fly: $(FLY_READY) ## Fly missions/square.plan: simulator, flight stack and groun
 	@$(BIN)/gcs fly missions/square.plan
 
 test: $(READY) ## Run the tests that a developer runs all day: unit, protocol, flights, C against Python, one real flight
-	@$(PYTEST) -m "unit or protocol or flight or parity or smoke"
+	@$(PYTEST) -n $(CORES) -m "(unit or protocol or flight or parity or smoke) and not long"
 
 test-all: $(READY) ## Run every test
 	@$(PYTEST) --durations 15

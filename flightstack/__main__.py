@@ -39,6 +39,7 @@ class RunOptions:
     outer_hz: options.OuterHz = None
     clock: options.Clock = "lockstep"
     loops: options.Loops = "python"
+    state: options.State = "truth"
     sim_host: options.SimHost = "127.0.0.1"
     sim_port: options.SimPort = None
     sim_timeout: options.SimTimeout = 30.0
@@ -54,7 +55,7 @@ class RunOptions:
     overwrite: options.Overwrite = False
     param: options.Assignments = None
     params: options.ParamFile = None
-    state: options.State = None
+    state_dir: options.StateDir = None
     home: options.Home = None
     ideal_rotors: options.IdealRotors = False
     wait_for_start: options.WaitForStart = False
@@ -128,9 +129,9 @@ def _state_directory(given: RunOptions) -> StateDirectory | None:
     """Return the directory of saved parameters and plans, or None if nothing is saved."""
     from flightstack.process.state_directory import StateDirectory
 
-    if given.state == "none" or (given.state is None and given.params == "none"):
+    if given.state_dir == "none" or (given.state_dir is None and given.params == "none"):
         return None
-    path = None if given.state is None else Path(given.state)
+    path = None if given.state_dir is None else Path(given.state_dir)
     return StateDirectory(path, given.instance, has_params=given.params is None)
 
 
@@ -147,6 +148,7 @@ def _stack_config(given: RunOptions, directory: StateDirectory | None) -> StackC
         loops=given.loops,
         inner_hz=given.inner_hz,
         outer_hz=outer_hz,
+        state=given.state,
         ideal_rotors=given.ideal_rotors,
         lockstep=given.clock == "lockstep",
         home=DEFAULT_HOME if given.home is None else parse_home(given.home),

@@ -28,7 +28,7 @@ from sim_bridge.plant.fault_table import ROWS, STATE_KINDS, Fault, Kind
 from sim_bridge.plant.layout import CONTACT, DIVERGED, OUTPUT
 from sim_bridge.plant.plant import Plant, PlantOptions
 from sim_bridge.plants import make_plant
-from sim_bridge.sensors.faults import channels_of
+from sim_bridge.sensors.faults import without
 from sim_bridge.sensors.suite import Sender, SensorSuite
 from sim_bridge.sent_state import SentState
 
@@ -103,10 +103,11 @@ class Simulator:
         """Measure with the sensors of the vehicle from now on; return False if it has none. ``home`` is the origin."""
         if self.sensors is None and self.vehicle.sensors.numbers:
             sender = Sender(self._system_id, SIMULATOR_COMPONENT)
-            seed = self._flight.options.seed
-            self.sensors = SensorSuite(self.vehicle, home, seed, self._frame, self.plant, sender)
+            options = self._flight.options
+            self.sensors = SensorSuite(self.vehicle, home, options, self._frame, self.plant, sender)
             self.sensors.set_interval_us(self._interval_us)
-            self.sensors.set_faults(self._schedule.active(self.time_us))
+            self.sensors.prime(self.time_us)
+            self.sensors.set_faults(self._schedule.active(self.time_us), self.time_us)
             self.sensors.measure(self.time_us)
         return self.sensors is not None
 
@@ -184,13 +185,15 @@ class Simulator:
         check_faults((fault,), self._flight._replace(faults=self.faults))
 
     def clear_sensor_faults(self, sensor: str) -> None:
-        """Remove the active faults of a sensor, as "mag" or "gyro2"; "gyro" is that of all inertial sensors."""
-        ends = set(channels_of(sensor, self.vehicle.sensors.imu_count))
+        """End the active faults of a sensor, as "mag" or "gyro2"; "gyro" is that of all inertial sensors.
+
+        A fault of several sensors, as "imu", stays on the other ones.
+        """
+        count = self.vehicle.sensors.imu_count
         self._schedule.faults = [
-            fault
+            left
             for fault in self._schedule.faults
-            if fault.begin_us > self.time_us
-            or not ends.issuperset(channels_of(fault.sensor, self.vehicle.sensors.imu_count) or [("", 0)])
+            for left in ([fault] if fault.begin_us > self.time_us else without(fault, sensor, count))
         ]
         self._update_faults()
 
@@ -218,7 +221,7 @@ class Simulator:
         active = schedule.active(now_us)
         self.plant.set_faults(plant_faults(active))
         if self.sensors is not None:
-            self.sensors.set_faults(active)
+            self.sensors.set_faults(active, now_us)
         for event in events:
             if event.kind is Kind.BATTERY_LEVEL:
                 self.plant.set_charge(event.value)

@@ -30,6 +30,10 @@ class LocalFrame:
     """
 
     def __init__(self, origin: GeoPoint) -> None:
+        self.move_to(origin)
+
+    def move_to(self, origin: GeoPoint) -> None:
+        """Move the origin, for all users of this frame."""
         self.origin = origin
         sin_lat, cos_lat = sin_cos(math.radians(origin.latitude_deg))
         w2 = 1.0 - ECCENTRICITY_SQUARED * sin_lat * sin_lat

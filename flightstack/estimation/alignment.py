@@ -7,7 +7,7 @@ from typing import Annotated, TypeAlias
 
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Quaternion, Vector3
-from flightstack.core.geometry import quaternion_from_euler, rotate
+from flightstack.core.geometry import quaternion_from_euler, rotate, wrap_pi
 from flightstack.core.portable_math import atan2, sin_cos
 from flightstack.estimation.error_state import (
     ACCEL_BIAS,
@@ -37,7 +37,8 @@ Alignment: TypeAlias = Annotated[FloatArray, ALIGNMENT_SIZE]
 
 ALIGNMENT_S = 0.4
 WAIT_FOR_MAG_S = 2.0
-_UNKNOWN_YAW_RAD = 1.0
+_UNKNOWN_YAW_RAD, _ANY_YAW_RAD = 1.0, 1.8
+"""Deviation of the yaw that a magnetic field is to give, and without a magnetometer."""
 
 
 @compiled
@@ -54,7 +55,7 @@ def set_initial_variances(f: Filter, params: EstimatorParams, speed_m_s: float, 
     p = f.covariance
     reset_variance(p, 0, ERROR_STATES, 1e-8)
     reset_variance(p, ATTITUDE, 2, tilt_rad * tilt_rad)
-    reset_variance(p, ATTITUDE + 2, 1, _UNKNOWN_YAW_RAD * _UNKNOWN_YAW_RAD)
+    reset_variance(p, ATTITUDE + 2, 1, _ANY_YAW_RAD * _ANY_YAW_RAD)
     reset_variance(p, VELOCITY, 3, speed_m_s * speed_m_s)
     reset_variance(p, POSITION, 3, 1e-4)
     reset_variance(p, GYRO_BIAS, 3, params.gyro_bias_rad_s * params.gyro_bias_rad_s)
@@ -71,7 +72,7 @@ def align(
     """Set attitude, field and covariance from the sums of a vehicle that stands.
 
     ``earth`` is the Earth's field [gauss, NED] at the place; zero if unknown: then the measured field is taken, turned
-    to the declination.
+    to the declination, or to zero if that is NaN.
     """
     force = read_vector(sums, 0)
     off = abs(
@@ -95,35 +96,51 @@ def _set_attitude(f: Filter, q: Quaternion) -> None:
 @compiled
 def align_yaw(
     f: Filter, field: Vector3, earth: Vector3, declination_rad: float, params: EstimatorParams
-) -> None:
-    """Turn the attitude to the yaw of the measured field, and set the states of the magnetic field."""
+) -> float:
+    """Turn the attitude to the yaw of the measured field, and set the states of the field; return the turn [rad]."""
     n = read_nominal(f.nominal)
     level = rotate(n.attitude, field)
-    known = earth.x != 0.0 or earth.y != 0.0
-    north = atan2(earth.y, earth.x) if known else declination_rad
-    turn = north - atan2(level.y, level.x)
+    turn = wrap_pi(_north(earth, declination_rad) - atan2(level.y, level.x))
     _set_attitude(f, turned(n.attitude, Vector3(0.0, 0.0, turn)))
-    horizontal = math.sqrt(level.x * level.x + level.y * level.y)
-    sine, cosine = sin_cos(north)
-    measured = Vector3(cosine * horizontal, sine * horizontal, level.z)
-    write_vector(f.nominal, 16, earth if known else measured)
-    write_vector(f.nominal, 19, Vector3(0.0, 0.0, 0.0))
     reset_variance(f.covariance, ATTITUDE + 2, 1, _UNKNOWN_YAW_RAD * _UNKNOWN_YAW_RAD)
-    _set_field_variances(f.covariance, earth if known else measured, params)
+    set_field(f, level, earth, declination_rad, params)
     fuse_field(f, field, params)
+    return turn
 
 
 @compiled
-def _set_field_variances(p: Covariance, earth: Vector3, params: EstimatorParams) -> None:
-    """Set the covariance of the magnetic field: along the field by the sensor's scale, across it by the declination."""
-    across, size = (
-        params.earth_field_gauss * params.earth_field_gauss,
-        params.field_scale * params.field_scale,
-    )
-    reset_variance(p, EARTH_FIELD, 3, across)
-    p[EARTH_FIELD, EARTH_FIELD] += size * earth.x * earth.x
-    p[EARTH_FIELD, EARTH_FIELD + 1] = size * earth.x * earth.y
-    p[EARTH_FIELD + 1, EARTH_FIELD] = size * earth.x * earth.y
-    p[EARTH_FIELD + 1, EARTH_FIELD + 1] += size * earth.y * earth.y
+def _north(earth: Vector3, declination_rad: float) -> float:
+    """Return the direction [rad] of the Earth's field."""
+    if earth.x != 0.0 or earth.y != 0.0:
+        return atan2(earth.y, earth.x)
+    return declination_rad if math.isfinite(declination_rad) else 0.0
+
+
+@compiled
+def set_field(
+    f: Filter, level: Vector3, earth: Vector3, declination_rad: float, params: EstimatorParams
+) -> None:
+    """Set the states of the field: the Earth's field, or ``level``, the measured one in level axes, turned to north."""
+    known = earth.x != 0.0 or earth.y != 0.0
+    horizontal = math.sqrt(level.x * level.x + level.y * level.y)
+    sine, cosine = sin_cos(_north(earth, declination_rad))
+    start = earth if known else Vector3(cosine * horizontal, sine * horizontal, level.z)
+    write_vector(f.nominal, 16, start)
+    write_vector(f.nominal, 19, Vector3(0.0, 0.0, 0.0))
+    scale = params.field_scale if known else 1.0  # ``level`` is the measurement itself, which is fused next
+    turn_rad = 0.0 if known or math.isfinite(declination_rad) else params.declination_rad
+    _set_field_variances(f.covariance, start, scale, turn_rad, params)
+
+
+@compiled
+def _set_field_variances(
+    p: Covariance, earth: Vector3, scale: float, turn_rad: float, params: EstimatorParams
+) -> None:
+    """Set the covariance of the field: along it by a share of it, across it by an error of its direction."""
+    size, turn = scale * scale, turn_rad * turn_rad
+    reset_variance(p, EARTH_FIELD, 3, params.earth_field_gauss * params.earth_field_gauss)
+    p[EARTH_FIELD, EARTH_FIELD] += size * earth.x * earth.x + turn * earth.y * earth.y
+    p[EARTH_FIELD, EARTH_FIELD + 1] = (size - turn) * earth.x * earth.y
+    p[EARTH_FIELD + 1, EARTH_FIELD + 1] += size * earth.y * earth.y + turn * earth.x * earth.x
     p[EARTH_FIELD + 2, EARTH_FIELD + 2] += size * earth.z * earth.z
     reset_variance(p, BODY_FIELD, 3, params.body_field_gauss * params.body_field_gauss)

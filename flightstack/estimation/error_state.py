@@ -10,7 +10,8 @@ from typing import Annotated, NamedTuple, TypeAlias
 
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Quaternion, Vector3
-from flightstack.core.geometry import normalised, quaternion_product, rotation_over
+from flightstack.core.geometry import conjugate, normalised, quaternion_product, rotation_over, wrap_pi
+from flightstack.core.portable_math import atan2
 
 ERROR_STATES = 27
 NOMINAL_SIZE = 28
@@ -113,6 +114,13 @@ def write_nominal(x: FloatArray, n: Nominal) -> None:
 def turned(q: Quaternion, world_rotation: Vector3) -> Quaternion:
     """Rotate an attitude by a rotation vector [rad] in the world frame."""
     return normalised(quaternion_product(rotation_over(world_rotation, 1.0), q))
+
+
+@compiled
+def turn_between(before: Quaternion, after: Quaternion) -> float:
+    """Return the angle [rad] about the vertical from one attitude to another."""
+    turn = quaternion_product(after, conjugate(before))
+    return wrap_pi(2.0 * atan2(turn.z, turn.w))
 
 
 @compiled

@@ -14,6 +14,7 @@ from flightstack.estimation.derived_generated import (
 )
 from flightstack.estimation.error_state import (
     BARO_BIAS,
+    ERROR_STATES,
     GNSS_BIAS,
     GYRO_BIAS,
     POSITION,
@@ -23,9 +24,11 @@ from flightstack.estimation.error_state import (
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import (
     BARO,
+    FUSED_S,
     GNSS_POSITION,
     GNSS_VELOCITY,
     HOLD_POSITION,
+    HOLDS_HORIZONTAL,
     INNOVATION,
     INNOVATION_VARIANCE,
     MAG,
@@ -37,18 +40,42 @@ from flightstack.estimation.kalman import (
     clear,
     fuse,
 )
-from flightstack.estimation.prediction import DeltaSample
 
 GNSS_SIZE = 10
 """Array form of a GNSS measurement: time, position NED, velocity NED, eph, epv, speed accuracy."""
 _CONFIRMATION, _LEAST_SHARE = 0.02, 0.01
+_UNKNOWN_M, _UNKNOWN_VERTICAL_M, _UNKNOWN_M_S = 5.0, 8.0, 0.5
+"""Accuracies of a GNSS receiver that states none."""
+_AIDED_S = 1.0
+"""Time after an accepted GNSS velocity in which the horizontal motion counts as measured."""
+LEAST_COS_TILT = 0.7
+"""Cosine of the tilt below which the range finder is not used: 45 degrees."""
 
 GnssRow: TypeAlias = Annotated[FloatArray, GNSS_SIZE]
 
 
 @compiled
-def _accuracy(stated: float, otherwise: float) -> float:
-    return stated if math.isfinite(stated) and stated > 0.0 else otherwise
+def _stated(accuracy: float, unknown: float) -> float:
+    """Return an accuracy that a receiver states; ``unknown`` if it states none. Zero is an ideal receiver's."""
+    return accuracy if math.isfinite(accuracy) and accuracy >= 0.0 else unknown
+
+
+@compiled
+def horizontal_accuracy(row: GnssRow) -> float:
+    """Return the accuracy [m] of the horizontal position of a GNSS measurement."""
+    return _stated(row[7], _UNKNOWN_M)
+
+
+@compiled
+def vertical_accuracy(row: GnssRow) -> float:
+    """Return the accuracy [m] of the altitude of a GNSS measurement."""
+    return _stated(row[8], _UNKNOWN_VERTICAL_M)
+
+
+@compiled
+def speed_accuracy(row: GnssRow) -> float:
+    """Return the accuracy [m/s] of the velocity of a GNSS measurement."""
+    return _stated(row[9], _UNKNOWN_M_S)
 
 
 @compiled
@@ -57,13 +84,13 @@ def _drift_gnss_bias(
 ) -> None:
     """Propagate the Gauss-Markov process of the GNSS position bias."""
     kept = max(0.0, 1.0 - elapsed_s / params.gnss_bias_s)
-    for axis in range(3):
-        at = GNSS_BIAS + axis
-        spread = params.gnss_bias_share * (epv_m if axis == 2 else eph_m)
-        f.nominal[25 + axis] *= kept
-        for j in range(f.ph.size):
-            f.covariance[at, j] *= kept
+    for at in range(GNSS_BIAS, ERROR_STATES):
+        spread = params.gnss_bias_share * (epv_m if at == GNSS_BIAS + 2 else eph_m)
+        f.nominal[at + 1] *= kept
+        for j in range(at + 1):
             f.covariance[j, at] *= kept
+        for j in range(at, ERROR_STATES):
+            f.covariance[at, j] *= kept
         f.covariance[at, at] += (1.0 - kept * kept) * spread * spread
 
 
@@ -79,23 +106,23 @@ def _confirm_imu_noise(f: Filter, row: int) -> None:
 
 
 @compiled
-def fuse_gnss(f: Filter, row: GnssRow, age_s: float, elapsed_s: float, params: EstimatorParams) -> None:
-    """Fuse position and velocity, measured ``age_s`` before the time of the state."""
-    eph_m, epv_m = _accuracy(row[7], 5.0), _accuracy(row[8], 8.0)
-    speed_m_s = _accuracy(row[9], 0.5)
+def fuse_gnss(
+    f: Filter, row: GnssRow, age_s: float, elapsed_s: float, first: int, params: EstimatorParams
+) -> None:
+    """Fuse position and velocity from axis ``first``, measured ``age_s`` before the time of the state."""
+    eph_m, epv_m, speed_m_s = horizontal_accuracy(row), vertical_accuracy(row), speed_accuracy(row)
     _drift_gnss_bias(f, elapsed_s, eph_m, epv_m, params)
-    for axis in range(3):
+    for axis in range(first, 3):
         least = params.gnss_velocity_noise_m_s
         noise = Noise(least, speed_m_s, max(2.0 * speed_m_s, least), params.gnss_velocity_gate, 0.0)
         clear(f.h)
         f.h[VELOCITY + axis] = 1.0
         if fuse(f, GNSS_VELOCITY + axis, row[4 + axis] - f.nominal[4 + axis], noise, 0.0):
             _confirm_imu_noise(f, GNSS_VELOCITY + axis)
-    for axis in range(3):
+    for axis in range(first, 3):
         accuracy_m = epv_m if axis == 2 else eph_m
-        noise = Noise(
-            params.gnss_position_noise_m, accuracy_m, 2.0 * accuracy_m, params.gnss_position_gate, 0.0
-        )
+        least = params.gnss_position_noise_m
+        noise = Noise(least, accuracy_m, max(2.0 * accuracy_m, least), params.gnss_position_gate, 0.0)
         clear(f.h)
         f.h[POSITION + axis] = 1.0
         f.h[GNSS_BIAS + axis] = 1.0
@@ -105,27 +132,36 @@ def fuse_gnss(f: Filter, row: GnssRow, age_s: float, elapsed_s: float, params: E
 
 @compiled
 def fuse_baro(f: Filter, altitude_m: float, age_s: float, params: EstimatorParams) -> None:
-    """Fuse a pressure altitude: minus the position down, plus the barometer's bias."""
+    """Fuse a pressure altitude: minus the position down, plus the barometer's bias.
+
+    It leaves horizontal position and velocity alone in dead reckoning: their errors are then so much larger than that
+    of the height that pressure in turns and gusts, which is not white noise, moves them by metres.
+    """
+    is_aided = f.clock[0] - f.observations[GNSS_VELOCITY, FUSED_S] < _AIDED_S
     clear(f.h)
     f.h[POSITION + 2] = -1.0
     f.h[BARO_BIAS] = 1.0
     predicted_m = -(f.nominal[9] - age_s * f.nominal[6]) + f.nominal[24]
     noise = Noise(params.baro_noise_m, 1.0, params.baro_largest_noise_m, params.baro_gate, 0.0)
-    fuse(f, BARO, altitude_m - predicted_m, noise, 0.0)
+    fuse(f, BARO, altitude_m - predicted_m, noise, 0.0 if is_aided else HOLDS_HORIZONTAL)
 
 
 @compiled
-def fuse_range(f: Filter, distance_m: float, ground_m: float, age_s: float, params: EstimatorParams) -> None:
-    """Fuse a distance along the body's down axis to level ground at ``ground_m`` below the origin."""
-    n = read_nominal(f.nominal)
-    cos_tilt = 1.0 - 2.0 * (n.attitude.x * n.attitude.x + n.attitude.y * n.attitude.y)
-    if cos_tilt < 0.7:
-        return
+def cos_tilt_of(f: Filter) -> float:
+    """Return the cosine of the angle between the body's down axis and the vertical."""
+    x, y = f.nominal[1], f.nominal[2]
+    cosine: float = 1.0 - 2.0 * (x * x + y * y)
+    return cosine
+
+
+@compiled
+def fuse_range(f: Filter, vertical_m: float, ground_m: float, age_s: float, params: EstimatorParams) -> None:
+    """Fuse the vertical part of a distance to level ground at ``ground_m`` below the origin."""
     clear(f.h)
     f.h[POSITION + 2] = -1.0
-    height_m = ground_m - (n.position_ned_m.z - age_s * n.velocity_ned_m_s.z)
+    height_m = ground_m - (f.nominal[9] - age_s * f.nominal[6])
     noise = Noise(params.range_noise_m, params.range_noise_m, 1.0, params.range_gate, 0.0)
-    fuse(f, RANGE, distance_m * cos_tilt - height_m, noise, 0.0)
+    fuse(f, RANGE, vertical_m - height_m, noise, 0.0)
 
 
 @compiled
@@ -151,28 +187,26 @@ def fuse_field(f: Filter, measured: Vector3, params: EstimatorParams) -> None:
 
 
 @compiled
-def fuse_rest(f: Filter, sample: DeltaSample, params: EstimatorParams) -> None:
-    """Fuse zero velocity and zero rate of a vehicle that stands."""
-    measured = Vector3(
-        sample.angle_rad.x / sample.dt_s, sample.angle_rad.y / sample.dt_s, sample.angle_rad.z / sample.dt_s
-    )
-    n = read_nominal(f.nominal)
-    innovation = Vector3(
-        measured.x - n.gyro_bias_rad_s.x, measured.y - n.gyro_bias_rad_s.y, measured.z - n.gyro_bias_rad_s.z
-    )
+def fuse_rest_velocity(f: Filter, params: EstimatorParams) -> None:
+    """Fuse zero velocity of a vehicle that stands."""
     velocity = params.rest_velocity_noise_m_s
-    still = Noise(velocity, velocity, velocity, 5.0, 0.0)
-    density = max(sample.gyro_density.x, sample.gyro_density.y, sample.gyro_density.z)
-    deviation = params.rest_rate_noise_rad_s + math.sqrt(density / sample.dt_s)
-    rate = Noise(deviation, deviation, deviation, 3.0, 0.0)
+    noise = Noise(velocity, velocity, velocity, 5.0, 0.0)
     for axis in range(3):
         clear(f.h)
         f.h[VELOCITY + axis] = 1.0
-        fuse(f, REST_VELOCITY + axis, -f.nominal[4 + axis], still, 0.0)
+        fuse(f, REST_VELOCITY + axis, -f.nominal[4 + axis], noise, 0.0)
+
+
+@compiled
+def fuse_rest_rate(f: Filter, rate_rad_s: Vector3, variance: float, params: EstimatorParams) -> None:
+    """Fuse zero rate of a vehicle that stands: ``rate_rad_s``, with this variance of noise, is the bias of the gyro."""
+    deviation = params.rest_rate_noise_rad_s + math.sqrt(variance)
+    noise = Noise(deviation, deviation, deviation, 3.0, 0.0)
+    for axis in range(3):
         clear(f.h)
         f.h[GYRO_BIAS + axis] = 1.0
-        value = innovation.x if axis == 0 else innovation.y if axis == 1 else innovation.z
-        fuse(f, REST_RATE + axis, value, rate, 0.0)
+        value = rate_rad_s.x if axis == 0 else rate_rad_s.y if axis == 1 else rate_rad_s.z
+        fuse(f, REST_RATE + axis, value - f.nominal[10 + axis], noise, 0.0)
 
 
 @compiled

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple, TypeAlias
 
+import numpy as np
+
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
 from flightstack.estimation.error_state import (
@@ -16,20 +18,33 @@ from flightstack.estimation.error_state import (
     write_nominal,
 )
 
-OBSERVATIONS = 19
+OBSERVATIONS = 23
 GNSS_VELOCITY, GNSS_POSITION, BARO, MAG, RANGE = 0, 3, 6, 7, 10
-REST_VELOCITY, REST_RATE, HOLD_POSITION = 11, 14, 17
+REST_VELOCITY, REST_RATE, HOLD_POSITION, KNOWN_FIELD, DECLINATION = 11, 14, 17, 19, 22
 """First row of each sensor in ``Filter.observations``."""
 
-INNOVATION, INNOVATION_VARIANCE, TEST_RATIO, FUSED_S, NOISE, LAGGED = 0, 1, 2, 3, 4, 5
-OBSERVATION_COLUMNS = 6
+INNOVATION, INNOVATION_VARIANCE, TEST_RATIO, FUSED_S, NOISE, LAGGED, FUSED, REFUSED, NIS_SUM = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+    7,
+    8,
+)
+OBSERVATION_COLUMNS = 9
 """Columns: innovation, its variance, squared ratio to the gate, time of the last accepted one, noise variance, mean
-product of successive innovations."""
+product of successive innovations; numbers of accepted and of refused measurements; sum of the squares of accepted
+innovations by their variance."""
 
 _ADAPTATION = 0.01
 """Share of an innovation in the estimate of the noise variance."""
 
 _LARGEST_CORRELATION = 0.95
+
+HOLDS_HORIZONTAL = 2.0
 
 Observations: TypeAlias = Annotated[FloatArray, OBSERVATIONS, OBSERVATION_COLUMNS]
 
@@ -39,6 +54,7 @@ class Filter(NamedTuple):
 
     nominal: Annotated[FloatArray, 28]
     covariance: Covariance
+    """Only the elements on and above the diagonal count."""
     observations: Observations
     h: ErrorVector
     """Jacobian of the measurement at hand."""
@@ -66,12 +82,10 @@ def clear(x: ErrorVector) -> None:
         x[i] = 0.0
 
 
-@compiled
-def mirror(p: Covariance) -> None:
-    """Copy the elements above the diagonal below it."""
-    for i in range(ERROR_STATES):
-        for j in range(i):
-            p[i, j] = p[j, i]
+def symmetric(p: Covariance) -> Covariance:
+    """Return a covariance with the elements below the diagonal, which the filter does not keep."""
+    whole: FloatArray = np.triu(p) + np.triu(p, 1).T
+    return whole
 
 
 @compiled
@@ -80,7 +94,9 @@ def _project(f: Filter) -> float:
     clear(f.ph)
     for k in range(ERROR_STATES):
         if f.h[k] != 0.0:
-            for i in range(ERROR_STATES):
+            for i in range(k):
+                f.ph[i] += f.h[k] * f.covariance[i, k]
+            for i in range(k, ERROR_STATES):
                 f.ph[i] += f.h[k] * f.covariance[k, i]
     total = 0.0
     for i in range(ERROR_STATES):
@@ -94,7 +110,7 @@ def _correct(f: Filter, innovation: float, variance: float) -> None:
     p, gain, ph = f.covariance, f.gain, f.ph
     for i in range(ERROR_STATES):
         own = gain[i] * variance - ph[i]
-        for j in range(ERROR_STATES):
+        for j in range(i, ERROR_STATES):
             p[i, j] += own * gain[j] - gain[i] * ph[j]
     for i in range(ERROR_STATES):
         p[i, i] = max(p[i, i], 1e-12)
@@ -107,7 +123,7 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
     """Fuse a scalar measurement with the Jacobian ``f.h``; return True if it is within its gate.
 
     With ``holds`` above zero, tilt, velocity, position and accelerometer bias keep their values and their
-    uncertainty (a Schmidt-Kalman update).
+    uncertainty (a Schmidt-Kalman update); with ``HOLDS_HORIZONTAL``, horizontal velocity and position.
     """
     o = f.observations
     least, largest = noise.least * noise.least, noise.largest * noise.largest
@@ -121,13 +137,19 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
     ratio = innovation * innovation / (noise.gate * noise.gate * variance)
     o[row, INNOVATION], o[row, INNOVATION_VARIANCE], o[row, TEST_RATIO] = innovation, variance, ratio
     if not ratio <= 1.0:
+        o[row, REFUSED] += 1.0
         return False
+    o[row, FUSED] += 1.0
+    o[row, NIS_SUM] += innovation * innovation / variance
     estimate = innovation * innovation - projected
     o[row, LAGGED] += _ADAPTATION * (innovation * last - o[row, LAGGED])
     o[row, NOISE] = min(max(r + _ADAPTATION * (estimate - r), least), largest)
     for i in range(ERROR_STATES):
         f.gain[i] = f.ph[i] / variance
-    if holds > 0.0:
+    if holds == HOLDS_HORIZONTAL:
+        for i in range(2):
+            f.gain[3 + i], f.gain[6 + i] = 0.0, 0.0
+    elif holds > 0.0:
         f.gain[0], f.gain[1] = 0.0, 0.0
         for i in range(3, 9):
             f.gain[i] = 0.0
@@ -142,8 +164,10 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
 def reset_variance(p: Covariance, at: int, count: int, variance: float) -> None:
     """Make ``count`` states from ``at`` independent of all others, each with ``variance``."""
     for i in range(at, at + count):
-        for j in range(ERROR_STATES):
-            p[i, j], p[j, i] = 0.0, 0.0
+        for j in range(i):
+            p[j, i] = 0.0
+        for j in range(i, ERROR_STATES):
+            p[i, j] = 0.0
         p[i, i] = variance
 
 

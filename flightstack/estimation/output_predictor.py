@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Quaternion, Vector3
-from flightstack.core.geometry import conjugate, cross, quaternion_product, rotation_vector
-from flightstack.estimation.error_state import read_vector, scaled, sum_of, turned, write_vector
+from flightstack.core.geometry import conjugate, quaternion_product, rotate, rotation_over, rotation_vector
+from flightstack.estimation.error_state import read_vector, write_vector
 from flightstack.estimation.prediction import Motion
 from flightstack.estimation.rings import IMU_RING, IMU_ROWS, Rings, slot_of
 
@@ -26,34 +26,25 @@ def write_motion(row: FloatArray, time_s: float, motion: Motion) -> None:
 
 
 @compiled
-def _shifted(
-    late: Motion, error: Motion, turn: Vector3, start: Motion, age_s: float, gravity: float
-) -> Motion:
-    """Return ``late``, ``age_s`` after ``start``, corrected for an error of ``start``.
-
-    An error of attitude turns the specific force since ``start``, and so the change of velocity and position.
-    """
+def _replayed(
+    row: FloatArray, correction: Quaternion, before: Motion, after: Motion, gravity: float, start_s: float
+) -> None:
+    """Move a row that followed from ``before`` so that it follows from ``after``: its specific force turns too."""
+    late, age_s = read_motion(row), row[0] - start_s
+    u, v = before.velocity_ned_m_s, late.velocity_ned_m_s
+    p, q = before.position_ned_m, late.position_ned_m
     fall = gravity * age_s
-    dv = Vector3(
-        late.velocity_ned_m_s.x - start.velocity_ned_m_s.x,
-        late.velocity_ned_m_s.y - start.velocity_ned_m_s.y,
-        late.velocity_ned_m_s.z - start.velocity_ned_m_s.z - fall,
+    dv = rotate(correction, Vector3(v.x - u.x, v.y - u.y, v.z - u.z - fall))
+    dp = rotate(
+        correction,
+        Vector3(q.x - p.x - u.x * age_s, q.y - p.y - u.y * age_s, q.z - p.z - (u.z + 0.5 * fall) * age_s),
     )
-    dp = Vector3(
-        late.position_ned_m.x - start.position_ned_m.x - start.velocity_ned_m_s.x * age_s,
-        late.position_ned_m.y - start.position_ned_m.y - start.velocity_ned_m_s.y * age_s,
-        late.position_ned_m.z
-        - start.position_ned_m.z
-        - start.velocity_ned_m_s.z * age_s
-        - 0.5 * fall * age_s,
+    u, p = after.velocity_ned_m_s, after.position_ned_m
+    velocity = Vector3(u.x + dv.x, u.y + dv.y, u.z + dv.z + fall)
+    place = Vector3(
+        p.x + u.x * age_s + dp.x, p.y + u.y * age_s + dp.y, p.z + (u.z + 0.5 * fall) * age_s + dp.z
     )
-    velocity = sum_of(error.velocity_ned_m_s, cross(turn, dv))
-    position = sum_of(sum_of(error.position_ned_m, scaled(error.velocity_ned_m_s, age_s)), cross(turn, dp))
-    return Motion(
-        turned(late.attitude, turn),
-        sum_of(late.velocity_ned_m_s, velocity),
-        sum_of(late.position_ned_m, position),
-    )
+    write_motion(row, row[0], Motion(quaternion_product(correction, late.attitude), velocity, place))
 
 
 @compiled
@@ -65,16 +56,21 @@ def follow(rings: Rings, output: FloatArray, target: Motion, share: float, gravi
     """
     oldest = rings.track[slot_of(rings, IMU_RING, IMU_ROWS, 0)]
     start, start_s = read_motion(oldest), oldest[0]
-    turn = scaled(rotation_vector(quaternion_product(target.attitude, conjugate(start.attitude))), share)
-    error = Motion(
-        target.attitude,
-        scaled(sum_of(target.velocity_ned_m_s, scaled(start.velocity_ned_m_s, -1.0)), share),
-        scaled(sum_of(target.position_ned_m, scaled(start.position_ned_m, -1.0)), share),
+    turn = rotation_vector(quaternion_product(target.attitude, conjugate(start.attitude)))
+    correction = rotation_over(turn, share)
+    after = Motion(
+        quaternion_product(correction, start.attitude),
+        _between(start.velocity_ned_m_s, target.velocity_ned_m_s, share),
+        _between(start.position_ned_m, target.position_ned_m, share),
     )
     for number in range(IMU_ROWS):
         if number >= rings.cursors[IMU_RING, 1]:
             break
         row = rings.track[slot_of(rings, IMU_RING, IMU_ROWS, number)]
-        write_motion(row, row[0], _shifted(read_motion(row), error, turn, start, row[0] - start_s, gravity))
-    age_s = output[0] - start_s
-    write_motion(output, output[0], _shifted(read_motion(output), error, turn, start, age_s, gravity))
+        _replayed(row, correction, start, after, gravity, start_s)
+    _replayed(output, correction, start, after, gravity, start_s)
+
+
+@compiled
+def _between(a: Vector3, b: Vector3, share: float) -> Vector3:
+    return Vector3(a.x + share * (b.x - a.x), a.y + share * (b.y - a.y), a.z + share * (b.z - a.z))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
@@ -12,6 +13,8 @@ from flightstack.core.contract import FloatArray
 GNSS_ROWS, MAG_ROWS, BARO_ROWS, RANGE_ROWS, IMU_ROWS = 8, 32, 32, 32, 64
 GNSS_RING, MAG_RING, BARO_RING, RANGE_RING, IMU_RING, RINGS = 0, 1, 2, 3, 4, 5
 IMU_COLUMNS, TRACK_COLUMNS = 14, 11
+_COUNT, _PUSHED_S, _LAST_S, MEAN_SIZE = 4, 5, 6, 7
+"""Columns of a mean of samples: sums of a row (4), their number, times of the last row and of the last sample."""
 
 Cursors: TypeAlias = "Annotated[np.ndarray[tuple[int, int], np.dtype[np.int64]], RINGS, 2]"
 """For each ring the slot of its oldest row, and the number of its rows."""
@@ -38,6 +41,15 @@ def slot_of(rings: Rings, ring: int, size: int, number: int) -> int:
 
 
 @compiled
+def count_of_measurements(rings: Rings) -> int:
+    """Return the number of rows that wait in all rings but that of the IMU."""
+    total: int = 0
+    for ring in range(IMU_RING):
+        total += rings.cursors[ring, 1]
+    return total
+
+
+@compiled
 def is_due(rings: Rings, ring: int, row_s: float, now_s: float) -> bool:
     """Return True if the ring has rows and its oldest one, measured at ``row_s``, is not in the future."""
     count: int = rings.cursors[ring, 1]
@@ -59,6 +71,36 @@ def pop(rings: Rings, ring: int, size: int) -> None:
     """Remove the oldest row."""
     rings.cursors[ring, 0] = slot_of(rings, ring, size, 1)
     rings.cursors[ring, 1] -= 1
+
+
+@compiled
+def take_mean(mean: FloatArray, row: FloatArray, period_s: float) -> bool:
+    """Add a sample to a mean; return True, with the mean in ``row``, if ``period_s`` passed since the last one."""
+    if row[0] - mean[_LAST_S] > period_s:  # a gap: older samples say nothing about the present
+        for i in range(_PUSHED_S):
+            mean[i] = 0.0
+    mean[_LAST_S] = row[0]
+    for i in range(row.size):
+        mean[i] += row[i]
+    mean[_COUNT] += 1.0
+    if row[0] - mean[_PUSHED_S] < 0.9 * period_s:
+        return False
+    mean[_PUSHED_S] = row[0]
+    for i in range(row.size):
+        row[i] = mean[i] / mean[_COUNT]
+    for i in range(_PUSHED_S):
+        mean[i] = 0.0
+    return True
+
+
+@compiled
+def newest_time(rings: Rings, ring: int, rows: FloatArray) -> float:
+    """Return the time of the newest row, or minus infinity."""
+    count: int = rings.cursors[ring, 1]
+    if count == 0:
+        return -math.inf
+    newest_s: float = rows[slot_of(rings, ring, rows.shape[0], count - 1), 0]
+    return newest_s
 
 
 @compiled

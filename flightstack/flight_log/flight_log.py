@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -18,7 +18,7 @@ from flightstack.core.contract import FloatArray, LoopRow
 from flightstack.core.geodesy import GeoPoint
 from flightstack.flight_log import ulog
 from flightstack.flight_log.row_block import RowBlock, TimeArray, content_size
-from flightstack.flight_log.topics import EVENT_TOPICS, OUTER, OUTER_TOPICS, Topic, inner_topics
+from flightstack.flight_log.topics import EVENT_TOPICS, OUTER, OUTER_TOPICS, Group, Topic, inner_topics
 from flightstack.mavlink.fields import COUNTERS, STRUCT_CODES, fitted
 from flightstack.params.vehicle import Vehicle, system_type
 
@@ -103,6 +103,9 @@ class FlightLog:
         self._inner_topics = inner_topics(rotors)
         self.inner = Trace(capacity, LoopRow.SIZE, self.flush)
         self.outer = Trace(capacity, OUTER.size, self.flush)
+        self.sampled: dict[str, Trace] = {}
+        """Traces of the groups of ``start``, by name."""
+        self._sampled_blocks: list[tuple[Trace, RowBlock]] = []
         self.error: OSError | None = None
         self._size = 0  # bytes of complete messages
         self._closed = False
@@ -123,15 +126,22 @@ class FlightLog:
         info: Mapping[str, str | int | float],
         parameters: Mapping[str, float],
         origin: GeoPoint,
+        groups: Sequence[Group] = (),
     ) -> None:
-        """Write header and definitions; ``origin`` is the origin of the local frame. Call first, once."""
-        self._outer_block = RowBlock(
-            OUTER_TOPICS,
-            self._first_outer_id,
-            self.outer.capacity,
-            {"ref_lat": origin.latitude_deg, "ref_lon": origin.longitude_deg, "ref_alt": origin.altitude_m},
-        )
-        topics = (*self._inner_topics, *OUTER_TOPICS, *EVENT_TOPICS)
+        """Write header and definitions, with ``groups`` of further topics. Call first, once.
+
+        ``origin`` is the origin of the local frame.
+        """
+        reference = {
+            "ref_lat": origin.latitude_deg, "ref_lon": origin.longitude_deg, "ref_alt": origin.altitude_m,
+        }  # fmt: skip
+        capacity = self.outer.capacity
+        self._outer_block = RowBlock(OUTER_TOPICS, self._first_outer_id, capacity, reference)
+        topics = [*self._inner_topics, *OUTER_TOPICS, *EVENT_TOPICS]
+        for group in groups:
+            trace = self.sampled[group.name] = Trace(capacity, group.columns, self.flush)
+            self._sampled_blocks.append((trace, RowBlock(group.topics, len(topics), capacity, reference)))
+            topics += group.topics
         self._write(ulog.file_header(time_us), ulog.HEADER_SIZE)
         parts = []
         for topic in topics:
@@ -152,6 +162,10 @@ class FlightLog:
             assert self._outer_block is not None, "start() comes first"
             self._write(self._outer_block.encode(outer.times_us[: outer.n], outer.rows[: outer.n]))
             outer.n = 0
+        for trace, block in self._sampled_blocks:
+            if trace.n:
+                self._write(block.encode(trace.times_us[: trace.n], trace.rows[: trace.n]))
+                trace.n = 0
 
     def event(self, topic: str, time_us: int, **fields: float) -> None:
         """Write a message of an event topic after the buffered rows; omitted fields have defaults."""
@@ -162,6 +176,11 @@ class FlightLog:
         """Write a text with MAV_SEVERITY ``level``."""
         self.flush()
         self._write(ulog.logged_string(time_us, level, text))
+
+    def information(self, key: str, value: bytes) -> None:
+        """Write an information message after the buffered rows."""
+        self.flush()
+        self._write(ulog.information(key, value))
 
     def parameter(self, name: str, value: float) -> None:
         """Write a changed parameter after the buffered rows."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +22,13 @@ from flightstack.core.contract import (
 from flightstack.core.enums import NAVIGATION_STATE
 from flightstack.core.geodesy import GeoPoint
 from flightstack.flight_log.flight_log import FlightLog
-from flightstack.flight_log.topics import ARMING_STATE_ARMED, ARMING_STATE_DISARMED, OUTER, outer_heading
+from flightstack.flight_log.topics import (
+    ARMING_STATE_ARMED,
+    ARMING_STATE_DISARMED,
+    OUTER,
+    Group,
+    outer_heading,
+)
 from flightstack.guidance.navigator import MissionProgress
 
 if TYPE_CHECKING:
@@ -42,10 +48,11 @@ class FlightRecorder:
         parameters: Callable[[], Mapping[str, float]],
         home: GeoPoint,
         battery: Callable[[], Battery],
+        groups: Sequence[Group] = (),
     ) -> None:
         """``parameters`` returns the values at the start of a log; ``home`` is the origin of the local frame.
 
-        ``battery`` returns the newest report.
+        ``battery`` returns the newest report. ``groups`` are further topics of the logs.
         """
         self._open_log = open_log
         self._info = info
@@ -53,6 +60,7 @@ class FlightRecorder:
         self._origin = home
         self._battery, self._battery_due_us = battery, 0
         self._home = (home, Vector3(0.0, 0.0, 0.0))
+        self._groups = groups
         self._log: FlightLog | None = None
         scratch = np.zeros(LoopRow.SIZE)
         self._no_row: Callable[[int], FloatArray] = lambda _: scratch
@@ -65,6 +73,11 @@ class FlightRecorder:
         self._missions = 0
         self._armed = False
         self._error: OSError | None = None
+
+    @property
+    def log(self) -> FlightLog | None:
+        """The open log."""
+        return self._log
 
     @property
     def is_logging(self) -> bool:
@@ -127,7 +140,7 @@ class FlightRecorder:
             return
         self.inner_row = self._log.inner.append
         self._battery_due_us = time_us
-        self._log.start(time_us, self._info, self._parameters(), self._origin)
+        self._log.start(time_us, self._info, self._parameters(), self._origin, self._groups)
         self._write_home(time_us)
         self.landed(time_us, True)
         self._write_mission(time_us)
@@ -141,6 +154,10 @@ class FlightRecorder:
         """Record where home is now."""
         self._home = (home, position_ned_m)
         self._write_home(time_us)
+
+    def set_origin(self, origin: GeoPoint) -> None:
+        """Set the origin of the local frame of the next logs."""
+        self._origin = origin
 
     def _write_home(self, time_us: int) -> None:
         if self._log is None:

@@ -56,9 +56,17 @@ class Topic(NamedTuple):
     fields: tuple[Field, ...]
 
 
+class Group(NamedTuple):
+    """Topics written from the rows of one trace with this number of columns."""
+
+    name: str
+    columns: int
+    topics: tuple[Topic, ...]
+
+
 @compiled
 def outer_heading(rows: FloatArray) -> FloatArray:
-    """Return the heading [rad] of each row of the outer loop's trace, shape (n, 30)."""
+    """Return the heading [rad] of each row, which begins with a state as that of the outer loop's trace."""
     headings = np.empty(len(rows))
     for i in range(len(rows)):
         w, x, y, z = (

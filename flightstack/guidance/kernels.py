@@ -25,20 +25,24 @@ from flightstack.core.contract import (
     VehicleState,
 )
 from flightstack.core.enums import Mode
-from flightstack.core.geometry import blend, euler_from_quaternion
+from flightstack.core.geometry import blend, euler_from_quaternion, rotate
 from flightstack.core.portable_math import sin_cos
+from flightstack.guidance.follow import follow_horizontally
 from flightstack.guidance.land_detector import DESCENT_M_S, LandMemory, land_detector_step, lift_share
 from flightstack.guidance.manual import manual_step
 from flightstack.guidance.mission import mission_goal, mission_step, with_landing_descent
-from flightstack.guidance.mode_target import RETURN, advance_return, target_goal
+from flightstack.guidance.mode_target import LAND, RETURN, advance_return, target_goal
 from flightstack.guidance.offboard import attitude_step, point_step
 from flightstack.guidance.params import GuidanceParams
-from flightstack.guidance.setpoints import ATTITUDE
+from flightstack.guidance.setpoints import ATTITUDE, NOT_GIVEN
 from flightstack.guidance.trajectory import Trajectory, TrajectoryLimits, setpoint_of, trajectory_step
 from flightstack.params.vehicle import GRAVITY_M_S2
 
+DESCEND, DESCEND_LEVEL = 64, 65
+"""Numbers of the mode LAND without a position: the vehicle brakes, or without a velocity stays level and drifts."""
 MISSION, OFFBOARD, POSITION = int(Mode.MISSION), int(Mode.OFFBOARD), int(Mode.POSITION)
 
+_STOP = Vector3(0.0, 0.0, 0.0)
 TRAJECTORY_SIZE = 11
 GUIDANCE_PARAMS_SIZE = len(GuidanceParams._fields)
 LAND_MEMORY_SIZE = 4
@@ -65,6 +69,23 @@ def _limit_sink_lead(last: Trajectory, reference: Trajectory, state: VehicleStat
 
 
 @compiled
+def _without_position(
+    last: Trajectory,
+    reference: Trajectory,
+    state: VehicleState,
+    brakes: bool,
+    limits: TrajectoryLimits,
+    dt_s: float,
+) -> Trajectory:
+    """Return the reference at the vehicle's horizontal position; it ``brakes``, or demands no tilt."""
+    t, p, v = reference, state.position_ned_m, state.velocity_ned_m_s
+    vx, vy, ax, ay = v.x, v.y, 0.0, 0.0
+    if brakes:
+        _, _, vx, vy, ax, ay = follow_horizontally(last, NOT_GIVEN, _STOP, NOT_GIVEN, 0.0, limits, dt_s)
+    return Trajectory(p.x, p.y, t.z, vx, vy, t.vz, ax, ay, t.az, t.yaw_rad, t.yaw_rate_rad_s)
+
+
+@compiled
 def _press_m_s2(reference: Trajectory, state: VehicleState, spare_m_s2: float) -> float:
     """Return the downward acceleration to add, at most ``spare_m_s2``, for a vehicle behind a sinking reference."""
     lack_m_s = reference.vz - state.velocity_ned_m_s.z
@@ -75,23 +96,48 @@ def _press_m_s2(reference: Trajectory, state: VehicleState, spare_m_s2: float) -
 
 
 @compiled
+def _press(
+    reference: Trajectory, state: VehicleState, attitude: Quaternion, lift: float, last_press: Vector3
+) -> Vector3:
+    """Return the acceleration to add [m/s² NED]. It reduces the thrust and keeps the tilt.
+
+    ``attitude`` and ``lift`` are the last target, which includes ``last_press``. Without the horizontal part, the
+    tilt that holds the position in wind would double as the thrust is reduced.
+    """
+    lift_m_s2 = lift * GRAVITY_M_S2
+    unpressed_m_s2 = lift_m_s2 + last_press.z
+    down_m_s2 = _press_m_s2(reference, state, unpressed_m_s2 - PRESSED_LIFT * GRAVITY_M_S2)
+    if down_m_s2 == 0.0:
+        return Vector3(0.0, 0.0, 0.0)
+    axis = rotate(attitude, Vector3(0.0, 0.0, -1.0))
+    along = max(lift_m_s2, 0.5 * GRAVITY_M_S2) / max(-axis.z, 0.5)
+    share = down_m_s2 / max(unpressed_m_s2, 0.5 * GRAVITY_M_S2)
+    return Vector3(
+        -share * (axis.x * along - last_press.x), -share * (axis.y * along - last_press.y), down_m_s2
+    )
+
+
+@compiled
 def _finish(
     last: Trajectory,
     reference: Trajectory,
     state: VehicleState,
     trajectory: FloatArray,
     land: FloatArray,
-    lift: float,
+    target: AttitudeTarget,
+    params: GuidanceParams,
     descent_m_s: float,
     dt_s: float,
     setpoint: FloatArray,
 ) -> None:
-    """Store the reference, write the setpoint, and advance the land detector."""
-    pressed_m_s2 = position_setpoint(setpoint).acceleration_ned_m_s2.z - last.az
-    spare_m_s2 = pressed_m_s2 + (lift - PRESSED_LIFT) * GRAVITY_M_S2
+    """Store reference and setpoint, and advance the land detector; ``target`` is the last attitude target."""
+    lift = lift_share(state, target.thrust_n, params.weight_n)
+    last_a = position_setpoint(setpoint).acceleration_ned_m_s2
+    last_press = Vector3(last_a.x - last.ax, last_a.y - last.ay, last_a.z - last.az)
     store(trajectory, reference)
     p, v, a, yaw_rad, yaw_rate_rad_s = setpoint_of(reference)
-    pressed = Vector3(a.x, a.y, a.z + _press_m_s2(reference, state, spare_m_s2))
+    press = _press(reference, state, target.attitude, lift, last_press)
+    pressed = Vector3(a.x + press.x, a.y + press.y, a.z + press.z)
     store_position_setpoint(setpoint, PositionSetpoint(p, v, pressed, yaw_rad, yaw_rate_rad_s))
     memory = LandMemory(*as_tuple(land, LAND_MEMORY_SIZE))
     store(land, land_detector_step(memory, state, lift, descent_m_s, dt_s))
@@ -157,11 +203,13 @@ def goal_kernel(
     else:
         if mode == RETURN:
             advance_return(a, state, params)
-        goal = target_goal(mode, a, params)
+        goal = target_goal(LAND if mode >= DESCEND else mode, a, params)
     goal = with_landing_descent(goal, state.position_ned_m.z, params)
-    lift = lift_share(state, attitude_target(last_target).thrust_n, params.weight_n)
     reference = _limit_sink_lead(last, trajectory_step(last, goal, _limits(params), dt_s), state)
-    _finish(last, reference, state, trajectory, land, lift, reference.vz, dt_s, setpoint)
+    if mode >= DESCEND:
+        reference = _without_position(last, reference, state, mode == DESCEND, _limits(params), dt_s)
+    loop_target = attitude_target(last_target)
+    _finish(last, reference, state, trajectory, land, loop_target, params, reference.vz, dt_s, setpoint)
 
 
 @compiled
@@ -187,7 +235,7 @@ def stream_kernel(
     state = vehicle_state(state_array)
     params = GuidanceParams(*as_tuple(params_array, GUIDANCE_PARAMS_SIZE))
     last, limits = Trajectory(*as_tuple(trajectory, TRAJECTORY_SIZE)), _limits(params)
-    lift = lift_share(state, attitude_target(last_target).thrust_n, params.weight_n)
+    loop_target = attitude_target(last_target)
     s = stream[0]
     if mode == OFFBOARD and s["kind"] >= ATTITUDE:
         reference = attitude_step(s, last_target, state, params, limits, dt_s, target)
@@ -199,4 +247,4 @@ def stream_kernel(
             reference = manual_step(last, s["sticks"], state, mode == POSITION, params, limits, dt_s)
         reference = _limit_sink_lead(last, reference, state)
         descent_m_s = reference.vz
-    _finish(last, reference, state, trajectory, land, lift, descent_m_s, dt_s, setpoint)
+    _finish(last, reference, state, trajectory, land, loop_target, params, descent_m_s, dt_s, setpoint)

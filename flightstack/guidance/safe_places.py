@@ -47,6 +47,7 @@ class SafePlaces:
         self.home_is_chosen = False
         """True if a user has set home; it then does not follow the vehicle."""
         self.points: tuple[ReturnPlace, ...] = ()
+        self._fence_items: tuple[MissionItem, ...] = ()
         self._rally_items: tuple[MissionItem, ...] = ()
         self.ids: tuple[int, int, int] = (0, 0, 0)
         """Opaque ids of mission, geofence and rally points; the owner of the stores keeps them."""
@@ -66,6 +67,13 @@ class SafePlaces:
         self.home = ReturnPlace(local.x, local.y, -local.z)
         self.set_rally(self._rally_items)
         return None
+
+    def move_origin(self, origin: GeoPoint) -> None:
+        """Move the origin of the local frame, and home with it unless a user has set home; keep all other places."""
+        self.frame.move_to(origin)
+        self.set_fence(self._fence_items)
+        if not self.home_is_chosen or self.set_home(self.home_point, chosen=True) is not None:
+            self.set_home(origin, chosen=False)
 
     def has_left_home(self, position_ned_m: Vector3) -> bool:
         """Return True if a position differs from home by more than ``HOME_SPREAD_M``."""
@@ -93,6 +101,7 @@ class SafePlaces:
 
     def set_fence(self, items: Sequence[MissionItem]) -> Fence:
         """Set a checked geofence, and return it."""
+        self._fence_items = tuple(items)
         self.fence = Fence.from_items(items, self.frame) if items else NO_FENCE
         return self.fence
 

@@ -16,6 +16,10 @@ DEFAULT_HOME = GeoPoint(47.397742, 8.545594, 488.0)
 DEFAULT_CONTROLLER = "pid"
 DEFAULT_INNER_HZ = 500.0
 DEFAULT_OUTER_HZ = 100.0
+ESTIMATED, TRUTH = "estimated", "truth"
+STATES = (ESTIMATED, TRUTH)
+"""Sources of the state: the vehicle's sensors, or the simulator."""
+DEFAULT_STATE = TRUTH
 
 
 @dataclass(frozen=True)
@@ -29,6 +33,8 @@ class StackConfig:
     """Control loops in use; syntax in ``flightstack.firmware.choice``."""
     inner_hz: float = DEFAULT_INNER_HZ
     outer_hz: float = DEFAULT_OUTER_HZ
+    state: str = DEFAULT_STATE
+    """Source of the state, one of ``STATES``."""
     ideal_rotors: bool = False
     lockstep: bool = True
     home: GeoPoint = DEFAULT_HOME

@@ -1,14 +1,17 @@
 """Parameter files in QGroundControl's ``.params`` format: five tab-separated columns.
 
 Reading is strict: a malformed line, a rejected value or a truncated file raises an error with file and line. Parameters
-that the current vehicle and controller do not have are kept. Writing is atomic.
+that the current vehicle and controller do not have are kept. Writing is atomic, also among vehicles that share a file.
 """
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import math
+import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -168,22 +171,55 @@ def _kind_problem(spec: ParamSpec, item: ParamLine) -> str | None:
     return f"is {f'an integer, type {INT32}' if spec.is_integer else f'a real number, type {REAL32}'}, in the vehicle"
 
 
-def lines_to_save(store: ParamStore, loaded: LoadedParams) -> list[ParamLine]:
-    """Return the lines of the file: parameters that differ from their defaults, and unknown ones.
+class ParamFile:
+    """The parameter file that a vehicle saves to.
 
-    A parameter that is overridden for this run keeps its line of the file.
+    Several vehicles may share it: each writes only the parameters that it has changed since it last read or wrote them.
     """
-    kept = {name: loaded.lines[name] for name in loaded.unknown}
-    for name, spec in store.specs.items():
-        if store.is_overridden(name):
-            if name in loaded.lines:
-                kept[name] = loaded.lines[name]
-        elif not store.is_default(name):
-            kept[name] = ParamLine(name, store.value(name), spec.is_integer)
-    return list(kept.values())
+
+    def __init__(self, path: Path, system_id: int, loaded: LoadedParams = NOTHING_LOADED) -> None:
+        self._path = path
+        self._system_id = system_id
+        self._lines = dict(loaded.lines)
+        self._saved = {name: item.value for name, item in self._lines.items()}
+
+    def save(self, store: ParamStore) -> None:
+        """Write changed parameters atomically, those with their default by removing the line.
+
+        Parameters that are overridden for this run, unknown ones, and what another vehicle wrote keep their lines.
+        Raise OSError, and ConfigError for a file that is damaged by now.
+        """
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        saved = self._saved.copy()
+        with _locked(self._path):
+            lines = self._lines.copy()
+            if self._path.exists():  # if not, it was removed during the run
+                lines = {item.name: item for item in read_param_file(self._path)}
+            for name, spec in store.specs.items():
+                value = store.value(name)
+                if store.is_overridden(name) or value == saved.get(name, spec.default):
+                    continue
+                saved[name] = value
+                lines[name] = ParamLine(name, value, spec.is_integer)
+                if value == spec.default:
+                    del lines[name]
+            write_text_atomically(self._path, format_params(lines.values(), self._system_id))
+        self._lines, self._saved = lines, saved
 
 
-def save(store: ParamStore, loaded: LoadedParams, path: Path, system_id: int) -> None:
-    """Write the parameter file atomically; raise OSError."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_text_atomically(path, format_params(lines_to_save(store, loaded), system_id))
+@contextlib.contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Lock the file against other processes that replace it, if it exists and the file system has locks."""
+    file: int | None = None
+    with contextlib.suppress(OSError):
+        while file is None:
+            file = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+            fcntl.flock(file, fcntl.LOCK_EX)
+            if not os.path.samestat(os.fstat(file), path.stat()):  # it was replaced meanwhile
+                os.close(file)
+                file = None
+    try:
+        yield
+    finally:
+        if file is not None:
+            os.close(file)

@@ -7,6 +7,7 @@ import math
 import select
 import signal
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from types import FrameType
 
@@ -122,12 +123,13 @@ class App:
                     wait_for_state(simulator, self.stack, self._process, self._serve_while_waiting)
                 waits = False
                 if holds_time:
+                    if self.stack.estimation is not None:
+                        waits = True
+                        self._run(simulator, until=self.stack.estimation.is_ready)
+                        waits = False
                     self._hold_time(simulator)
                 holds_time = False
-                if self._lockstep:
-                    self._run_lockstep(simulator)
-                else:
-                    self._run_real_time(simulator)
+                self._run(simulator)
             except RebootRequestedError:
                 self._reboot()
                 if not holds_time:  # the last state was answered: the simulator sends the next one
@@ -226,7 +228,14 @@ class App:
 
     # ------------------------------------------------------------------ loops
 
-    def _run_lockstep(self, simulator: TcpClient) -> None:
+    def _run(self, simulator: TcpClient, until: Callable[[], bool] | None = None) -> None:
+        """Run the loops until ``until`` is true before an outer tick, whose state stays unanswered."""
+        if self._lockstep:
+            self._run_lockstep(simulator, until)
+        else:
+            self._run_real_time(simulator, until)
+
+    def _run_lockstep(self, simulator: TcpClient, until: Callable[[], bool] | None) -> None:
         """Answer each state with actuator commands; the simulator drives the time."""
         link, autopilot, timing = self.stack.simulator, self.stack.autopilot, self.stack.timing
         lockstep = Lockstep(link, autopilot, self.stack.rates.interval_us)
@@ -236,6 +245,8 @@ class App:
         fresh, began_ns, before_ns = True, 0, 0  # fresh: the state received before the start
         while True:
             if fresh:
+                if until is not None and tick % divisor == 0 and until():
+                    return
                 before_ns, began_ns = began_ns, clock_ns()
                 commands = lockstep.tick(began_ns)
                 simulator.send(link.answer(commands, autopilot.now.status.armed))
@@ -266,7 +277,7 @@ class App:
                 return self.stack.simulator.receive(data)
             check_deadline(deadline_s, self.stack, self._process)
 
-    def _run_real_time(self, simulator: TcpClient) -> None:
+    def _run_real_time(self, simulator: TcpClient, until: Callable[[], bool] | None) -> None:
         """Tick at fixed deadlines on the newest state; the machine's clock drives the time."""
         link, autopilot, timing = self.stack.simulator, self.stack.autopilot, self.stack.timing
         minimise_timer_slack()
@@ -280,6 +291,8 @@ class App:
             data = simulator.receive_now()
             if data is not None and link.receive(data):
                 heard_s = began_ns * 1e-9
+            if until is not None and until():
+                return
             commands = autopilot.tick(time_us)
             simulator.send(link.answer(commands, autopilot.now.status.armed))
             timing.tick(began_ns, time.monotonic_ns())

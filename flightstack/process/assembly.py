@@ -15,14 +15,17 @@ from flightstack.control.backend import ControlBackend
 from flightstack.control.controller import controller_of
 from flightstack.control.controller_loading import check_python, load_controller
 from flightstack.control.loop_parameters import loop_numbers
+from flightstack.core.errors import ConfigError
+from flightstack.core.geodesy import GeoPoint
 from flightstack.firmware.c_loops import LoopsSetup
 from flightstack.firmware.choice import PYTHON, parse_loops
 from flightstack.firmware.law_tree import law_tree, own_params
 from flightstack.firmware.targets import make_loops
 from flightstack.flight_log.flight_log import vehicle_fields
 from flightstack.flight_log.recorder import FlightRecorder, OpenLog
+from flightstack.flight_log.sensor_recorder import SENSOR_GROUPS, SensorRecorder
 from flightstack.guidance.safe_places import SafePlaces
-from flightstack.params.config import AUTOPILOT, GENERIC, SYSTEM_ID, StackConfig
+from flightstack.params.config import AUTOPILOT, ESTIMATED, GENERIC, STATES, SYSTEM_ID, StackConfig
 from flightstack.params.gains_file import open_gains
 from flightstack.params.param_file import LoadedParams
 from flightstack.params.store import ParamStore
@@ -36,7 +39,8 @@ from flightstack.services.telemetry.telemetry import Telemetry
 from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.assembly import VehicleParts, assemble
-from flightstack.vehicle.autopilot import Autopilot
+from flightstack.vehicle.autopilot import TickingAutopilot
+from flightstack.vehicle.estimation import Estimation, SensorAutopilot, Users
 from flightstack.vehicle.flight_state import FlightState
 from flightstack.vehicle.journal import Journal
 from flightstack.vehicle.parameters import (
@@ -52,6 +56,7 @@ _KERNELS = (
     "follow_rotors", "detect", "fence_step", "store_outer_row", "outer_heading", "euler_rad",
 )  # fmt: skip
 _LOOP_KERNELS = ("inner_kernel", "outer_kernel")
+_ESTIMATOR_KERNELS = ("imu_kernel", "push_kernel", "field_kernel")
 _REAL_TIME_KERNELS = ("stream_kernel",)
 """Kernels that a vehicle in lockstep compiles or loads at their first use."""
 
@@ -76,11 +81,14 @@ class Stack(NamedTuple):
     loops: ControlBackend
     status: Callable[[], VehicleStatus]
     """Returns the current status."""
+    autopilot: TickingAutopilot
+    estimation: Estimation | None
+    """None for a vehicle that flies on the simulator's state."""
 
     @property
-    def autopilot(self) -> Autopilot:
-        """The autopilot, which runs ticks."""
-        return self.parts.autopilot
+    def is_ready(self) -> bool:
+        """True if the state is known well enough to take off: at once on the simulator's, after seconds on sensors."""
+        return self.estimation is None or self.estimation.is_ready()
 
     @property
     def now(self) -> FlightState:
@@ -105,7 +113,15 @@ class Stack(NamedTuple):
 
 def vehicle_of(config: StackConfig) -> Vehicle:
     """Load the vehicle; raise ConfigError."""
+    if config.state not in STATES:
+        raise ConfigError(
+            "--state", config.state, f"is not one of {', '.join(STATES)}; the directory is --state-dir"
+        )
     vehicle = load_vehicle(config.vehicle)
+    if config.state == ESTIMATED and not vehicle.sensors.numbers:
+        raise ConfigError(
+            "--state", config.state, f"needs sensors, and {config.vehicle} has none: add [sensors]"
+        )
     return vehicle.with_ideal_rotors() if config.ideal_rotors else vehicle
 
 
@@ -113,6 +129,7 @@ def kernels_of(config: StackConfig) -> tuple[str, ...]:
     """Return the names of the kernels that ``build`` compiles or loads: those of the loops, then the other ones."""
     needs_loops = config.loops == PYTHON
     kernels = tuple(name for name in _KERNELS if needs_loops or name not in _LOOP_KERNELS)
+    kernels += _ESTIMATOR_KERNELS if config.state == ESTIMATED else ()
     return kernels if config.lockstep else kernels + _REAL_TIME_KERNELS
 
 
@@ -172,13 +189,18 @@ def _join(
     params, loaded = load_parameters(config, backend)
     behaviour, system_id = behaviour_of(params), int(params.value(SYSTEM_ID))
     info = _log_info(config, setup, loop_rates, backend.version)
-    simulator = SimulatorEndpoint(vehicle, config.home, config.lockstep, system_id, loop_rates.interval_us)
-    recorder = FlightRecorder(open_log, info, params.values, config.home, lambda: simulator.battery)
+    simulator = SimulatorEndpoint(
+        vehicle, config.home, config.lockstep, system_id, loop_rates.interval_us,
+        uses_sensors=config.state == ESTIMATED,
+    )  # fmt: skip
+    groups = () if simulator.sensors is None else SENSOR_GROUPS
+    recorder = FlightRecorder(open_log, info, params.values, config.home, lambda: simulator.battery, groups)
     parts = assemble(
         vehicle, backend, behaviour, config.home, loop_rates.divisor, loop_rates.outer_hz, recorder,
         simulator.state, simulator.rotor_speed_rad_s, simulator,
     )  # fmt: skip
     parts.warm_up(with_streams=not config.lockstep)
+    autopilot, estimation = _on_sensors(parts, simulator, params, recorder, config.home)
     connect_parameters(params, parts, recorder)
     timing = LoopTiming(round(1e9 / loop_rates.inner_hz))
     report = TimingReport(timing, loop_rates, config.lockstep)
@@ -186,14 +208,36 @@ def _join(
     vehicle_id = vehicle_info(vehicle, system_id, generic, parts.places.frame)
 
     def status() -> VehicleStatus:
-        return vehicle_status(vehicle_id, parts, simulator.battery)
+        sensed = None if estimation is None else estimation.sensed()
+        return vehicle_status(vehicle_id, parts, simulator.battery, sensed)
 
-    telemetry = Telemetry(status, lambda: parts.now.time_us, report.message)
+    telemetry = Telemetry(status, lambda: parts.now.time_us, report.message, estimation is not None)
     context = VehicleContext.of(parts, params, simulator, generic, logs)
     ground = GroundHub(context, parts, telemetry, vehicle_id)
     return Stack(
-        vehicle, loop_rates, simulator, parts, ground, recorder, timing, report, params, loaded, backend, status
+        vehicle, loop_rates, simulator, parts, ground, recorder, timing, report, params, loaded, backend, status,
+        autopilot, estimation,
     )  # fmt: skip
+
+
+def _on_sensors(
+    parts: VehicleParts,
+    simulator: SimulatorEndpoint,
+    params: ParamStore,
+    recorder: FlightRecorder,
+    home: GeoPoint,
+) -> tuple[TickingAutopilot, Estimation | None]:
+    """Return the autopilot to tick; that of a vehicle on sensors estimates its state first.
+
+    ``home`` is the origin of the simulator's true state.
+    """
+    if simulator.sensors is None:
+        return parts.autopilot, None
+    users = Users(parts.area, parts.failsafes, parts.navigator, parts.backend, parts.journal)
+    sensor_recorder = SensorRecorder(recorder, parts.places.frame, home)
+    estimation = Estimation(simulator.sensors, parts.now, users, params, sensor_recorder, simulator.truth)
+    estimation.warm_up()
+    return SensorAutopilot(parts.autopilot, estimation), estimation
 
 
 def _log_info(
@@ -227,7 +271,7 @@ def reboot_config(stack: Stack, config: StackConfig) -> StackConfig:
 
 
 def transfer_state(old: Stack, new: Stack) -> None:
-    """Copy peers, plans, home and the newest state to the new stack at a reboot.
+    """Copy peers, plans, home and the newest state to the new stack at a reboot. An estimator begins anew.
 
     Vehicle clock, modes, failsafes, sequence numbers, transfers, counters and timing restart. The process keeps signing
     timestamps, the number of the next log, and the parameter file for all stacks.
@@ -238,4 +282,4 @@ def transfer_state(old: Stack, new: Stack) -> None:
     new.ground.adopt_plans(old.ground)
     new.ground.last_heard_s = old.ground.last_heard_s
     new.simulator.resume(old.simulator)
-    new.now.has_state = old.now.has_state
+    new.now.has_state = old.now.has_state and new.estimation is None

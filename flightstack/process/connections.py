@@ -134,7 +134,7 @@ def wait_for_state(
             has_warned = True
             _warn_of_silence(stack, process)
         check_deadline(began_s + process.simulator_timeout_s, stack, process)
-    stack.now.has_state = True
+    stack.now.has_state = stack.estimation is None
 
 
 def serve_while_idle(

@@ -131,6 +131,14 @@ ParamFile = Annotated[
     ),
 ]
 State = Annotated[
+    str,
+    typer.Option(
+        help="estimated (from the sensors of the vehicle) or truth (of the simulator).",
+        metavar="STATE",
+        **IN_LOOPS,
+    ),
+]
+StateDir = Annotated[
     str | None,
     typer.Option(
         help="Directory for parameters, mission, geofence, rally points and home, restored at the next start; "

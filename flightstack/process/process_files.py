@@ -9,7 +9,7 @@ from flightstack.firmware.targets import finish_loops
 from flightstack.flight_log.flight_log import FlightLog
 from flightstack.mavlink.signing import Signing
 from flightstack.params.config import SYSTEM_ID, StackConfig
-from flightstack.params.param_file import save
+from flightstack.params.param_file import ParamFile
 from flightstack.process.assembly import Stack, build
 from flightstack.process.console import say
 from flightstack.process.log_files import FileTail, LogFiles
@@ -145,10 +145,7 @@ class ProcessFiles:
 
 def _param_saver(stack: Stack, path: Path) -> FileSaver:
     """Return the saver of a stack's parameters to ``path``."""
-    system_id = int(stack.params.value(SYSTEM_ID))
-    saver = FileSaver(
-        lambda: save(stack.params, stack.loaded_params, path, system_id),
-        f"the parameters are not saved to {path}",
-    )
+    file = ParamFile(path, int(stack.params.value(SYSTEM_ID)), stack.loaded_params)
+    saver = FileSaver(lambda: file.save(stack.params), f"the parameters are not saved to {path}")
     stack.params.subscribe(lambda *_: saver.change())
     return saver

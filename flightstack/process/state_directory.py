@@ -48,9 +48,9 @@ class StateDirectory:
         except OSError as error:
             if not self.is_named:
                 return None
-            raise ConfigError("--state", str(self.path), f"cannot be created: {error.strerror}") from None
+            raise ConfigError("--state-dir", str(self.path), f"cannot be created: {error.strerror}") from None
         if self.is_named and not os.access(self.path, os.W_OK | os.X_OK):
-            raise ConfigError("--state", str(self.path), "is not writable: permission denied")
+            raise ConfigError("--state-dir", str(self.path), "is not writable: permission denied")
         self._take_lock()
         return self._adopt_params()
 
@@ -60,8 +60,8 @@ class StateDirectory:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             self.close()
-            reason = "is in use by another vehicle: give each its own --instance or --state DIR"
-            raise ConfigError("--state", str(self.path), reason) from None
+            reason = "is in use by another vehicle: give each its own --instance or --state-dir DIR"
+            raise ConfigError("--state-dir", str(self.path), reason) from None
         except OSError:  # no support for locks, or not writable
             self.close()
 
@@ -132,7 +132,9 @@ class FileSaver:
     def _sentence(self, error: Exception | None) -> str | None:
         if error is None:
             return None
-        reason = error.strerror if isinstance(error, OSError) else f"{type(error).__name__}: {error}"
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        if not isinstance(error, OSError | ConfigError):
+            reason = f"{type(error).__name__}: {error}"
         return f"{self._failure}: {reason or error}"
 
     def take_error(self) -> str | None:

@@ -198,9 +198,8 @@ class SimulatorEndpoint:
         return fresh
 
     def _take_clock(self, sensors: SensorInbox) -> None:
-        before_us = self.time_us
         self._take_time(sensors.clock_us)
-        sensors.stamp(self.time_us, self.time_us - before_us)
+        sensors.stamp(self.time_us)
 
     def _receive_any(self, data: memoryview) -> bool:
         fresh = False

@@ -43,6 +43,7 @@ _PAYLOAD = struct.Struct("<Q13fIB")
 _TIME, _FIELDS = struct.Struct("<Q"), struct.Struct("<IB")
 _FIELDS_AT = _PAYLOAD.size - _FIELDS.size
 _CRC = struct.Struct("<H")
+_HEAD = struct.Struct("<BBB4x3s")  # magic, size, incompatible flags, message
 _SENSOR_EXTRA: int = mavlink.MAVLink_hil_sensor_message.crc_extra
 _SENSOR_EXTRA_BYTE = bytes([_SENSOR_EXTRA])
 _crc16 = crc16.mcrf4xx
@@ -57,7 +58,8 @@ class HilSensorFrame:
         HEADER.pack_into(
             self._frame, 0, MAGIC_V2, _PAYLOAD.size, 0, 0, 0, system_id, component_id, HIL_SENSOR_ID, 0
         )
-        self._head, self._message = bytes(self._frame[:1]), bytes(self._frame[7:HEADER_V2])
+        self._message = bytes(self._frame[7:HEADER_V2])
+        self._payload = self._frame[HEADER_V2 : HEADER_V2 + _PAYLOAD.size]
         self.values = np.frombuffer(self._buffer, "<f4", VALUES, _ALIGNMENT + HEADER_V2 + 8)
         """Measurements, float32, shape (13,)."""
         self.time_us = 0
@@ -66,6 +68,7 @@ class HilSensorFrame:
         self.number = 0
         """Number of the sensor, from 0."""
         self._seq = 0
+        self._parts: dict[int, tuple[memoryview, memoryview]] = {}  # checked part and frame, by their end
 
     def seal(self, time_us: int, fields: int, number: int) -> memoryview:
         """Complete the frame around the values; return its bytes without trailing zeros, valid until the next call."""
@@ -75,27 +78,31 @@ class HilSensorFrame:
         self._seq = (self._seq + 1) & 255
         _TIME.pack_into(frame, HEADER_V2, time_us)
         _FIELDS.pack_into(frame, HEADER_V2 + _FIELDS_AT, fields, number)
+        if not fields | number:  # the last values may be zero, and must not be overwritten by the checksum
+            payload = bytes(frame[HEADER_V2 : HEADER_V2 + _FIELDS_AT]).rstrip(b"\x00") or b"\x00"
+            return memoryview(pack_frame(HIL_SENSOR_ID, payload, _SENSOR_EXTRA, frame[4], frame[5], frame[6]))
         size = _PAYLOAD.size if number else _FIELDS_AT + ((fields.bit_length() + 7) >> 3)
         end = HEADER_V2 + size
-        while size > 1 and not frame[end - 1]:  # without fields the last values may be zero
-            size, end = size - 1, end - 1
         frame[1] = size
-        _CRC.pack_into(frame, end, _crc16(_SENSOR_EXTRA_BYTE, _crc16(frame[1:end])))
-        return frame[: end + CHECKSUM_SIZE]
+        frame[end] = _SENSOR_EXTRA  # the checksum covers one more byte, which is not sent
+        if end not in self._parts:
+            self._parts[end] = frame[1 : end + 1], frame[: end + CHECKSUM_SIZE]
+        checked, sealed = self._parts[end]
+        _CRC.pack_into(frame, end, _crc16(checked))
+        return sealed
 
     def open(self, data: bytes | bytearray | memoryview) -> bool:
         """Copy ``data`` if it is exactly one intact, unsigned HIL_SENSOR of MAVLink 2; else change nothing."""
         end = len(data) - CHECKSUM_SIZE
         size = end - HEADER_V2
-        if not 0 < size <= _PAYLOAD.size or data[0] != MAGIC_V2 or data[1] != size or data[2]:
-            return False
-        if data[7:HEADER_V2] != self._message:
+        if not 0 < size <= _PAYLOAD.size or _HEAD.unpack_from(data) != (MAGIC_V2, size, 0, self._message):
             return False
         if _CRC.unpack_from(data, end)[0] != _crc16(_SENSOR_EXTRA_BYTE, _crc16(data[1:end])):
             return False
-        payload = self._frame[HEADER_V2 : HEADER_V2 + _PAYLOAD.size]
+        payload = self._payload
         payload[:size] = data[HEADER_V2:end]
-        payload[size:] = bytes(_PAYLOAD.size - size)
+        if size < _PAYLOAD.size:
+            payload[size:] = bytes(_PAYLOAD.size - size)
         (self.time_us,) = _TIME.unpack_from(payload)
         self.fields, self.number = _FIELDS.unpack_from(payload, _FIELDS_AT)
         return True

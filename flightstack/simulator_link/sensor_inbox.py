@@ -1,7 +1,8 @@
 """Sensor messages of a simulator that speaks PX4's contract, in the vehicle's time.
 
 HIL_SENSOR of id 0 is the clock. Messages before it, of other inertial sensors or of GNSS, get its time: simulators may
-stamp them by other clocks, and PX4 ignores their stamps as well.
+stamp them by other clocks, and PX4 ignores their stamps as well. HIL_SENSOR of another id that follows the clock with
+the same stamp, as a simulator for PX4 sends it, gets the time of this clock.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ from typing import NamedTuple, TypeAlias
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.simulator_link.sensor_frames import (
+    ACCEL,
+    GYRO,
     HIL_GPS_ID,
     HIL_SENSOR_ID,
     HilGps,
@@ -19,6 +22,7 @@ from flightstack.simulator_link.sensor_frames import (
     gps_of,
 )
 
+_IMU = ACCEL | GYRO
 _DISTANCE_ID = mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR
 _FLOW_ID = mavlink.MAVLINK_MSG_ID_HIL_OPTICAL_FLOW
 MOST_WAITING = 64
@@ -32,7 +36,10 @@ class HilReport(NamedTuple):
     fields: int
     values: tuple[float, ...]
     step_us: int
-    """Time since the last step of the clock; 0 in the first one."""
+    """Time since the last inertial measurement of this sensor; 0 in the first one, and in a report without one.
+
+    It includes the time of measurements that were lost or not taken, so that the sum is the time that passed.
+    """
 
 
 class RangeReport(NamedTuple):
@@ -68,6 +75,8 @@ class SensorInbox:
         self._frame = HilSensorFrame()
         self._waiting: list[Content] = []
         self._reports: list[Report] = []
+        self._time_us, self._stamp_us = 0, -1  # of the last clock
+        self._measured_us: dict[int, int] = {}  # last inertial measurement of each sensor
 
     @property
     def clock_us(self) -> int:
@@ -113,7 +122,10 @@ class SensorInbox:
         frame = self._frame
         if frame.number == 0:
             return True
-        self._wait(HilReport(frame.number, frame.fields, tuple(frame.values.tolist()), 0))
+        if frame.time_us == self._stamp_us:
+            self._report(self._time_us, frame.number, frame.fields, tuple(frame.values.tolist()))
+        else:
+            self._wait(HilReport(frame.number, frame.fields, tuple(frame.values.tolist()), 0))
         return False
 
     def _wait(self, content: Content) -> None:
@@ -121,16 +133,43 @@ class SensorInbox:
             del self._waiting[0]
         self._waiting.append(content)
 
-    def stamp(self, time_us: int, step_us: int) -> None:
+    def stamp(self, time_us: int) -> None:
         """Give the messages since the last clock, and the clock's own measurements, their vehicle time."""
-        frame, reports = self._frame, self._reports
-        for content in self._waiting:
-            report = content._replace(step_us=step_us) if isinstance(content, HilReport) else content
-            reports.append(Report(time_us, report))
-        self._waiting.clear()
-        reports.append(Report(time_us, HilReport(0, frame.fields, tuple(frame.values.tolist()), step_us)))
-        if len(reports) > MOST_WAITING:
-            del reports[: len(reports) - MOST_WAITING]
+        frame = self._frame
+        if self._waiting:
+            for content in self._waiting:
+                if isinstance(content, HilReport):
+                    self._report(time_us, *content[:3])
+                else:
+                    self._reports.append(Report(time_us, content))
+            self._waiting.clear()
+        self._time_us, self._stamp_us = time_us, frame.time_us
+        self._report(time_us, 0, frame.fields, tuple(frame.values.tolist()))
+        if len(self._reports) > MOST_WAITING:
+            self._drop(len(self._reports) - MOST_WAITING)
+
+    def _report(self, time_us: int, number: int, fields: int, values: tuple[float, ...]) -> None:
+        """Report the measurements of a HIL_SENSOR with the duration of the inertial one."""
+        step_us = 0
+        if fields & _IMU == _IMU:
+            step_us = time_us - self._measured_us.get(number, time_us)
+            self._measured_us[number] = time_us
+        self._reports.append(Report(time_us, HilReport(number, fields, values, step_us)))
+
+    def _drop(self, count: int) -> None:
+        """Drop the oldest reports; the next inertial measurement of each sensor lasts as long as all of them."""
+        lost_us: dict[int, int] = {}
+        kept: list[Report] = []
+        for index, report in enumerate(self._reports):
+            content = report.content
+            if isinstance(content, HilReport) and content.fields & _IMU == _IMU:
+                step_us = content.step_us + lost_us.pop(content.number, 0)
+                if index < count:
+                    lost_us[content.number] = step_us
+                report = report._replace(content=content._replace(step_us=step_us))  # noqa: PLW2901
+            if index >= count:
+                kept.append(report)
+        self._reports = kept
 
     def take(self) -> list[Report]:
         """Return the new reports, oldest first, and clear them."""

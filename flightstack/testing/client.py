@@ -243,7 +243,7 @@ class Network:
         """Add a client to a hub, that of a vehicle after a power cycle too."""
         peer = hub.add_peer(client.address, permanent=True)
         if not telemetry:
-            peer.streams = Streams(SLOW_RATES_HZ)
+            peer.streams = Streams(SLOW_RATES_HZ, peer.streams.available)
 
     def exchange(self, hub: GroundHub, now_s: float) -> bool:
         """Exchange the messages of this instant once; return True if any arrived."""

@@ -84,8 +84,10 @@ class Engine:
         self._interval_us, self._divisor = self.stack.rates.interval_us, self.stack.rates.divisor
         self._lockstep = Lockstep(self._endpoint, self.stack.autopilot, self._interval_us)
         self._missed_us = self._next_timing_us = self._ticks = 0
+        if self.stack.estimation is not None:
+            self.simulator.start_sensors(self.config.home)
         self._endpoint.receive(memoryview(self.states()))
-        self._now.has_state = True
+        self._now.has_state = self.stack.estimation is None
 
     def _open_log(self) -> FlightLog:
         self.logs.append(LogBuffer(self._boot_us * 1e-6))

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from flightstack.core.contract import FloatArray
-from gcs_cli.report.analysis import flight_in, parse_ulog
+from gcs_cli.logs.ulog_parser import parse_ulog
+from gcs_cli.report.analysis import flight_in
 from gcs_cli.report.flight_data import Flight as FlightData
 
 Array: TypeAlias = np.ndarray[Any, np.dtype[Any]]
@@ -99,7 +100,8 @@ class Log(Mapping[str, Topic]):
             self._read(content)
 
     def _read(self, content: bytes) -> None:
-        log = self._parsed = parse_ulog(content, _SOURCE)
+        self._parsed = parse_ulog(content, _SOURCE)
+        log = self._parsed.log
         self._data = {item.name: item.data for item in log.data_list}
         self.parameters = dict(log.initial_parameters)
         self.texts = tuple(
@@ -112,7 +114,7 @@ class Log(Mapping[str, Topic]):
         """The flight as ``gcs`` reads it from its log; empty without one."""
         if not self.content:
             return FlightData()
-        data = flight_in(self._parsed, self.content, _SOURCE)
+        data = flight_in(self._parsed, _SOURCE)
         return replace(data, start_s=self._boot_s + data.start_s)
 
     def __getitem__(self, name: str) -> Topic:

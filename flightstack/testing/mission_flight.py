@@ -17,6 +17,9 @@ from gcs_cli.vehicle.view_types import MISSION_COMPLETE, Mission, VehicleView
 if TYPE_CHECKING:
     from flightstack.testing.world import World
 
+READY_S = 60.0
+"""Longest wait for the state, after which the vehicle refuses to arm."""
+
 
 def fly_plan(
     world: World, plan: Plan, limit_s: float | None = None, step: Callable[[], bool | None] | None = None
@@ -27,11 +30,19 @@ def fly_plan(
         world.upload(plan)
         if limit_s is None:  # of an accepted plan: one with an idle loop never ends
             limit_s = flight_limit_s(plan.items, world.setup.home, world.engine.stack.now.behaviour)
+        await_state(world, step or world.step)
         world.arm()
         world.start_mission()
     except RefusedError as error:
         return Outcome(Code.VEHICLE_LOST if error.is_silent else Code.REFUSED, str(error))
     return _flown(world, limit_s, step or world.step)
+
+
+def await_state(world: World, step: Callable[[], bool | None]) -> None:
+    """Run until the vehicle may fly on its state, as one on sensors does after seconds, or for ``READY_S``."""
+    end_s = world.time_s + READY_S
+    while not world.engine.stack.is_ready and world.time_s < end_s and not step():
+        pass
 
 
 def _flown(world: World, limit_s: float, step: Callable[[], bool | None]) -> Outcome:

@@ -8,14 +8,13 @@ import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib import invalidate_caches
-from importlib.metadata import entry_points
 from pathlib import Path
 
 from flightstack.commander.failsafe import Failsafe
-from flightstack.control.controller_loading import ENTRY_POINT_GROUP, load_controller
+from flightstack.control.controller_loading import entry_points_of_controllers, load_controller
 from flightstack.core.enums import Mode
 from flightstack.core.errors import ConfigError
-from flightstack.params.config import DEFAULT_CONTROLLER, DEFAULT_HOME, parse_home
+from flightstack.params.config import DEFAULT_CONTROLLER, DEFAULT_HOME, DEFAULT_STATE, STATES, parse_home
 from flightstack.params.gains_file import DEFAULT_GAINS
 from flightstack.params.store import read_assignment
 from flightstack.params.toml_file import read_toml
@@ -104,6 +103,9 @@ class Scenario:
     controller: str = key(DEFAULT_CONTROLLER, "an attitude controller")
     gains: str = key(DEFAULT_GAINS, "a built-in set of gains, or a gains file")
     loops: str = key("python", "`python`, `c`, `host` or `emulated`")
+    state: str = key(
+        DEFAULT_STATE, "`estimated` to fly on the sensors, `truth` on the simulator's state", choices=STATES
+    )
     plant: str = key("rigid", "the simulated vehicle", choices=("rigid", "multibody", "paper"))
     drag: bool = key(False, "give the vehicle the optional drag of its file")
     ideal_rotors: bool = key(False, "rotors without lag and limits")
@@ -154,7 +156,7 @@ class Scenario:
     def setup(self, seed: int) -> Setup:
         """Return the vehicle and conditions of the flight with ``seed``."""
         same = (
-            "vehicle", "controller", "gains", "loops", "plant", "drag", "ideal_rotors", "inner_hz", "outer_hz",
+            "vehicle", "controller", "gains", "loops", "state", "plant", "drag", "ideal_rotors", "inner_hz", "outer_hz",
             "battery_percent", "battery_capacity_mah", "battery_drain",
         )  # fmt: skip
         folder = self.path.parent
@@ -186,7 +188,7 @@ def _beside(name: str, folder: Path) -> str:
 
 def forget_controllers() -> None:
     """Forget the modules of plug-in controllers: the next use imports them as they are then."""
-    tops = {point.module.partition(".")[0] for point in entry_points(group=ENTRY_POINT_GROUP)}
+    tops = {point.module.partition(".")[0] for point in entry_points_of_controllers()}
     plugins = tops - {__name__.partition(".")[0]}
     for name in [name for name in sys.modules if name.partition(".")[0] in plugins]:
         del sys.modules[name]

@@ -16,7 +16,13 @@ from flightstack.core.geodesy import GeoPoint
 from flightstack.firmware.c_loops import LoopsSetup
 from flightstack.firmware.choice import PYTHON, parse_loops
 from flightstack.firmware.targets import make_loops
-from flightstack.params.config import DEFAULT_CONTROLLER, DEFAULT_HOME, DEFAULT_INNER_HZ, StackConfig
+from flightstack.params.config import (
+    DEFAULT_CONTROLLER,
+    DEFAULT_HOME,
+    DEFAULT_INNER_HZ,
+    DEFAULT_STATE,
+    StackConfig,
+)
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
 from flightstack.params.vehicle import DEFAULT_VEHICLE, Vehicle, load_vehicle
 from flightstack.plan import Plan, load_plan
@@ -24,7 +30,7 @@ from flightstack.process.assembly import vehicle_of
 from flightstack.process.clock import nearest_outer_hz, rates
 from flightstack.vehicle.parameters import load_parameters, read_parameters
 from gcs_cli.transfers.plan_files import example_plans
-from sim_bridge.arguments import check_battery, check_plant, check_range
+from sim_bridge.arguments import check_battery, check_boat, check_plant, check_range, check_slope
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.plant.disturbance import Disturbance, check_wind
 from sim_bridge.plant.plant import PlantOptions
@@ -48,6 +54,8 @@ class Setup:
     """A built-in set of gains, or the path of a gains file."""
     loops: str = "python"
     """``python``, ``c``, ``host`` or ``emulated``; see docs/reference/cli-flightstack.md."""
+    state: str = DEFAULT_STATE
+    """``estimated`` to fly on the vehicle's sensors, ``truth`` on the simulator's state."""
     plant: str = "rigid"
     """``rigid``, ``multibody`` or ``paper``."""
     wind: Sequence[float] = (0.0, 0.0)
@@ -62,6 +70,10 @@ class Setup:
     """Constant torque FRD [N m]."""
     torque_gust: float = 0.0
     """Standard deviation of the gusty torque about roll and pitch [N m]."""
+    slope_deg: float = 0.0
+    """Slope of the ground, which rises to the north; rigid plant."""
+    boat: Sequence[float] = (0.0, 0.0)
+    """Velocity of the ground north and east, as of a boat [m/s]."""
     battery_percent: float | None = None
     """Charge at the start; None: full."""
     battery_capacity_mah: float | None = None
@@ -110,6 +122,7 @@ class Setup:
             loops=self.loops,
             inner_hz=self.inner_hz,
             outer_hz=nearest_outer_hz(self.inner_hz) if self.outer_hz is None else self.outer_hz,
+            state=self.state,
             ideal_rotors=self.ideal_rotors,
             home=self.home,
             params=tuple(f"{name}={value!r}" for name, value in self.params.items()),
@@ -146,11 +159,16 @@ class Setup:
             battery = check_battery(
                 vehicle, self.battery_percent, self.battery_capacity_mah, self.battery_drain
             )
+            boat = check_boat(_vector("boat", (*self.boat, 0.0)), "boat")
+            slope_rad = check_slope(self.slope_deg, self.plant, boat, "slope_deg")
         except UsageProblemError as error:
             name, _, problem = str(error).partition(": ")
             name = name.removeprefix("--").replace("-", "_")
             raise ConfigError(name, "", problem.replace("add --drag", "set drag")) from None
-        return vehicle, PlantOptions(disturbance=disturbance, seed=self.seed, battery=battery)
+        options = PlantOptions(
+            disturbance, self.seed, battery=battery, slope_rad=slope_rad, boat_ned_m_s=boat
+        )
+        return vehicle, options
 
     def simulator(self, vehicle: Vehicle) -> Simulator:
         """Return the simulator of ``vehicle``; raise ConfigError for conditions that it cannot simulate."""

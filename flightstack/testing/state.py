@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from flightstack.core.contract import Quaternion, Vector3
+from flightstack.core.geodesy import GeoPoint
 from flightstack.core.geometry import euler_from_quaternion
 from flightstack.core.portable_math import distance
 from flightstack.process.assembly import Stack
@@ -81,14 +84,16 @@ class State(NamedTuple):
         return "; ".join(parts)
 
 
-def state_of(stack: Stack, simulator: Simulator, time_s: float) -> State:
-    """Return the present state; ``time_s`` is the time of the world."""
+def state_of(stack: Stack, simulator: Simulator, start: GeoPoint, time_s: float) -> State:
+    """Return the present state; ``start`` is the origin of the simulator, ``time_s`` the time of the world."""
     now, truth = stack.now, simulator.frame.state
     position, velocity = Vector3(*truth[0:3].tolist()), Vector3(*truth[3:6].tolist())
     euler = euler_from_quaternion(Quaternion(*truth[6:10].tolist()))
     roll, pitch, yaw = (math.degrees(angle) for angle in euler)
     flies = now.status.armed and not now.landed and -position.z > _TOUCH_M
+    offset = stack.places.frame.to_ned(start)  # 0 unless the vehicle had to find out where it is
     home = stack.places.frame.to_ned(stack.area.home)
+    in_frame = position + np.array(offset)
     return State(
         time_s=time_s,
         mode=now.status.mode.name,
@@ -100,10 +105,10 @@ def state_of(stack: Stack, simulator: Simulator, time_s: float) -> State:
         roll_deg=roll,
         pitch_deg=pitch,
         yaw_deg=yaw,
-        distance_to_home_m=distance(position.x - home.x, position.y - home.y),
+        distance_to_home_m=distance(in_frame[0] - home.x, in_frame[1] - home.y),
         battery_percent=100.0 * stack.simulator.battery.remaining,
         failsafes=tuple(failsafe.name for failsafe in stack.parts.failsafes.active),
         failsafe=stack.journal.failsafe_acts,
         item=now.progress.current if now.mission_count else -1,
-        error_m=distance(*(now.setpoint[0:3] - position).tolist()) if flies else 0.0,
+        error_m=distance(*(now.setpoint[0:3] - in_frame).tolist()) if flies else 0.0,
     )

@@ -14,12 +14,12 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from flightstack.commander.failsafe import Failsafe
 from flightstack.core.contract import Vector3
 from flightstack.core.enums import Mode
+from flightstack.core.geodesy import LocalFrame
 from flightstack.plan import MissionItem, MissionType, Plan
 from flightstack.testing.client import Client, ConditionTimeoutError, Network, RefusedError
 from flightstack.testing.engine import Engine
@@ -135,7 +135,7 @@ class World:
     @property
     def state(self) -> State:
         """The present state."""
-        return state_of(self.engine.stack, self.engine.simulator, self.time_s)
+        return state_of(self.engine.stack, self.engine.simulator, self.setup.home, self.time_s)
 
     @property
     def texts(self) -> list[str]:
@@ -191,6 +191,14 @@ class World:
         raise ConditionTimeoutError(
             f"{what} did not come true within {timeout_s:g} s of simulated time; {self.state}{self._last_texts()}"
         )
+
+    def wait_until_ready(self, timeout_s: float = 60.0) -> None:
+        """Run until the vehicle may fly on its state: at once on the simulator's, after seconds on sensors.
+
+        Raise ConditionTimeoutError after ``timeout_s`` of simulated time.
+        """
+        __tracebackhide__ = True
+        self.run_until(lambda _: self.engine.stack.is_ready, timeout_s)
 
     def watch(self, callback: Callable[[], None]) -> None:
         """Call ``callback`` after every outer tick."""
@@ -315,7 +323,7 @@ class World:
     def goto_command(self, north_m: float, east_m: float, alt_m: float = math.nan) -> calls.Command:
         """Return the command to fly to a position relative to home at the start."""
         stack = self.engine.stack
-        place = stack.places.frame.to_geo(Vector3(north_m, east_m, 0.0))
+        place = LocalFrame(self.setup.home).to_geo(Vector3(north_m, east_m, 0.0))
         amsl_m = stack.area.home.altitude_m + alt_m
         return calls.goto_command(place.latitude_deg, place.longitude_deg, amsl_m)
 
@@ -395,7 +403,5 @@ class World:
     def __enter__(self) -> World:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()

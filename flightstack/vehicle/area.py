@@ -73,6 +73,13 @@ class FlightArea:
         """Move home to the vehicle; return the refusal, or None."""
         return self.set_home(self._places.frame.to_geo(self._here()), chosen=False)
 
+    def move_origin(self, origin: GeoPoint) -> None:
+        """Move the origin of the local frame to the position at which the vehicle knows where it is."""
+        self._places.move_origin(origin)
+        self._journal.origin(origin)
+        self.fence.set_fence(self._places.fence)
+        self._home_moved()
+
     def move_home_on_arming(self) -> float:
         """Move home to the arming vehicle if it follows; return the change of its altitude [m]."""
         places, here = self._places, self._here()
@@ -105,13 +112,16 @@ class FlightArea:
     def _move_home(self, point: GeoPoint, chosen: bool) -> str | None:
         refusal = self._places.set_home(point, chosen)
         if refusal is None:
-            home = self._places.home
-            home_ned_m = Vector3(home.north_m, home.east_m, -home.altitude_m)
-            self._mission.home_moved()
-            self.fence.set_home(home_ned_m)
-            self.set_bounds()
-            self._journal.home(point, home_ned_m)
+            self._home_moved()
         return refusal
+
+    def _home_moved(self) -> None:
+        home = self._places.home
+        home_ned_m = Vector3(home.north_m, home.east_m, -home.altitude_m)
+        self._mission.home_moved()
+        self.fence.set_home(home_ned_m)
+        self.set_bounds()
+        self._journal.home(self._places.home_point, home_ned_m)
 
     # ------------------------------------------------------------------ ground
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 from flightstack.commander.failsafe_monitor import FailsafeMonitor
 from flightstack.control.backend import ControlBackend
 from flightstack.core.contract import FloatArray, LoopFlags, LoopRow, LoopStatus
@@ -15,6 +17,16 @@ from flightstack.vehicle.flight_state import FlightState
 _MISSION = Mode.MISSION
 _COMMANDS = LoopRow.ROTOR_COMMAND
 _OUTER_DUE, _SET_TARGET, _RESET = int(LoopFlags.OUTER_DUE), int(LoopFlags.SET_TARGET), int(LoopFlags.RESET)
+
+
+class TickingAutopilot(Protocol):
+    """An autopilot for the clock that drives it."""
+
+    now: FlightState
+
+    def tick(self, time_us: int) -> FloatArray:
+        """Run one inner tick; return the rotor speed commands [rad/s], shape (8,)."""
+        ...
 
 
 class Autopilot:

@@ -78,6 +78,10 @@ class Journal:
         self._recorder.landed(self._now.time_us, landed)
         self.say(Severity.INFO, "Landing detected" if landed else "Takeoff detected")
 
+    def origin(self, origin: GeoPoint) -> None:
+        """Record the origin of the local frame."""
+        self._recorder.set_origin(origin)
+
     def home(self, home: GeoPoint, position_ned_m: Vector3) -> None:
         """Record a change of home."""
         self._recorder.home(self._now.time_us, home, position_ned_m)

@@ -11,7 +11,7 @@ from flightstack.core.contract import FloatArray, LoopRow
 from flightstack.core.enums import Severity
 from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from flightstack.simulator_link.state_steps import is_gap
-from flightstack.vehicle.autopilot import Autopilot
+from flightstack.vehicle.autopilot import TickingAutopilot
 
 STALL_NS = 1_000_000_000
 """If states arrive whose time has not changed for this wall time, the vehicle clock advances with wall time."""
@@ -20,7 +20,7 @@ STALL_NS = 1_000_000_000
 class Lockstep:
     """Runs the ticks that are due after each state."""
 
-    def __init__(self, link: SimulatorEndpoint, autopilot: Autopilot, interval_us: int) -> None:
+    def __init__(self, link: SimulatorEndpoint, autopilot: TickingAutopilot, interval_us: int) -> None:
         self._link = link
         self._autopilot = autopilot
         self._now = autopilot.now

@@ -10,6 +10,7 @@ from flightstack.commander.failsafe import Action
 from flightstack.commander.fence_monitor import FenceBreaches
 from flightstack.core.enums import Mode
 from flightstack.core.geodesy import GeoPoint, LocalFrame
+from flightstack.estimation.sensed import Sensed
 from flightstack.guidance.navigator import MissionProgress
 from flightstack.params.vehicle import Vehicle
 from flightstack.simulator_link.endpoint import Battery
@@ -79,6 +80,8 @@ class VehicleStatus(NamedTuple):
     """True if a breach of the fence has an action (GF_ACTION)."""
     fence_breached: bool
     fence_breaches: FenceBreaches
+    sensed: Sensed | None = None
+    """None for a vehicle that flies on the simulator's state."""
 
 
 def vehicle_info(vehicle: Vehicle, system_id: int, is_generic: bool, frame: LocalFrame) -> VehicleInfo:
@@ -106,7 +109,9 @@ def in_single_precision(values: list[float]) -> list[float]:
     return [math.copysign(math.inf, value) if abs(value) > _SINGLE_LIMIT else value for value in values]
 
 
-def vehicle_status(info: VehicleInfo, parts: VehicleParts, battery: Battery) -> VehicleStatus:
+def vehicle_status(
+    info: VehicleInfo, parts: VehicleParts, battery: Battery, sensed: Sensed | None = None
+) -> VehicleStatus:
     """Return the current status."""
     now, failsafes, fence = parts.now, parts.failsafes, parts.area.fence
     state: list[float] = now.state.tolist()
@@ -134,4 +139,5 @@ def vehicle_status(info: VehicleInfo, parts: VehicleParts, battery: Battery) -> 
         fence_acts=now.behaviour.fence_action != 0,
         fence_breached=fence.is_breached,
         fence_breaches=fence.breaches,
+        sensed=sensed,
     )

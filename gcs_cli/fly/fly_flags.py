@@ -81,9 +81,12 @@ class FlyOptions:
         typer.Option(metavar="FILE", help="Parameter file to fly with.  [default: none]", **world.IN_VEHICLE),
     ] = None
     loops: stack.Loops = "python"
+    state: stack.State = "truth"
     force: Annotated[str | None, world.FORCE] = None
     torque: Annotated[str | None, world.TORQUE] = None
     physics_hz: Annotated[float | None, world.PHYSICS_HZ] = None
+    slope: Annotated[float | None, world.SLOPE] = None
+    boat: Annotated[str | None, world.BOAT] = None
     home: Annotated[
         str | None,
         typer.Option(
@@ -115,9 +118,20 @@ class FlyOptions:
 
 TO_SIMULATOR = (
     "vehicle", "plant", "speed", "instance", "seed", "wind", "gust", "drag", "force", "torque", "torque_gust",
-    "physics_hz", "battery_start", "battery_capacity", "battery_drain", "faults", "ideal_rotors", "view",
+    "physics_hz", "slope", "boat", "battery_start", "battery_capacity", "battery_drain", "faults",
+    "ideal_rotors", "view",
 )  # fmt: skip
-TO_STACK = ("vehicle", "controller", "gains", "loops", "inner_hz", "instance", "param", "ideal_rotors")
+TO_STACK = (
+    "vehicle",
+    "controller",
+    "gains",
+    "loops",
+    "state",
+    "inner_hz",
+    "instance",
+    "param",
+    "ideal_rotors",
+)
 
 _SET = "set by gcs fly"
 _LOCAL = "the links of this flight stay on this machine"
@@ -127,7 +141,7 @@ NOT_PASSED = {
     "timeout": "--timeout of gcs fly", "sim_timeout": "--timeout of gcs fly", "log": "--out of gcs fly",
     "params": "--params of gcs fly, which creates no file", "outer_hz": "--outer-hz of gcs fly",
     "home": "--home of gcs fly, or the plan's home", "overwrite": "--overwrite of gcs fly",
-    "state": "none: a flight depends on its command line alone",
+    "state_dir": "none: a flight depends on its command line alone",
     "api_port": _LOCAL, "tcp_port": _LOCAL, "listen": _LOCAL, "signing_key": "--signing-key of gcs",
     "allow_unsigned": _LOCAL, "check": "gcs fly checks before it starts anything", "version": "gcs --version",
 }  # fmt: skip

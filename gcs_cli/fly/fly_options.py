@@ -23,7 +23,7 @@ from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly.flight_limit import flight_limit_s
 from gcs_cli.fly.fly_flags import TO_SIMULATOR, TO_STACK, FlyOptions, passed
 from gcs_cli.link.endpoint import LOOPBACK
-from gcs_cli.report.run_directory import LOG_NAME
+from gcs_cli.run_directory import LOG_NAME
 from gcs_cli.transfers.plan_parts import plan_problem
 from gcs_cli.vehicle.param_info import load_parameters
 from sim_bridge.__main__ import check_arguments as check_simulator
@@ -101,6 +101,7 @@ def check_options(options: FlyOptions, home: GeoPoint) -> None:
             loops=options.loops,
             inner_hz=options.inner_hz,
             outer_hz=outer_rate_hz(options),
+            state=options.state,
             ideal_rotors=options.ideal_rotors,
             home=home,
             system_id=system_id(options.instance),
@@ -160,7 +161,7 @@ def stack_arguments(options: FlyOptions, home: GeoPoint, folder: Path, ground_po
         f"--exit-on-gcs-loss={GCS_LOSS_S:g}",
         f"--params={options.params or 'none'}",
         *(["--clock=realtime"] if runs_freely(options) else []),
-        "--state=none",  # a flight depends on its command line alone
+        "--state-dir=none",  # a flight depends on its command line alone
         "--wait-for-start",
         *signing,
     ]

@@ -10,7 +10,7 @@ import numpy as np
 
 from flightstack.core.errors import ConfigError
 from gcs_cli.logs.recording import ULOG, Dropout, LogText, ParameterChange, Recording, Topic
-from gcs_cli.report.analysis import is_whole, parse_ulog
+from gcs_cli.logs.ulog_parser import parse_ulog
 
 _GPS_TOPICS = ("vehicle_gps_position", "sensor_gps")
 _LOWEST_LEVEL = 7
@@ -18,7 +18,7 @@ _LOWEST_LEVEL = 7
 
 def read_ulog(content: bytes, source: str) -> Recording:
     """Read the bytes of a ULog file, complete or truncated; raise ConfigError, which names ``source``."""
-    log = parse_ulog(content, source)
+    log, damaged = parse_ulog(content, source)
     topics = tuple(_topics(log))
     if not topics:
         raise ConfigError(source, "", "the log has no data")
@@ -37,7 +37,7 @@ def read_ulog(content: bytes, source: str) -> Recording:
             for time_us, name, value in log.changed_parameters
         ),
         dropouts=tuple(Dropout(int(item.timestamp), item.duration * 1e-3) for item in log.dropouts),
-        damaged=bool(log.file_corruption) or not is_whole(content),
+        damaged=damaged,
         vehicle=_vehicle(log.initial_parameters),
     )
 

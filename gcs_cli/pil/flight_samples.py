@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
-import struct
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from pyulog import ULog, ULogException
 
 from flightstack.core.contract import LoopStatus
 from flightstack.core.errors import ConfigError
+from gcs_cli.logs.ulog_parser import DAMAGE, parse_ulog
 from gcs_cli.pil.signals import SIGNALS
 from gcs_cli.pil.ulps import Float32Array
-from gcs_cli.report.analysis import LogBytes
 
 TimeArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 StatusArray: TypeAlias = np.ndarray[Any, np.dtype[np.uint16]]
 
-_DAMAGE = (ULogException, struct.error, ValueError, KeyError, IndexError, OverflowError, TypeError)
 _TOPICS = sorted({signal.topic for signal in SIGNALS} | {"trajectory_setpoint"})
 GROUNDED = LoopStatus.IDLE | LoopStatus.INPUT_STALE
 """Status of ticks in which the loops did not run: on the ground, or with a frozen input."""
@@ -73,13 +68,12 @@ class FlightSamples(NamedTuple):
 def read_samples(path: Path) -> FlightSamples:
     """Read a flight log; raise ConfigError if it is not readable, or has no loops."""
     try:
-        # pyulog reports damage on stdout, where it would mix with the output of the command
-        with contextlib.redirect_stdout(io.StringIO()):
-            log = ULog(LogBytes(path.read_bytes()), _TOPICS)
-            return _samples(path, log)
+        content = path.read_bytes()
     except OSError as error:
         raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
-    except _DAMAGE as error:
+    try:
+        return _samples(path, parse_ulog(content, path, _TOPICS).log)
+    except DAMAGE as error:
         raise ConfigError(path, "", f"is not a readable flight log: {error}") from error
 
 

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import math
-import os
-import struct
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from pyulog import ULog, ULogException
 
 from flightstack.core.contract import MAX_ROTORS, FloatArray
 from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import GeoPoint
 from flightstack.core.geometry_bulk import euler_from_quaternions
-from flightstack.flight_log.ulog import HEADER_SIZE, MESSAGE_HEADER, MESSAGE_TYPES
+from gcs_cli.logs.ulog_parser import DAMAGE, ParsedLog, parse_ulog
 from gcs_cli.report.flight_data import (
     Flight,
     LoopTiming,
@@ -32,15 +27,15 @@ from gcs_cli.report.flight_data import (
     series,
 )
 
-__all__ = ["Flight", "flight_in", "flight_of", "parse_ulog", "read_flight"]
-
 _ARMED = 2  # vehicle_status.arming_state
 _TIMING_FIELDS = LoopTiming._fields[2:8]  # execution and lateness
-_DAMAGE = (ULogException, struct.error, ValueError, KeyError, IndexError, OverflowError, TypeError)
 _TOPICS = [
     "vehicle_local_position",
     "trajectory_setpoint",
     "vehicle_attitude",
+    "vehicle_attitude_groundtruth",
+    "vehicle_local_position_groundtruth",
+    "estimator_states",
     "vehicle_attitude_setpoint",
     "rotor_speeds",
     "wrench",
@@ -51,27 +46,6 @@ _TOPICS = [
     "battery_status",
     "loop_timing",
 ]
-
-
-class LogBytes(io.BytesIO):
-    """A log in memory for pyulog, which seeks back by a message's size even where the file ended before.
-
-    It would go back further each time, and never end. ``seek`` goes back by no more than the last ``read`` has read.
-    """
-
-    _missing = 0
-
-    def read(self, size: int | None = -1, /) -> bytes:
-        """Return up to ``size`` bytes."""
-        data = super().read(size)
-        self._missing = max(0, (size or 0) - len(data))
-        return data
-
-    def seek(self, offset: int, whence: int = 0, /) -> int:
-        """Move; return the position."""
-        if whence == os.SEEK_CUR and offset < 0:
-            offset = min(0, offset + self._missing)
-        return super().seek(offset, whence)
 
 
 def read_flight(path: Path) -> Flight:
@@ -85,26 +59,16 @@ def read_flight(path: Path) -> Flight:
 
 def flight_of(content: bytes, source: object) -> Flight:
     """Read the bytes of a ULog file, complete or cut off; raise ConfigError, which names ``source``."""
-    return flight_in(parse_ulog(content, source, _TOPICS), content, source)
+    return flight_in(parse_ulog(content, source, _TOPICS), source)
 
 
-def flight_in(log: Any, content: bytes, source: object) -> Flight:
-    """Read the flight of a log that ``parse_ulog`` made of ``content``; raise ConfigError, which names ``source``."""
+def flight_in(parsed: ParsedLog, source: object) -> Flight:
+    """Read the flight of a parsed log; raise ConfigError, which names ``source``."""
     try:
-        flight = _Reader(log).flight()
-    except _DAMAGE as error:
+        flight = _Reader(parsed.log).flight()
+    except DAMAGE as error:
         raise ConfigError(source, "", f"is not a readable flight log: {error}") from error
-    return replace(flight, damaged=log.file_corruption or not is_whole(content))
-
-
-def parse_ulog(content: bytes, source: object, topics: list[str] | None = None) -> Any:
-    """Return pyulog's view of the bytes of a ULog file, of all ``topics`` by default; raise ConfigError."""
-    try:
-        # pyulog reports damage on stdout, which belongs to the command's own output
-        with contextlib.redirect_stdout(io.StringIO()):
-            return ULog(LogBytes(content), topics)
-    except _DAMAGE as error:
-        raise ConfigError(source, "", f"is not a readable flight log: {error}") from error
+    return replace(flight, damaged=parsed.damaged)
 
 
 class _Reader:
@@ -138,6 +102,10 @@ class _Reader:
             rotor_command=self._series("rotor_speeds", _elements("command_rad_s", rotors)),
             torque=self._series("wrench", _elements("torque_n_m", 3)),
             battery=self._series("battery_status", ["remaining", "voltage_v"]),
+            true_position=self._truth("x", "y", "z"),
+            true_velocity=self._truth("vx", "vy", "vz"),
+            true_attitude=self._euler("vehicle_attitude_groundtruth", "q"),
+            deviations=self._deviations(),
             statuses=tuple(
                 Status(time_s, int(state), arming == _ARMED, bool(failsafe))
                 for time_s, state, arming, failsafe in self._rows(
@@ -185,6 +153,18 @@ class _Reader:
         time_s, q = self._series(topic, _elements(quaternion, 4))
         return series(time_s.copy(), euler_from_quaternions(q))
 
+    def _truth(self, *fields: str) -> Series:
+        """Return true values if the log has true attitudes at the same times."""
+        times_s = self._series("vehicle_attitude_groundtruth", _elements("q", 4)).time_s
+        found = self._series("vehicle_local_position_groundtruth", list(fields))
+        return found if np.array_equal(found.time_s, times_s) else empty_series(len(fields))
+
+    def _deviations(self) -> Series:
+        """Return the deviations of a log of this flight stack: PX4 has four variances of the attitude up to 1.14."""
+        is_own = self._log.msg_info_dict.get("sys_name") == "flightstack"
+        time_s, variances = self._series("estimator_states", _elements("covariances", 9))
+        return series(time_s.copy(), np.sqrt(np.maximum(variances, 0.0))) if is_own else empty_series(9)
+
     def _rows(self, topic: str, *fields: str) -> list[tuple[float, ...]]:
         data = self._data.get(topic)
         if data is None or any(name not in data for name in fields):
@@ -207,17 +187,3 @@ class _Reader:
 
 def _elements(name: str, count: int) -> list[str]:
     return [f"{name}[{index}]" for index in range(count)]
-
-
-def is_whole(log: bytes) -> bool:
-    """Return True if messages of known types fill a ULog file to its last byte. Damage inside one is not detected.
-
-    The format has no end mark and no checksums.
-    """
-    at, end = HEADER_SIZE, len(log)
-    while at + MESSAGE_HEADER.size <= end:
-        size, kind = MESSAGE_HEADER.unpack_from(log, at)
-        if kind not in MESSAGE_TYPES:
-            return False
-        at += MESSAGE_HEADER.size + size
-    return at == end

@@ -71,7 +71,7 @@ class SimOptions(FlyOptions):
         ),
     ] = None
     overwrite: stack.Overwrite = False
-    state: Annotated[
+    state_dir: Annotated[
         str | None,
         typer.Option(
             metavar="DIR|none",

@@ -51,7 +51,7 @@ def vehicles_of(options: SimOptions) -> list[SimOptions]:
             seed=options.seed + index,
             home=home_text(frame.to_geo(Vector3(0.0, index * options.spacing, 0.0)) if index else first),
             log=options.log if single else _own_log(options, options.instance + index),
-            state=options.state if single else _own_state(options, options.instance + index),
+            state_dir=options.state_dir if single else _own_state_dir(options, options.instance + index),
             params=options.params if single or options.params == Path(NONE) else None,
             param=[*assignments, *(options.param or ())] or None,
         )
@@ -74,10 +74,10 @@ def _own_log(options: SimOptions, instance: int) -> str | None:
     return str(path.parent / f"instance-{instance}" / path.name)
 
 
-def _own_state(options: SimOptions, instance: int) -> str | None:
-    if options.state in (None, NONE):
-        return options.state
-    return str(Path(str(options.state)) / f"instance-{instance}")
+def _own_state_dir(options: SimOptions, instance: int) -> str | None:
+    if options.state_dir in (None, NONE):
+        return options.state_dir
+    return str(Path(str(options.state_dir)) / f"instance-{instance}")
 
 
 def start_of(vehicle: SimOptions) -> GeoPoint:
@@ -87,7 +87,7 @@ def start_of(vehicle: SimOptions) -> GeoPoint:
 
 def stack_arguments(vehicle: SimOptions) -> list[str]:
     """Return the command line of ``flightstack`` for one vehicle."""
-    files = {"log": vehicle.log, "state": vehicle.state, "params": vehicle.params}
+    files = {"log": vehicle.log, "state-dir": vehicle.state_dir, "params": vehicle.params}
     signing = [] if vehicle.signing_key is None else [f"--signing-key={vehicle.signing_key}"]
     return [
         *passed(vehicle, FLOWN_TO_STACK),

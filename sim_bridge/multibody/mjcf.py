@@ -55,7 +55,10 @@ _HOVER_HEIGHT_M = 2.0
 
 _IMPEDANCE_RATIO = 0.1
 _IMPEDANCE = f"{_IMPEDANCE_RATIO} {_IMPEDANCE_RATIO} 0.001"  # MuJoCo's solimp: the same at any depth
-_FRICTION = f"{FRICTION} 0.005 0.0001"
+_FRICTION = f"{FRICTION} {FRICTION} 0.005 0.0001 0.0001"
+_SLIP_TIME_S = (
+    0.4  # MuJoCo time constant of friction: slip below its limit decays in 20 ms (times half the impedance)
+)
 _FRICTION_STIFFNESS = 10  # over that of the normal force: reduces the creep of a foot under a side force
 _CREEP_ITERATIONS = 4  # of the no-slip solver, which removes the remaining creep
 
@@ -88,7 +91,6 @@ def model_xml(vehicle: Vehicle, *, scene: bool = False, lean: bool = False) -> s
     a mesh that is not a solid.
     """
     assembly = assemble(vehicle)
-    solref = exact(contact_solref(vehicle, _STEP_S))
     root = Element("mujoco", model=vehicle.name)
     add(root, "compiler", angle="radian", inertiafromgeom="auto", discardvisual="true" if lean else "false")
     option = add(
@@ -106,9 +108,10 @@ def model_xml(vehicle: Vehicle, *, scene: bool = False, lean: bool = False) -> s
         add(world, "light", pos="0 0 20", dir="0.2 -0.2 -1", directional="true")
     add(
         world, "geom", name="ground", type="plane", size="0 0 1", pos=exact((0.0, 0.0, -foot_z_m(vehicle))),
-        rgba="0.45 0.5 0.42 1", contype=0, conaffinity=1, friction=_FRICTION, solref=solref, solimp=_IMPEDANCE,
+        rgba="0.45 0.5 0.42 1", contype=0, conaffinity=1,
     )  # fmt: skip
-    _add_vehicle(world, vehicle, assembly, solref, scene)
+    _add_vehicle(world, vehicle, assembly, scene)
+    _add_contacts(root, vehicle, assembly)
     if not lean:
         _add_actuators(root, vehicle)
     if scene:
@@ -119,12 +122,12 @@ def model_xml(vehicle: Vehicle, *, scene: bool = False, lean: bool = False) -> s
     return tostring(root, encoding="unicode") + "\n"
 
 
-def _add_vehicle(world: Element, vehicle: Vehicle, assembly: Assembly, solref: str, scene: bool) -> None:
+def _add_vehicle(world: Element, vehicle: Vehicle, assembly: Assembly, scene: bool) -> None:
     body = add(world, "body", name="vehicle")
     add(body, "freejoint", name="vehicle")
     for placed in assembly.parts:
         if placed.body == 0:
-            _add_geom(body, placed, solref, _VISIBLE)
+            _add_geom(body, placed, _VISIBLE)
     for number, rotor in enumerate(vehicle.rotors, start=1):
         hub = exact(flip_vector(rotor.position_frd_m))
         add(body, "site", name=f"hub_{number}", pos=hub, size=0.003, group=4)
@@ -133,10 +136,10 @@ def _add_vehicle(world: Element, vehicle: Vehicle, assembly: Assembly, solref: s
         add(spinning, "site", name=f"rotor_{number}", size=0.003, group=4)
         for placed in assembly.parts:
             if placed.body == number:
-                _add_geom(spinning, placed, solref, _HIDDEN if scene else _VISIBLE)
+                _add_geom(spinning, placed, _HIDDEN if scene else _VISIBLE)
 
 
-def _add_geom(body: Element, placed: PlacedPart, solref: str, group: int) -> None:
+def _add_geom(body: Element, placed: PlacedPart, group: int) -> None:
     part = placed.part
     attributes: dict[str, str | float] = {"name": part.name, "type": part.shape}
     if part.shape == "mesh":
@@ -149,12 +152,26 @@ def _add_geom(body: Element, placed: PlacedPart, solref: str, group: int) -> Non
         attributes["rgba"] = _PLAIN
     if any(part.euler_rad):
         attributes["quat"] = exact(flip_quaternion(quaternion_from_euler(*part.euler_rad)))
-    has_contact = placed.has_contact
     add(
         body, "geom", **attributes, pos=exact(flip_vector(part.position_frd_m)),
-        density=repr(part.density_kg_m3), group=group, contype=1 if has_contact else 0, conaffinity=0,
-        **({"friction": _FRICTION, "solref": solref, "solimp": _IMPEDANCE} if has_contact else {}),
+        density=repr(part.density_kg_m3), group=group, contype=1 if placed.has_contact else 0, conaffinity=0,
     )  # fmt: skip
+
+
+def _add_contacts(root: Element, vehicle: Vehicle, assembly: Assembly) -> None:
+    """Add a contact pair of the ground and each part with contact.
+
+    MuJoCo's friction cone couples slip and normal force: a foot that slides at v_t rises at about μ·v_t·b_t/b, where
+    b_t and b are the damping rates of friction and normal force. Only a pair has a ``solref`` of its own for friction.
+    """
+    contacts = add(root, "contact")
+    solref = exact(contact_solref(vehicle, _STEP_S))
+    for placed in assembly.parts:
+        if placed.has_contact:
+            add(
+                contacts, "pair", geom1="ground", geom2=placed.part.name, friction=_FRICTION,
+                solref=solref, solreffriction=f"{_SLIP_TIME_S} 1", solimp=_IMPEDANCE,
+            )  # fmt: skip
 
 
 def _model_size(part: Part) -> tuple[float, ...]:

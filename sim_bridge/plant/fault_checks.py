@@ -42,6 +42,8 @@ def _drag(flight: Flight) -> str | None:
 
 
 def _mean_wind(flight: Flight) -> str | None:
+    if flight.options.boat_ned_m_s != _STILL:
+        return "the wind on a boat does not change with the height"
     has_step = any(fault.kind is Kind.WIND_STEP for fault in flight.faults)
     if has_step or flight.options.disturbance.wind_ned_m_s != _STILL:
         return None
@@ -73,6 +75,8 @@ def _sensor(fault: Fault, flight: Flight) -> str | None:
         return f"the vehicle {flight.vehicle.name} has no such sensor"
     if is_imu and number and int(number) > sensors.imu_count:
         return f"the vehicle {flight.vehicle.name} has inertial sensors 1 to {sensors.imu_count}"
+    if fault.kind is Kind.VIBRATION and not sensors.numbers["imu"]["rotor_imbalance_g_mm"]:
+        return f"the rotors of the vehicle {flight.vehicle.name} have no imbalance; set rotor_imbalance_g_mm"
     return None
 
 

@@ -249,7 +249,8 @@ TABLE: tuple[Row, ...] = (
     ),
     Row(
         Kind.SENSOR_LATE, "sensor:SENSOR:late=SECONDS", "sensor SENSOR late SECONDS",
-        "Its measurements are older by this time.", {"SECONDS": Range(1e-4, 10.0, "s")}, (Need.SENSOR,),
+        "Its measurements arrive later by this time, rounded up to an exchange. They begin with a gap.",
+        {"SECONDS": Range(1e-4, 10.0, "s")}, (Need.SENSOR,),
     ),
     Row(
         Kind.SENSOR_LOSS, "sensor:SENSOR:loss=SHARE", "sensor SENSOR loss SHARE",

@@ -13,13 +13,13 @@ import math
 
 import numpy as np
 
-from flightstack.core.compiled import compiled
+from flightstack.core.compiled import compiled, direct
 from flightstack.core.contract import FloatArray, RecordArray
 from flightstack.core.portable_math import exp, log
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.plant.dimensions import foot_z_m, propeller_radius_m
 from sim_bridge.sensors.layout import BARO, write_numbers
-from sim_bridge.sensors.noise import NormalStream, gauss_markov, quantised, with_fault
+from sim_bridge.sensors.noise import NormalStream, Wander, quantised, with_fault
 
 SEA_LEVEL_HPA, SEA_LEVEL_K, LAPSE_K_M = 1013.25, 288.15, 0.0065
 _EXPONENT = 9.80665 / (287.05287 * LAPSE_K_M)
@@ -77,6 +77,7 @@ class Barometer:
         self.records: RecordArray = np.zeros(1, BARO)
         self.out: FloatArray = self.records["out"][0]
         """The last measurement."""
+        self._call = measure_baro
         baro, self._noise = self.records[0], NormalStream(seed, "baro", width=2)
         write_numbers(baro, vehicle.sensors.numbers["baro"])
         radius = propeller_radius_m(vehicle)
@@ -87,9 +88,15 @@ class Barometer:
             baro["disc_loading"][index] = rotor.thrust_coefficient_n_s2 / area
         first, second = self._noise.first(2).tolist()
         baro["offset"], baro["drift"] = baro["turn_on_offset_hpa"] * first, baro["drift_hpa"] * second
-        baro["decay"], share = gauss_markov(1.0 / float(baro["rate_hz"]), float(baro["drift_time_s"]))
-        baro["wander"] = share * baro["drift_hpa"]
+        self._wander = Wander(baro, float(baro["drift_hpa"]), float(baro["drift_time_s"]))
 
-    def measure(self, state: FloatArray, airspeed_m_s: float, rotor_speed: FloatArray) -> None:
+    def measure(
+        self, time_us: int, state: FloatArray, airspeed_m_s: float, rotor_speed: FloatArray
+    ) -> FloatArray:
         """Measure at a state, an airspeed and the speeds [rad/s] of the rotors, shape (8,)."""
-        measure_baro(self.records, state, airspeed_m_s, rotor_speed, self._noise.row())
+        self._wander.follow(time_us)
+        noise = self._noise.row()
+        if self._call is measure_baro:
+            self._call = direct(measure_baro, self.records, state, airspeed_m_s, rotor_speed, noise)
+        self._call(self.records, state, airspeed_m_s, rotor_speed, noise)
+        return self.out

@@ -1,6 +1,8 @@
 """Faults of the sensors: which parts of which sensors they affect, and how.
 
 Bias, noise and a frozen output act in the record of a sensor; drop-out, loss and delay on its output, in ``Channel``.
+A measurement that is late by less than a period is sent between two measurements, at the first exchange at or after
+its time.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from sim_bridge.sensors.noise import UniformStream
 
 T = TypeVar("T")
 
+NEVER_US = 1 << 64
 _STILL = Vector3(0.0, 0.0, 0.0)
 
 
@@ -72,38 +75,60 @@ def channels_of(sensor: str, imu_count: int) -> list[tuple[str, int]]:
     return [(part, index) for part in parts for index in indices if name]
 
 
+def without(fault: Fault, sensor: str, imu_count: int) -> list[Fault]:
+    """Return what is left of a fault when it ends on ``sensor``: the fault, or one for each other sensor, or none."""
+    channels, ended = channels_of(fault.sensor, imu_count), channels_of(sensor, imu_count)
+    if not set(channels).intersection(ended):
+        return [fault]
+    return [
+        fault._replace(sensor=f"{name}{index + 1}") for name, index in channels if (name, index) not in ended
+    ]
+
+
 class Channel:
-    """One sensor, or one part of the inertial sensor, in its faults."""
+    """One sensor, or one part of the inertial sensor: its faults, and the way of its measurements to the link."""
 
     def __init__(
-        self, records: RecordArray, index: int = 0, part: int | None = None, scale: float = 1.0
+        self,
+        key: tuple[str, int],
+        seed: int,
+        records: RecordArray,
+        part: int | None = None,
+        *,
+        scale: float = 1.0,
+        latency_us: int = 0,
     ) -> None:
-        """``part``: of a record with several channels; ``scale``: from the unit of faults to that of the record."""
+        """``key``: name and number of the sensor; ``part``: of a record with several channels.
+
+        ``scale`` is from the unit of faults to that of the record, ``latency_us`` from a measurement to its message.
+        """
+        name, number = key
+        index = number if part is not None else 0
         of_part = slice(None) if part is None else slice(3 * part, 3 * part + 3)
         self._bias: FloatArray = records["fault_bias"][index, of_part]
         at = index if part is None else (index, part)
         self._flat = (records["fault_noise"], records["is_frozen"], at)
-        self._scale = scale
+        self._scale, self._latency_us = scale, latency_us
         self._fault = HEALTHY
-        self._past: deque[tuple[int, Any]] = deque()
-        self._losses: UniformStream | None = None
+        self._waiting: deque[tuple[int, Any]] = deque()
+        self.next_due_us = NEVER_US
+        """Time of the next message that waits."""
+        self._losses = UniformStream(seed, name, number)
 
     @property
-    def is_healthy(self) -> bool:
-        """True without a fault."""
-        return self._fault == HEALTHY
+    def is_direct(self) -> bool:
+        """True if each measurement is sent at once, and none waits."""
+        return self._fault == HEALTHY and self._latency_us == 0 and not self._waiting
 
-    def set(self, fault: ChannelFault, losses: UniformStream) -> None:
-        """Begin, change or end the fault; ``losses`` decides which measurements are lost."""
-        if fault.late_us != self._fault.late_us:
-            self._past.clear()
-        self._fault, self._losses = fault, losses
+    def set(self, fault: ChannelFault, time_us: int) -> None:
+        """Begin, change or end the fault at ``time_us``."""
+        self._fault = fault
         noise, frozen, at = self._flat
         noise[at], frozen[at] = fault.noise * self._scale, fault.is_frozen
-        self.update(fault.begin_us)
+        self.update(time_us)
 
     def update(self, time_us: int) -> None:
-        """Move the bias of a drift to ``time_us``."""
+        """Move the bias of a drift to ``time_us``; call before the measurement of this time."""
         fault = self._fault
         since_s = max(0, time_us - fault.begin_us) * 1e-6
         bias = np.add(fault.bias, np.multiply(fault.drift_s, since_s)) * self._scale
@@ -116,17 +141,22 @@ class Channel:
         return rate
 
     def pass_on(self, time_us: int, out: T) -> T | None:
-        """Return the output that is sent at ``time_us`` for the measurement ``out``, or None. ``out`` is kept."""
+        """Take the measurement ``out``, which is kept, and return the one that is sent at ``time_us``, or None."""
         fault = self._fault
-        if fault.late_us:
-            self._past.append((time_us, out))
-            while len(self._past) > 1 and self._past[1][0] <= time_us - fault.late_us:
-                self._past.popleft()
-            out = self._past[0][1]
-        if fault.is_off or (fault.loss > 0.0 and self._is_lost()):
-            return None
-        return out
+        if fault.loss == 0.0 or self._losses.next() >= fault.loss:
+            due_us = time_us + self._latency_us + fault.late_us
+            self._waiting.append((due_us, out))
+            self.next_due_us = min(self.next_due_us, due_us)
+        sent: T | None = self.due(time_us)
+        return sent
 
-    def _is_lost(self) -> bool:
-        assert self._losses is not None
-        return self._losses.next() < self._fault.loss
+    def due(self, time_us: int) -> Any:
+        """Return the newest measurement that is due, once, or None; older ones are dropped."""
+        if time_us < self.next_due_us:
+            return None
+        waiting, out = self._waiting, None
+        newest = max(i for i, (due_us, _) in enumerate(waiting) if due_us <= time_us)
+        for _ in range(newest + 1):
+            out = waiting.popleft()[1]
+        self.next_due_us = min((due_us for due_us, _ in waiting), default=NEVER_US)
+        return None if self._fault.is_off else out

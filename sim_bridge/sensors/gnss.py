@@ -10,17 +10,16 @@ needs four. A jump or a slow spoof moves the position and is not stated.
 from __future__ import annotations
 
 import math
-from collections import deque
 from typing import NamedTuple
 
 import numpy as np
 
-from flightstack.core.compiled import compiled
+from flightstack.core.compiled import compiled, direct
 from flightstack.core.contract import FloatArray, RecordArray, Vector3
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.sensors.layout import GNSS, write_numbers
-from sim_bridge.sensors.noise import NormalStream, gauss_markov, with_fault
+from sim_bridge.sensors.noise import NormalStream, Wander, with_fault
 
 LEAST_SATELLITES = 4
 
@@ -62,40 +61,33 @@ class GnssReceiver:
         write_numbers(gnss, vehicle.sensors.numbers["gnss"])
         horizontal, vertical = float(gnss["horizontal_drift_m"]), float(gnss["vertical_drift_m"])
         spread = np.array([horizontal, horizontal, vertical])
-        gnss["decay"], share = gauss_markov(1.0 / float(gnss["rate_hz"]), float(gnss["drift_time_s"]))
-        gnss["drift"], gnss["wander"] = spread * self._noise.first(4)[:3], share * spread
+        gnss["drift"] = spread * self._noise.first(4)[:3]
+        self._wander = Wander(gnss, spread, float(gnss["drift_time_s"]))
         noise_m, vertical_noise_m = float(gnss["horizontal_noise_m"]), float(gnss["vertical_noise_m"])
         self._eph_m = math.sqrt(2.0 * (horizontal * horizontal + noise_m * noise_m))
         self._epv_m = math.sqrt(vertical * vertical + vertical_noise_m * vertical_noise_m)
-        self._latency_us = round(float(gnss["latency_s"]) * 1e6)
         self._first_fix_us = round(float(gnss["first_fix_s"]) * 1e6)
-        self._waiting: deque[tuple[int, Fix]] = deque()
-        self.lost_share = 0.0
-        """Share of the satellites that jamming takes."""
+        self.latency_us = round(float(gnss["latency_s"]) * 1e6)
+        """Time from a measurement to its message."""
+        self._call = measure_gnss
+        self.jam(0.0)
 
-    def measure(self, time_us: int, state: FloatArray) -> None:
-        """Measure at a state; the message is due after the latency."""
+    def jam(self, lost_share: float) -> None:
+        """Take this share of the satellites."""
         gnss = self.records[0]
-        jam = 1.0 / max(1.0 - self.lost_share, 0.05)
-        gnss["noise_factor"] = jam
-        measure_gnss(self.records, state, self._noise.row())
-        satellites = math.floor(float(gnss["satellites"]) * (1.0 - self.lost_share) + 0.5)
-        has_fix = satellites >= LEAST_SATELLITES and time_us >= self._first_fix_us
+        self._jam = 1.0 / max(1.0 - lost_share, 0.05)
+        gnss["noise_factor"] = self._jam
+        self._satellites = math.floor(float(gnss["satellites"]) * (1.0 - lost_share) + 0.5)
+
+    def measure(self, time_us: int, state: FloatArray) -> Fix:
+        """Measure at a state."""
+        self._wander.follow(time_us)
+        noise = self._noise.row()
+        if self._call is measure_gnss:
+            self._call = direct(measure_gnss, self.records, state, noise)
+        self._call(self.records, state, noise)
+        has_fix = self._satellites >= LEAST_SATELLITES and time_us >= self._first_fix_us
         kind = mavlink.GPS_FIX_TYPE_3D_FIX if has_fix else mavlink.GPS_FIX_TYPE_NO_FIX
-        x, y, z, vx, vy, vz = gnss["out"].tolist()
-        fix = Fix(
-            Vector3(x, y, z), Vector3(vx, vy, vz), self._eph_m * jam, self._epv_m * jam, kind, satellites
-        )
-        self._waiting.append((time_us + self._latency_us, fix))
-
-    @property
-    def next_due_us(self) -> int:
-        """Time of the next message."""
-        return self._waiting[0][0] if self._waiting else 1 << 64
-
-    def due(self, time_us: int) -> Fix | None:
-        """Return the newest message that is due, once; older ones are dropped."""
-        fix = None
-        while self._waiting and self._waiting[0][0] <= time_us:
-            fix = self._waiting.popleft()[1]
-        return fix
+        x, y, z, vx, vy, vz = self.records["out"][0].tolist()
+        accuracy = self._eph_m * self._jam, self._epv_m * self._jam
+        return Fix(Vector3(x, y, z), Vector3(vx, vy, vz), *accuracy, kind, self._satellites)

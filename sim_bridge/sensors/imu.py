@@ -19,7 +19,7 @@ Errors of an axis, with white noise n and the wandering bias b, a Gauss-Markov p
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,7 +36,7 @@ from flightstack.core.geometry import (
 )
 from flightstack.core.portable_math import sin_cos
 from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
-from sim_bridge.sensors.layout import IMU, IMU_NOISE, MOTION, write_numbers
+from sim_bridge.sensors.layout import IMU, IMU_NOISE, MOTION, SingleArray, write_numbers
 from sim_bridge.sensors.noise import NormalStream, gauss_markov, limited, quantised, with_fault
 
 _MATRIX_DEVIATES, _BIAS_DEVIATES = 18, 18
@@ -60,7 +60,7 @@ def mounting_velocity(state: FloatArray, mounting: FloatArray) -> Vector3:
 
 
 @compiled
-def vibration(m: Record, rotor_speed: FloatArray) -> Motion:
+def vibration(m: Record, rotor_speed: SingleArray) -> Motion:
     """Turn the rotors; return the mean rates and specific force of their imbalance."""
     p, q, r, ax, ay = 0.0, 0.0, 0.0, 0.0, 0.0
     dt, inertia = m["dt_s"], m["inertia"]
@@ -69,7 +69,9 @@ def vibration(m: Record, rotor_speed: FloatArray) -> Motion:
         m["speed"][i] = rotor_speed[i]
         turned = wrap_pi(phase + speed * dt)
         m["phase"][i] = turned
-        (s0, c0), (s1, c1) = sin_cos(phase), sin_cos(turned)
+        s0, c0 = m["turn"][i, 0], m["turn"][i, 1]
+        s1, c1 = sin_cos(turned)
+        m["turn"][i, 0], m["turn"][i, 1] = s1, c1
         spin, at = m["spin"][i], m["rotor_position"][i]
         along, across = m["imbalance"] * (s1 - s0) / dt, m["imbalance"] * (c0 - c1) / dt
         ax += speed * along / m["mass"]
@@ -97,9 +99,19 @@ def true_motion(m: Record, state: FloatArray) -> Motion:
 
 
 @compiled
-def _sense(imu: Record, part: int, true: Vector3, full_scale: float, step: float, noise: FloatArray) -> None:
+def _sense(
+    imu: Record,
+    part: int,
+    true: Vector3,
+    full_scale: float,
+    step: float,
+    noise: FloatArray,
+    wire: SingleArray,
+) -> None:
     """Write the output of the gyro (``part`` 0) or accelerometer (1)."""
     if imu["is_frozen"][part] != 0:
+        for i in range(3 * part, 3 * part + 3):
+            wire[(i + 3) % 6] = imu["out"][i]
         return
     matrix, white = imu["matrix"][part], with_fault(imu["white"][part], imu["fault_noise"][part])
     for axis in range(3):
@@ -109,17 +121,23 @@ def _sense(imu: Record, part: int, true: Vector3, full_scale: float, step: float
         value += imu["turn_on"][i] + imu["per_kelvin"][i] * imu["rise"] + imu["bias"][i]
         value += white * noise[i] + imu["fault_bias"][i]
         imu["out"][i] = quantised(limited(value, full_scale), step)
-        imu["wire"][(i + 3) % 6] = imu["out"][i]
+        wire[(i + 3) % 6] = imu["out"][i]
 
 
 @compiled
 def measure_imu(
-    motion: RecordArray, imus: RecordArray, state: FloatArray, rotor_speed: FloatArray, deviates: FloatArray
+    motion: RecordArray,
+    imus: RecordArray,
+    state: FloatArray,
+    rotor_speed: SingleArray,
+    deviates: FloatArray,
+    wires: SingleArray,
 ) -> None:
-    """Write the measurements of all inertial sensors to their ``out``.
+    """Write the measurements of all inertial sensors to their ``out``, and to ``wires`` as in HIL_SENSOR.
 
     ``state`` is the array form of ``VehicleState``, ``rotor_speed`` rad/s, ``deviates`` standard normal deviates of
-    shape (rows, sensors, 12), of which each call takes one row.
+    shape (rows, sensors, 12), of which each call takes one row. ``wires`` has the shape (sensors, 6): specific force
+    and rates.
     """
     m = motion[0]
     noise = deviates[m["row"]]
@@ -136,8 +154,8 @@ def measure_imu(
         imu["rise"] = imu["warm_up_k"] + imu["warming"] * (imu["rise"] - imu["warm_up_k"])
         for i in range(6):
             imu["bias"][i] = imu["decay"] * imu["bias"][i] + imu["wander"][i // 3] * noise[k, 6 + i]
-        _sense(imu, 0, gyro, imu["gyro_range_rad_s"], imu["gyro_resolution_rad_s"], noise[k])
-        _sense(imu, 1, accel, imu["accel_range_m_s2"], imu["accel_resolution_m_s2"], noise[k])
+        _sense(imu, 0, gyro, imu["gyro_range_rad_s"], imu["gyro_resolution_rad_s"], noise[k], wires[k])
+        _sense(imu, 1, accel, imu["accel_range_m_s2"], imu["accel_resolution_m_s2"], noise[k], wires[k])
 
 
 class ImuSet:
@@ -166,9 +184,9 @@ class ImuSet:
         m["rotor_count"] = len(vehicle.rotors)
         for index, rotor in enumerate(vehicle.rotors):
             m["rotor_position"][index], m["spin"][index] = rotor.position_frd_m, rotor.spin
-            m["phase"][index] = wrap_pi(
-                2.4 * index
-            )  # rotors do not turn in step: an irrational share of a turn
+            # rotors do not turn in step: an irrational share of a turn
+            m["phase"][index] = wrap_pi(2.4 * index)
+            m["turn"][index] = sin_cos(m["phase"][index])
         m["attitude"], m["velocity"] = state[6:10], mounting_velocity(state, m["mounting"])
 
     def set_step(self, dt_s: float) -> None:
@@ -186,19 +204,22 @@ class ImuSet:
                 share * imu["accel_bias_instability_m_s2"],
             )
 
-    def measure(self, state: FloatArray, rotor_speed: FloatArray) -> None:
-        """Measure the motion since the last call; ``state`` and ``rotor_speed`` are the same arrays in each call."""
+    def measure(self, state: FloatArray, rotor_speed: SingleArray, wires: SingleArray) -> None:
+        """Measure the motion since the last call; the arrays have the same types in each call."""
         if self._left == 0:
-            self._refill(state, rotor_speed)
+            self._refill(state, rotor_speed, wires)
         self._left -= 1
-        self._call(self.motion, self.records, state, rotor_speed, self._noise)
+        self._call(self.motion, self.records, state, rotor_speed, self._noise, wires)
 
-    def _refill(self, state: FloatArray, rotor_speed: FloatArray) -> None:
+    def _refill(self, *arrays: Any) -> None:
         for index, stream in enumerate(self._streams):
             self._noise[:, index] = stream.rows(_ROWS)
         self._left, self.motion[0]["row"] = _ROWS, 0
         if self._call is measure_imu:
-            self._call = direct(measure_imu, self.motion, self.records, state, rotor_speed, self._noise)
+            state, rotor_speed, wires = arrays
+            self._call = direct(
+                measure_imu, self.motion, self.records, state, rotor_speed, self._noise, wires
+            )
 
 
 def _set_errors(imu: Record, stream: NormalStream) -> None:

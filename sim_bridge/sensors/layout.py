@@ -6,12 +6,18 @@ An angle of the file in degrees is in radians here, and its name ends in ``_rad`
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from flightstack.core.contract import MAX_ROTORS, Record
+from flightstack.core.portable_math import sin_cos
 from flightstack.params.sensors import TABLES, Numbers
+from flightstack.params.vehicle import Vehicle
+from sim_bridge.plant.dimensions import foot_z_m
+from sim_bridge.plant.plant import PlantOptions
+
+SingleArray: TypeAlias = "np.ndarray[Any, np.dtype[np.float32]]"
 
 IMU_NOISE = 12
 """Normal deviates for one measurement of an inertial sensor: six white ones, six of the biases."""
@@ -55,6 +61,7 @@ MOTION = np.dtype(
         ("attitude", "f8", 4),  # at the last measurement
         ("velocity", "f8", 3),  # of the mounting, m/s NED, then
         ("phase", "f8", MAX_ROTORS),  # angle of each rotor's imbalance, rad
+        ("turn", "f8", (MAX_ROTORS, 2)),  # sine and cosine of this angle
         ("speed", "f8", MAX_ROTORS),  # of each rotor at the last measurement, rad/s
         ("rotor_count", "i8"),
         ("rotor_position", "f8", (MAX_ROTORS, 3)),  # m FRD
@@ -83,7 +90,6 @@ IMU = _dtype(
     ("warming", "f8"),  # decay of its rest over one measurement
     ("fault_bias", "f8", 6),  # rad/s, m/s²
     ("out", "f8", 6),  # rates rad/s, specific force m/s², FRD
-    ("wire", "f4", 6),  # specific force and rates, as in HIL_SENSOR
     channels=(2,),
 )
 """One inertial sensor."""
@@ -123,19 +129,32 @@ GNSS = _dtype(
     ("out", "f8", 6),  # position m NED, velocity m/s NED
 )
 
+_GROUND = (
+    ("surface_z", "f8"),  # m along the normal of the ground
+    ("slope", "f8", 2),  # sine and cosine; the ground rises to the north
+    ("ground_velocity", "f8", 3),  # m/s NED
+)
+
 RANGE = _dtype(
     "range",
-    ("surface_z", "f8"),
+    *_GROUND,
     ("fault_bias", "f8", 1),
     ("out", "f8", 2),  # distance m, quality 0 to 1
 )
 
 FLOW = _dtype(
     "flow",
-    ("surface_z", "f8"),
+    *_GROUND,
     ("fault_bias", "f8", 2),
     ("out", "f8", 3),  # flow about x and y rad/s, quality 0 to 1
 )
+
+
+def write_ground(record: Record, vehicle: Vehicle, options: PlantOptions) -> None:
+    """Write the ground under a vehicle to the record of a sensor that looks down."""
+    record["surface_z"], record["slope"] = foot_z_m(vehicle), sin_cos(options.slope_rad)
+    record["ground_velocity"] = options.boat_ned_m_s
+
 
 SENSORS = {"imu": IMU, "mag": MAG, "baro": BARO, "gnss": GNSS, "range": RANGE, "flow": FLOW}
 """The record type of each sensor, by its name in ``TABLES``."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flightstack.core.compiled import compiled
+from flightstack.core.compiled import compiled, direct
 from flightstack.core.contract import FloatArray, Quaternion, RecordArray, Vector3
 from flightstack.core.geometry import conjugate, rotate
 from flightstack.params.vehicle import Vehicle
@@ -40,6 +40,7 @@ class Magnetometer:
         self.records: RecordArray = np.zeros(1, MAG)
         self.out: FloatArray = self.records["out"][0]
         """The last measurement."""
+        self._call = measure_mag
         mag, self._noise = self.records[0], NormalStream(seed, "mag", width=3)
         write_numbers(mag, vehicle.sensors.numbers["mag"])
         mag["earth"] = earth_ned_gauss
@@ -47,6 +48,10 @@ class Magnetometer:
         mag["offset"] = mag["hard_iron_gauss"] * self._noise.first(4)[:3]
         mag["per_ampere"] = mag["current_gauss_a"] * self._noise.first(4)[:3]
 
-    def measure(self, state: FloatArray, current_a: float) -> None:
+    def measure(self, state: FloatArray, current_a: float) -> FloatArray:
         """Measure at a state; ``current_a`` is that of the battery."""
-        measure_mag(self.records, state, current_a, self._noise.row())
+        noise = self._noise.row()
+        if self._call is measure_mag:
+            self._call = direct(measure_mag, self.records, state, current_a, noise)
+        self._call(self.records, state, current_a, noise)
+        return self.out

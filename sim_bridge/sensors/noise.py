@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray
+from flightstack.core.contract import FloatArray, Record
 from flightstack.core.portable_math import exp
 from sim_bridge.plant.turbulence import normal_deviates
 
@@ -18,7 +18,7 @@ _ROWS = 256
 _FIRST_STREAM = 16
 """Jumps of the generator before the first stream; gusts have the first two."""
 _STREAMS = {"imu": 0, "mag": 8, "baro": 16, "gnss": 24, "range": 32, "flow": 40}
-_LOSSES = 48
+_LOSSES = {"gyro": 48, "accel": 52, "mag": 56, "baro": 57, "gnss": 58, "range": 59, "flow": 60}
 
 
 class NormalStream:
@@ -45,10 +45,10 @@ class NormalStream:
 
 
 class UniformStream:
-    """Numbers of a uniform distribution over [0, 1)."""
+    """Numbers of a uniform distribution over [0, 1), which decide the losses of one sensor."""
 
-    def __init__(self, seed: int) -> None:
-        self._bits = np.random.PCG64(seed).jumped(_FIRST_STREAM + _LOSSES)
+    def __init__(self, seed: int, sensor: str, instance: int = 0) -> None:
+        self._bits = np.random.PCG64(seed).jumped(_FIRST_STREAM + _LOSSES[sensor] + instance)
 
     def next(self) -> float:
         """Return the next number."""
@@ -59,6 +59,24 @@ def gauss_markov(step_s: float, time_s: float) -> tuple[float, float]:
     """Return decay and relative noise of a first-order Gauss-Markov process over one step, exact for any step."""
     decay = exp(-step_s / time_s)
     return decay, math.sqrt(1.0 - decay * decay)
+
+
+class Wander:
+    """Keeps ``decay`` and ``wander`` of a record, a Gauss-Markov process, to the times of its samples."""
+
+    def __init__(self, record: Record, spread: FloatArray | float, time_s: float) -> None:
+        self._record, self._spread, self._time_s = record, spread, time_s
+        self._last_us: int | None = None
+        self._step_us = -1
+
+    def follow(self, time_us: int) -> None:
+        """Set the coefficients for a sample at ``time_us``; the first sample is the start of the process."""
+        step_us = 0 if self._last_us is None else time_us - self._last_us
+        self._last_us = time_us
+        if step_us != self._step_us:
+            self._step_us = step_us
+            decay, share = gauss_markov(step_us * 1e-6, self._time_s)
+            self._record["decay"], self._record["wander"] = decay, np.multiply(share, self._spread)
 
 
 @compiled

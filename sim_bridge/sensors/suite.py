@@ -2,15 +2,19 @@
 
 The inertial sensors measure in each exchange, the others at their own rates, at the first exchange at or after each
 multiple of their period. The messages are those that PX4 expects of a simulator: HIL_SENSOR with the bits of what is
-new, HIL_GPS, DISTANCE_SENSOR and HIL_OPTICAL_FLOW. HIL_SENSOR of the first inertial sensor is the last one, because its
-time is the clock of the vehicle: what arrives before it belongs to the same instant.
+new, HIL_GPS, DISTANCE_SENSOR and HIL_OPTICAL_FLOW.
+
+The time of HIL_SENSOR of the first inertial sensor is the clock of the vehicle. The flight stack gives all messages
+before it the same time, so that it comes last. PX4 sets its clock on this message and stamps the other ones with its
+clock when it reads them (SimulatorMavlink.cpp, ``handle_message_hil_sensor``), so that for PX4 it comes first: sent
+last, a second inertial sensor would be one step old.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,27 +43,28 @@ from flightstack.simulator_link.sensor_frames import (
     encode_gps,
 )
 from sim_bridge.plant.fault_table import Fault, Kind
-from sim_bridge.plant.plant import Plant
+from sim_bridge.plant.plant import Plant, PlantOptions
 from sim_bridge.sensors.barometer import Barometer
-from sim_bridge.sensors.faults import HEALTHY, Channel, channel_faults
+from sim_bridge.sensors.faults import HEALTHY, NEVER_US, Channel, channel_faults
 from sim_bridge.sensors.gnss import Fix, GnssReceiver
 from sim_bridge.sensors.imu import ImuSet
+from sim_bridge.sensors.layout import SingleArray
 from sim_bridge.sensors.magnetometer import Magnetometer
-from sim_bridge.sensors.noise import UniformStream
 from sim_bridge.sensors.optical_flow import OpticalFlow
 from sim_bridge.sensors.rangefinder import Rangefinder
 
 _DEGREE = math.pi / 180.0
 _IMU = ACCEL | GYRO
-_NEVER_US = 1 << 64
 _UNKNOWN_VARIANCE = 255
 
 
-class _Task(NamedTuple):
-    """A sensor with a rate of its own."""
+class _Sensor(NamedTuple):
+    """A sensor with a rate of its own; ``measure`` returns the output, ``send`` puts it into a message."""
 
     period_us: int
-    measure: Callable[[int], None]
+    channel: Channel
+    measure: Callable[[int], Any]
+    send: Callable[[int, Any], None]
 
 
 class Sender(NamedTuple):
@@ -76,54 +81,64 @@ class SensorSuite:
         self,
         vehicle: Vehicle,
         home: GeoPoint,
-        seed: int,
+        options: PlantOptions,
         truth: PlantStateFrame,
         plant: Plant,
         sender: Sender,
     ) -> None:
-        self._truth, self._plant, self._sender = truth, plant, sender
+        self._truth, self._plant, self._sender, self._seed = truth, plant, sender, options.seed
+        seed = options.seed
         self._link = Link(*sender)
         self._frame = LocalFrame(home)
         numbers = vehicle.sensors.numbers
         self.imus = ImuSet(vehicle, seed, truth.state)
         count = len(self.imus.records)
         self._frames = [HilSensorFrame(*sender) for _ in range(count)]
+        self._values = self._frames[0].values
         self._fields = [_IMU] * count
-        self._wires = [
-            (frame.values[:6], self.imus.records["wire"][index]) for index, frame in enumerate(self._frames)
-        ]
+        self._apart: SingleArray = np.zeros((count, 6), "<f4")  # measurements that go through channels
+        self._wires = self._values[:6].reshape(1, 6) if count == 1 else self._apart
         self._gps_seq = 0
         self._messages: list[bytes] = []
         self._channels: dict[tuple[str, int], Channel] = {}
         for index in range(count):
-            self._channels["gyro", index] = Channel(self.imus.records, index, 0, _DEGREE)
-            self._channels["accel", index] = Channel(self.imus.records, index, 1)
-        self._losses = UniformStream(seed)
+            for part, (name, scale) in enumerate((("gyro", _DEGREE), ("accel", 1.0))):
+                key = (name, index)
+                self._channels[key] = Channel(key, seed, self.imus.records, part, scale=scale)
         self._has_faults = False
+        self._is_apart = False  # measurements of the inertial sensors go through their channels
         self._imbalance = float(self.imus.motion[0]["imbalance"])
-        self._tasks: list[_Task] = []
+        self._sensors: list[_Sensor] = []
         if "mag" in numbers:
             self.mag = Magnetometer(vehicle, seed, earth_field_ned_gauss(home))
             self._mag_matrix: FloatArray = self.mag.records[0]["matrix"].copy()
-            self._add("mag", self.mag.records, self._measure_mag)
+            self._add("mag", self.mag.records, self._measure_mag, self._send_mag)
         if "baro" in numbers:
             self.baro = Barometer(vehicle, seed, home.altitude_m)
-            self._add("baro", self.baro.records, self._measure_baro)
+            self._add("baro", self.baro.records, self._measure_baro, self._send_baro)
         if "gnss" in numbers:
             self.gnss = GnssReceiver(vehicle, seed)
-            self._add("gnss", self.gnss.records, self._measure_gnss)
+            self._add("gnss", self.gnss.records, self._measure_gnss, self._send_fix, self.gnss.latency_us)
         if "range" in numbers:
-            self.range = Rangefinder(vehicle, seed)
-            self._add("range", self.range.records, self._measure_range)
+            self.range = Rangefinder(vehicle, options)
+            self._add("range", self.range.records, self._measure_range, self._send_range)
         if "flow" in numbers:
-            self.flow = OpticalFlow(vehicle, seed)
-            self._add("flow", self.flow.records, self._measure_flow)
-        self._due_us = [0] * len(self._tasks)
+            self.flow = OpticalFlow(vehicle, options)
+            self._add("flow", self.flow.records, self._measure_flow, self._send_flow)
+        self._due_us = [0] * len(self._sensors)
         self._next_us = 0
 
-    def _add(self, name: str, records: RecordArray, measure: Callable[[int], None]) -> None:
-        self._channels[name, 0] = Channel(records)
-        self._tasks.append(_Task(round(1e6 / float(records[0]["rate_hz"])), measure))
+    def _add(
+        self,
+        name: str,
+        records: RecordArray,
+        measure: Callable[[int], Any],
+        send: Callable[[int, Any], None],
+        latency_us: int = 0,
+    ) -> None:
+        channel = Channel((name, 0), self._seed, records, latency_us=latency_us)
+        self._channels[name, 0] = channel
+        self._sensors.append(_Sensor(round(1e6 / float(records[0]["rate_hz"])), channel, measure, send))
 
     def set_interval_us(self, interval_us: int) -> None:
         """Set the time between two exchanges."""
@@ -131,13 +146,16 @@ class SensorSuite:
 
     # ------------------------------------------------------------------ faults
 
-    def set_faults(self, active: Iterable[Fault]) -> None:
-        """Set the active faults; those of an earlier call end."""
+    def set_faults(self, active: Iterable[Fault], time_us: int) -> None:
+        """Set the active faults at ``time_us``; those of an earlier call end."""
         causes = [fault for fault in active if fault.sensor]
         faults = channel_faults(causes, len(self.imus.records))
         self._has_faults = bool(faults)
         for key, channel in self._channels.items():
-            channel.set(faults.get(key, HEALTHY), self._losses)
+            channel.set(faults.get(key, HEALTHY), time_us)
+        self._is_apart = not all(
+            channel.is_direct for (name, _), channel in self._channels.items() if name in ("gyro", "accel")
+        )
         values = {fault.kind: fault.value for fault in causes}
         self.imus.motion[0]["imbalance"] = self._imbalance * values.get(Kind.VIBRATION, 1.0)
         if ("mag", 0) in self._channels:
@@ -150,93 +168,99 @@ class SensorSuite:
                 ]
             )
         if ("gnss", 0) in self._channels:
-            self.gnss.lost_share = values.get(Kind.GNSS_JAM, 0.0)
+            self.gnss.jam(values.get(Kind.GNSS_JAM, 0.0))
             self.gnss.records[0]["fault_rate"] = self._channels["gnss", 0].rate
 
     # ------------------------------------------------------------------ measurements
 
+    def prime(self, time_us: int) -> None:
+        """Measure once without a message, so that a sensor that is frozen from the start has a measurement."""
+        self.imus.measure(self._truth.state, self._truth.rotor_speed_rad_s, self._apart)
+        for sensor in self._sensors:
+            sensor.measure(time_us)
+
     def measure(self, time_us: int) -> None:
         """Measure the present state, at the simulated time."""
-        self.imus.measure(self._truth.state, self._truth.rotor_speed_rad_s)
         if self._has_faults:
-            self._measure_faulty_imus(time_us)
+            for channel in self._channels.values():
+                channel.update(time_us)
+        truth = self._truth
+        if self._is_apart:
+            self.imus.measure(truth.state, truth.rotor_speed_rad_s, self._apart)
+            for index in range(len(self._frames)):
+                self._pass_on_imu(time_us, index)
         else:
-            for index, (values, wire) in enumerate(self._wires):
-                values[:] = wire
-                self._fields[index] = _IMU
+            self.imus.measure(truth.state, truth.rotor_speed_rad_s, self._wires)
+            self._fields[0] = _IMU
+            if len(self._frames) > 1:
+                for index, frame in enumerate(self._frames):
+                    frame.values[:6], self._fields[index] = self._wires[index], _IMU
         if time_us >= self._next_us:
             self._measure_slow(time_us)
 
-    def _measure_faulty_imus(self, time_us: int) -> None:
-        for channel in self._channels.values():
-            channel.update(time_us)
-        for index, frame in enumerate(self._frames):
-            out = self.imus.records["out"][index]
-            fields = 0
-            for name, at, part, bits in (
-                ("gyro", GYRO_AT, out[:3], GYRO),
-                ("accel", ACCEL_AT, out[3:], ACCEL),
-            ):
-                sent = self._channels[name, index].pass_on(time_us, part.copy())
-                if sent is not None:
-                    frame.values[at] = sent
-                    fields |= bits
-            self._fields[index] = fields
+    def _pass_on_imu(self, time_us: int, index: int) -> None:
+        """Send the measurement of an inertial sensor that its faults leave."""
+        out, values, fields = self.imus.records["out"][index], self._frames[index].values, 0
+        for name, at, part, bits in (
+            ("gyro", GYRO_AT, out[:3], GYRO),
+            ("accel", ACCEL_AT, out[3:], ACCEL),
+        ):
+            sent = self._channels[name, index].pass_on(time_us, part.copy())
+            if sent is not None:
+                values[at] = sent
+                fields |= bits
+        self._fields[index] = fields
 
     def _measure_slow(self, time_us: int) -> None:
-        for index, (period_us, measure) in enumerate(self._tasks):
+        next_us = NEVER_US
+        for index, (period_us, channel, measure, send) in enumerate(self._sensors):
+            out = None
             if time_us >= self._due_us[index]:
                 self._due_us[index] = (time_us // period_us + 1) * period_us
-                measure(time_us)
-        self._next_us = min(self._due_us, default=_NEVER_US)
-        if ("gnss", 0) in self._channels:
-            self._send_fix(time_us)
+                out = measure(time_us)
+                if not channel.is_direct:
+                    out = channel.pass_on(time_us, out if isinstance(out, tuple) else out.copy())
+            elif not channel.is_direct:
+                out = channel.due(time_us)
+            if out is not None:
+                send(time_us, out)
+            next_us = min(next_us, self._due_us[index])
+            if not channel.is_direct:
+                next_us = min(next_us, channel.next_due_us)
+        self._next_us = next_us
 
-    def _passed(self, name: str, time_us: int, out: FloatArray) -> FloatArray | None:
-        """Return the output of a sensor that is sent, or None."""
-        return self._channels[name, 0].pass_on(time_us, out.copy()) if self._has_faults else out
+    def _measure_mag(self, _time_us: int) -> FloatArray:
+        return self.mag.measure(self._truth.state, self._plant.current_a)
 
-    def _measure_mag(self, time_us: int) -> None:
-        self.mag.measure(self._truth.state, self._plant.current_a)
-        sent = self._passed("mag", time_us, self.mag.out)
-        if sent is not None:
-            self._frames[0].values[MAG_AT] = sent
-            self._fields[0] |= MAG
+    def _send_mag(self, _time_us: int, out: FloatArray) -> None:
+        self._values[MAG_AT] = out
+        self._fields[0] |= MAG
 
-    def _measure_baro(self, time_us: int) -> None:
-        self.baro.measure(self._truth.state, self._plant.airspeed_m_s(), self._truth.rotor_speed_rad_s)
-        sent = self._passed("baro", time_us, self.baro.out)
-        if sent is not None:
-            values = self._frames[0].values
-            values[PRESSURE_AT], values[ALTITUDE_AT], values[TEMPERATURE_AT] = sent.tolist()
-            self._fields[0] |= BARO
+    def _measure_baro(self, time_us: int) -> FloatArray:
+        truth = self._truth
+        return self.baro.measure(time_us, truth.state, self._plant.airspeed_m_s(), truth.rotor_speed_rad_s)
 
-    def _measure_gnss(self, time_us: int) -> None:
-        self.gnss.measure(time_us, self._truth.state)
+    def _send_baro(self, _time_us: int, out: FloatArray) -> None:
+        self._values[PRESSURE_AT], self._values[ALTITUDE_AT], self._values[TEMPERATURE_AT] = out.tolist()
+        self._fields[0] |= BARO
 
-    def _send_fix(self, time_us: int) -> None:
-        """Send the fix that is due; until then look again in each exchange."""
-        fix = self.gnss.due(time_us)
-        if fix is not None:
-            fix = self._channels["gnss", 0].pass_on(time_us, fix)
-        if fix is not None:
-            self._messages.append(self._gps_frame(time_us, fix))
-        self._next_us = min(self._next_us, self.gnss.next_due_us)
+    def _measure_gnss(self, time_us: int) -> Fix:
+        return self.gnss.measure(time_us, self._truth.state)
 
-    def _gps_frame(self, time_us: int, fix: Fix) -> bytes:
+    def _send_fix(self, time_us: int, fix: Fix) -> None:
         geo = self._frame.to_geo(fix.position_ned_m)
         seq, self._gps_seq = self._gps_seq, (self._gps_seq + 1) & 255
         gps = HilGps(
             time_us, geo.latitude_deg, geo.longitude_deg, geo.altitude_m, fix.eph_m, fix.epv_m,
             fix.velocity_ned_m_s, fix.fix_type, fix.satellites,
         )  # fmt: skip
-        return encode_gps(gps, seq, *self._sender)
+        self._messages.append(encode_gps(gps, seq, *self._sender))
 
-    def _measure_range(self, time_us: int) -> None:
-        self.range.measure(self._truth.state)
-        sent = self._passed("range", time_us, self.range.records["out"][0])
-        if sent is not None:
-            self._messages.append(self._link.encode(self._distance_message(time_us, *sent.tolist())))
+    def _measure_range(self, _time_us: int) -> FloatArray:
+        return self.range.measure(self._truth.state)
+
+    def _send_range(self, time_us: int, out: FloatArray) -> None:
+        self._messages.append(self._link.encode(self._distance_message(time_us, *out.tolist())))
 
     def _distance_message(self, time_us: int, distance_m: float, quality: float) -> Message:
         sensor = self.range.records[0]
@@ -252,11 +276,11 @@ class SensorSuite:
             signal_quality=100 if quality > 0.0 else 1,
         )
 
-    def _measure_flow(self, time_us: int) -> None:
-        self.flow.measure(self._truth.state)
-        sent = self._passed("flow", time_us, self.flow.records["out"][0])
-        if sent is not None:
-            self._messages.append(self._link.encode(self._flow_message(time_us, *sent.tolist())))
+    def _measure_flow(self, _time_us: int) -> FloatArray:
+        return self.flow.measure(self._truth.state)
+
+    def _send_flow(self, time_us: int, out: FloatArray) -> None:
+        self._messages.append(self._link.encode(self._flow_message(time_us, *out.tolist())))
 
     def _flow_message(self, time_us: int, about_x: float, about_y: float, quality: float) -> Message:
         dt_s = 1.0 / float(self.flow.records[0]["rate_hz"])
@@ -276,10 +300,16 @@ class SensorSuite:
 
     # ------------------------------------------------------------------ messages
 
-    def frames(self, stamp_us: int) -> bytes:
-        """Return the messages of the present measurements, HIL_SENSOR of the first inertial sensor last."""
-        parts = self._messages
-        for number in range(len(self._frames) - 1, -1, -1):
-            parts.append(bytes(self._frames[number].seal(stamp_us, self._fields[number], number)))
-        self._messages = []
-        return b"".join(parts)
+    def frames(self, stamp_us: int, clock_first: bool = False) -> bytes | memoryview:
+        """Return the messages of the present measurements, valid until the next call.
+
+        HIL_SENSOR of the first inertial sensor is the last one, or with ``clock_first`` the first.
+        """
+        if not self._messages and len(self._frames) == 1:
+            return self._frames[0].seal(stamp_us, self._fields[0], 0)
+        others, self._messages = self._messages, []
+        imus = [
+            bytes(frame.seal(stamp_us, fields, number))
+            for number, (frame, fields) in enumerate(zip(self._frames, self._fields, strict=True))
+        ]
+        return b"".join(imus + others if clock_first else others + imus[::-1])

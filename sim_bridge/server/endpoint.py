@@ -114,10 +114,10 @@ class FlightStackEndpoint:
         if self._requested == FS_PLANT_STATE_ID:
             return simulator.outgoing()
         data = simulator.battery_frame()
+        if self._sends_sensors and simulator.sensors is not None:
+            data += simulator.sensors.frames(simulator.stamp_us, clock_first=True)
         if self._requested and not simulator.drops_state:
             data += self._link.encode(hil_state(simulator, self._frame))
-        if self._sends_sensors and simulator.sensors is not None:
-            data += simulator.sensors.frames(simulator.stamp_us)
         return data
 
     def step(self) -> None:
@@ -146,20 +146,27 @@ class FlightStackEndpoint:
             )
         self.free_running = not actuators.flags & LOCKSTEP_FLAG
         self.freewheels = False
-        if not self.free_running and not self._faults_checked:
-            self._reject_drops()
+        if not self._faults_checked:
+            self._check_faults()
         if self.ready and actuators.time_us == self.simulator.stamp_us:
             self.answered = True
         elif not self.free_running:
             self.stale += 1
 
-    def _reject_drops(self) -> None:
-        """Set an error for the fault ``state:drop``, which is impossible in lockstep; checked once."""
+    def _check_faults(self) -> None:
+        """Set an error for a fault that cannot act on this flight stack; checked once."""
         self._faults_checked = True
-        if any(fault.kind is Kind.STATE_DROP for fault in self.simulator.faults):
+        faults = self.simulator.faults
+        if not self.free_running and any(fault.kind is Kind.STATE_DROP for fault in faults):
             self.error = (
                 "state:drop needs a flight stack on its own clock (--clock realtime): in lockstep both sides "
                 "would wait for ever; use state:freeze or state:nan"
+            )
+        sensor = next((fault.sensor for fault in faults if fault.sensor), None)
+        if sensor is not None and not self._sends_sensors:
+            self.error = (
+                f"the fault of the sensor {sensor} cannot act: the flight stack flies on the true state; start it "
+                "with --state estimated"
             )
 
     def _handle(self, message: Message) -> None:

@@ -27,7 +27,7 @@ class RealVehicle:
         self.simulator = Process("sim_bridge", *number, "--speed", str(speed))
         losses = [f"--param={name}={value}" for name, value in client_timeouts(speed).items()]
         self.stack = Process(
-            "flightstack", *number, "--log", str(self.log), "--state", str(directory), *losses, *options
+            "flightstack", *number, "--log", str(self.log), "--state-dir", str(directory), *losses, *options
         )
         try:
             self.stack.wait_for("flightstack: paper_quad")

@@ -19,6 +19,8 @@ from tests.support.generated_c import in_python
 from tests.support.plugin_site import ROOT, example_module
 from tests.support.tools import missing
 
+pytestmark = pytest.mark.long
+
 OURS = [*FUNCTIONS, *(law.step for law in every(BUILT_IN))]
 TRIES = 2000
 UNREACHABLE: dict[str, str] = {}

@@ -8,7 +8,15 @@ from typing import Any
 
 import pytest
 
-from flightstack.estimation import alignment, derived_generated, fusion, imu_input, kalman, prediction
+from flightstack.estimation import (
+    alignment,
+    derived_generated,
+    fusion,
+    imu_input,
+    kalman,
+    prediction,
+    yaw_estimator,
+)
 from flightstack.firmware.generator.call_c import CFunction, Vectors, differences
 from flightstack.firmware.generator.unit import Program
 from tests.support.generated_c import compile_program, in_python
@@ -23,12 +31,16 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "barometer": fusion.fuse_baro,
     "range": fusion.fuse_range,
     "field": fusion.fuse_field,
-    "rest": fusion.fuse_rest,
+    "rest": fusion.fuse_rest_velocity,
+    "rate at rest": fusion.fuse_rest_rate,
     "held position": fusion.fuse_hold,
     "IMU sums": imu_input.add_sample,
     "alignment": alignment.align,
+    "yaw models": yaw_estimator.predict_models,
+    "weights of yaw models": yaw_estimator.update_models,
+    "yaw of models": yaw_estimator.mean_turn,
 }
-_BOUNDS = {"reset of a variance": {"at": 3, "count": 4}, "scalar fusion": {"row": 6}}
+_BOUNDS = {"reset of a variance": {"at": 3, "count": 4}, "scalar fusion": {"row": 6}, "GNSS": {"first": 2}}
 """Integers that a caller gives, within the arrays."""
 
 

@@ -15,6 +15,8 @@ from tools.pil_faults.faults import BACKSTEPPING, PID, Fault
 from tools.pil_faults.page import named_check
 from tools.pil_faults.planted import PlantedCore, checks_of, faults, findings, setup_of
 
+pytestmark = pytest.mark.long
+
 PAGE = ROOT / "docs" / "reference" / "pil-faults.md"
 
 

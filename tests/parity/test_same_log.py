@@ -19,6 +19,8 @@ import pytest
 from tests.parity.flown_log import CONTROLLERS
 from tests.support.tools import NIGHTLY
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).resolve().parents[2]
 
 

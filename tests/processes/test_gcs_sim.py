@@ -28,7 +28,7 @@ def test_sim_serves_vehicles_until_interrupted(tmp_path: Path) -> None:
     first = free_pair()
     sim = Process(
         "gcs_cli", "sim", "--json", "--vehicles", "2", "--instance", str(first), "--speed", "10",
-        "--log", str(tmp_path / "a.ulg"), "--state", str(tmp_path / "state"),
+        "--log", str(tmp_path / "a.ulg"), "--state-dir", str(tmp_path / "state"),
     )  # fmt: skip
     try:
         sim.wait_for('"ready"')
@@ -51,7 +51,7 @@ def test_sim_serves_vehicles_until_interrupted(tmp_path: Path) -> None:
 
 def test_sim_ends_all_when_one_process_dies() -> None:
     first = free_instance()
-    sim = Process("gcs_cli", "sim", "--instance", str(first), "--log", "none", "--state", "none")
+    sim = Process("gcs_cli", "sim", "--instance", str(first), "--log", "none", "--state-dir", "none")
     try:
         sim.wait_for("Ctrl-C ends the simulation")
         os.kill(children_of(sim._popen.pid)["flightstack"], signal.SIGKILL)
@@ -62,7 +62,9 @@ def test_sim_ends_all_when_one_process_dies() -> None:
 
 
 def test_killed_sim_ends_its_vehicle() -> None:
-    sim = Process("gcs_cli", "sim", "--instance", str(free_instance()), "--log", "none", "--state", "none")
+    sim = Process(
+        "gcs_cli", "sim", "--instance", str(free_instance()), "--log", "none", "--state-dir", "none"
+    )
     try:
         sim.wait_for("Ctrl-C ends the simulation")
         with ends_of(*children_of(sim._popen.pid).values()):
@@ -73,7 +75,18 @@ def test_killed_sim_ends_its_vehicle() -> None:
 
 def test_ctrl_c_in_the_view_of_sim_ends_all() -> None:
     instance = str(free_instance())
-    words = ["-m", "gcs_cli", "sim", "--watch", "--instance", instance, "--log", "none", "--state", "none"]
+    words = [
+        "-m",
+        "gcs_cli",
+        "sim",
+        "--watch",
+        "--instance",
+        instance,
+        "--log",
+        "none",
+        "--state-dir",
+        "none",
+    ]
     with terminal(words) as screen:
         screen.read_until(b"Position")
         children = children_of(screen.process.pid)

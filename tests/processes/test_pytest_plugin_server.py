@@ -10,11 +10,9 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from pymavlink import mavutil
 from pyulog import ULog
 
 from flightstack.core.port_numbers import simulator_port
@@ -22,8 +20,6 @@ from flightstack.testing import server
 from flightstack.testing.instances import ServerError, free_instance
 from flightstack.testing.server import Server
 from flightstack.testing.setup import Setup
-from gcs_cli.link.connection import Connection
-from gcs_cli.link.endpoint import parse_endpoint
 from tests.support.plugin_run import PLUGIN, load, prepare, run, section
 from tests.support.process import children_of, ends_of
 
@@ -60,40 +56,10 @@ def outside(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytes
     return prepare(pytester, monkeypatch)
 
 
-@pytest.fixture(scope="module")
-def vehicle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    folder = tmp_path_factory.mktemp("vehicle")
-    setup = Setup(vehicle="x_quad", params={"MIS_TAKEOFF_ALT": 4.0})
-    with Server(setup, folder, speed=4.0, faults=["battery level 0.6 @0.5"]) as started:
-        yield started
-
-
 def assert_free(port: int) -> None:
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         probe.bind(("127.0.0.1", port))
-
-
-def test_pymavlink_reads_a_parameter_at_the_url(vehicle: Server) -> None:
-    link = mavutil.mavlink_connection(vehicle.mavlink_url)
-    try:
-        assert link.wait_heartbeat(timeout=LONG_S) is not None
-        link.mav.param_request_read_send(link.target_system, 1, b"MIS_TAKEOFF_ALT", -1)
-        answer = link.recv_match(type="PARAM_VALUE", blocking=True, timeout=LONG_S)
-        assert (answer.param_id, answer.param_value) == ("MIS_TAKEOFF_ALT", 4.0)
-    finally:
-        link.close()
-
-
-def test_fault_acts_from_its_time_since_the_start_of_the_simulator(vehicle: Server) -> None:
-    with Connection(parse_endpoint(vehicle.gcs_url)) as connection:
-        assert connection.wait_for(lambda: connection.session.view.battery is not None, LONG_S)
-        assert connection.wait_for(lambda: connection.session.view.battery.remaining <= 0.6, LONG_S)
-
-
-def test_urls_have_the_forms_of_their_libraries(vehicle: Server) -> None:
-    assert re.fullmatch(r"udpin://127\.0\.0\.1:\d+", vehicle.mavsdk_url)
-    assert re.fullmatch(r"udpin:127\.0\.0\.1:\d+", vehicle.mavlink_url)
 
 
 def test_vehicle_that_cannot_start_names_the_reason(tmp_path: Path) -> None:

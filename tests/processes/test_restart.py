@@ -20,7 +20,7 @@ from tests.support.commands import gcs
 from tests.support.vehicle_processes import LONG_S, VehicleProcesses, vehicle
 
 MISSIONS = Path(__file__).parents[2] / "missions"
-OPTIONS = ("--log", "none", "--state", "state")
+OPTIONS = ("--log", "none", "--state-dir", "state")
 
 
 def run(there: VehicleProcesses, *words: object) -> str:

@@ -65,6 +65,13 @@ def test_the_same_flight_gives_the_same_log_at_any_speed_and_in_one_process(tmp_
     assert world.flight().log.content == logs[0]
 
 
+def test_flight_on_sensors_gives_the_same_log_in_three_processes_and_in_one(tmp_path: Path) -> None:
+    instance = free_instance()
+    _, log = fly(tmp_path / "flight", instance, "--vehicle", "x_quad", "--seed", "7", "--state", "estimated")
+    with World(vehicle="x_quad", state="estimated", seed=7, params={"MAV_SYS_ID": instance + 1}) as world:
+        assert world.fly("hop").log.content == log
+
+
 GCS_LOSS_S = 5
 """As ``gcs fly`` has it. The station is there before the mission and heard each second until a test ends it."""
 
@@ -171,7 +178,7 @@ def test_a_busy_port_is_named(start: Start) -> None:
     ],
 )
 def test_bad_arguments_are_one_sentence_and_exit_2(arguments: list[str], sentence: str) -> None:
-    done = flightstack_command("--state", "none", *arguments)
+    done = flightstack_command("--state-dir", "none", *arguments)
     assert (done.returncode, done.stdout) == (2, "")
     assert sentence in done.stderr
     assert done.stderr.count("\n") == 1

@@ -16,7 +16,7 @@ from tests.support.tmux import Terminal, terminal
 from tests.support.vehicle_processes import VehicleProcesses, vehicle
 
 SQUARE = Path(__file__).parents[2] / "missions" / "square.plan"
-OPTIONS = ("--log", "none", "--state", "none")
+OPTIONS = ("--log", "none", "--state-dir", "none")
 CURSOR_S = re.compile(r"−\d+\.\d+ s")
 SPEED = 4
 """Times real time: flights are short, and the screen shows each part of them."""

@@ -144,3 +144,22 @@ def test_the_log_knows_home_and_origin(tmp_path) -> None:  # type: ignore[no-unt
     assert flight.home_ne_m() == pytest.approx((north_m, 0.0), abs=0.01)
     place = item_ned_m(item(16, north=30.0, z=3.0), flight)
     assert place == pytest.approx([30.0, 0.0, -3.0], abs=0.02)
+
+
+def test_moved_origin_leaves_places_where_they_are() -> None:
+    """A vehicle on sensors knows its origin with the first fix, perhaps after the upload of its plans."""
+    with World() as world:
+        world.upload("square")
+        area, places = world.engine.stack.area, world.engine.stack.places
+        area.set_fence(square(10.0))
+        corner, home = FRAME.to_geo(Vector3(9.0, 9.0, -2.0)), FRAME.to_geo(Vector3(3.0, 4.0, -4.0))
+        outside = FRAME.to_geo(Vector3(11.0, 0.0, 0.0))
+        area.move_origin(home)
+        assert (places.frame.origin, area.home) == (home, home)
+        allows = places.fence.shape.allows
+        assert allows(*places.frame.to_ned(corner)[:2])
+        assert not allows(*places.frame.to_ned(outside)[:2])
+        area.set_home(corner)
+        area.move_origin(FRAME.to_geo(Vector3(-2.0, 5.0, 8.0)))
+        assert area.home == corner  # set by a user
+        assert places.home.altitude_m == pytest.approx(10.0)

@@ -44,7 +44,8 @@ class Landing(NamedTuple):
     """What a landing was like."""
 
     found_s: float  # from touchdown to "landed"
-    deepest_m: float  # of the setpoint below the vehicle
+    lead_m: float  # of the setpoint below the vehicle at touchdown
+    deepest_m: float  # the same, largest
     slid_m: float  # from touchdown to the end
     tilt_deg: float  # half a second after it was disarmed
     world: World
@@ -61,21 +62,23 @@ def hover(altitude_m: float = 3.0, seconds: float = 4.0, **options: object) -> W
 
 def watch_landing(world: World, limit_s: float = 30.0) -> Landing:
     """Fly on until the vehicle disarms, and half a second more."""
-    touched_s, touched_at, found_s, deepest_m = math.nan, world.state.position_ned_m, math.nan, 0.0
+    touched_s, touched_at, found_s = math.nan, world.state.position_ned_m, math.nan
+    lead_m = deepest_m = 0.0
     ends_s = world.time_s + limit_s
     while world.state.armed:
         assert world.time_s < ends_s, (world.state.position_ned_m, world.state.mode, world.texts)
         world.tick()
+        below_m = float(world.engine.stack.now.setpoint[2] - world.state.position_ned_m.z)
         if math.isnan(touched_s) and world.engine.simulator.on_ground:
-            touched_s, touched_at = world.time_s, world.state.position_ned_m
+            touched_s, touched_at, lead_m = world.time_s, world.state.position_ned_m, below_m
         if math.isnan(found_s) and world.state.landed:
             found_s = world.time_s - touched_s
-        deepest_m = max(deepest_m, float(world.engine.stack.now.setpoint[2] - world.state.position_ned_m.z))
+        deepest_m = max(deepest_m, below_m)
     slid_m = math.dist(world.state.position_ned_m[:2], touched_at[:2])
     world.run_for(0.5)
     _, x, y, _ = world.engine.simulator.frame.state[6:10]
     tilt_deg = math.degrees(math.acos(1.0 - 2.0 * (x * x + y * y)))
-    return Landing(found_s, deepest_m, slid_m, tilt_deg, world)
+    return Landing(found_s, lead_m, deepest_m, slid_m, tilt_deg, world)
 
 
 GAINS = ("tuned", "paper", "paper_rate_fed", "backstepping_poles")
@@ -86,20 +89,17 @@ ALL = [
     for controller in ("pid", "backstepping")
     for gains in GAINS
     for share in ((0.0, 0.25, 0.6, 0.8, 0.95) if gains == "tuned" else (0.0, 0.25, 0.6))
-    if not (plant == "multibody" and share > 0.9)  # 46 m/s tip x_quad over as it slides
     for gust in ((0.0, 2.0) if (vehicle, plant) == ("x_quad", "rigid") else (0.0,))
-    # x_quad tips over on touchdown with the paper's gains, a wind of 0.25 and an upward force of 0.15
-    for up in (
-        (0.0, 0.15, 0.3)
-        if share < 0.5 and plant == "rigid" and (vehicle == "paper_quad" or gains == "tuned")
-        else (0.0,)
-    )
+    for up in ((0.0, 0.15, 0.3) if share < 0.5 and plant == "rigid" else (0.0,))
+    # the paper's loops saturate the rotors at touchdown in wind with an upward force: rate fed ahead, or in gusts
+    if not (up > 0.0 and gains == "paper_rate_fed") and not (up > 0.2 and gust > 0.0 and gains == "paper")
 ]
 SOME = [
     ("x_quad", "rigid", "pid", "tuned", 0.25, 0.0, 0.0),
     ("x_quad", "rigid", "backstepping", "tuned", 0.95, 2.0, 0.0),
     ("x_quad", "rigid", "pid", "paper", 0.25, 0.0, 0.0),
-    ("x_quad", "multibody", "pid", "tuned", 0.25, 0.0, 0.0),
+    ("x_quad", "rigid", "pid", "paper", 0.25, 0.0, 0.15),
+    ("x_quad", "multibody", "pid", "tuned", 0.95, 0.0, 0.0),
     ("x_quad", "paper", "pid", "tuned", 0.6, 0.0, 0.0),
     ("paper_quad", "rigid", "pid", "paper", 0.6, 0.0, 0.0),
     ("paper_quad", "rigid", "backstepping", "backstepping_poles", 0.0, 0.0, 0.3),
@@ -113,7 +113,7 @@ SOME = [
 def test_landing_in_wind(
     vehicle: str, plant: str, controller: str, gains: str, share: float, gust: float, up: float
 ) -> None:
-    """Measured in some: found within 1.4 s (tuned: 1.1 s), setpoint 0.52 m below."""
+    """Measured: found within 0.95 s with the tuned gains, else 1.9 s, the paper's vehicle and gains 3.3 s."""
     fast = {} if gains == "tuned" else {"inner_hz": 1000.0}
     world = hover(
         vehicle=vehicle, plant=plant, controller=controller, gains=gains, gust=gust,
@@ -125,11 +125,25 @@ def test_landing_in_wind(
         f"{landing.found_s:.2f} s, {landing.deepest_m:.2f} m, {landing.slid_m:.2f} m, {landing.tilt_deg:.1f}°"
     )
     assert set(world.texts) == USUAL_TEXTS
-    assert landing.found_s < (1.5 if gains == "tuned" else 3.0)
-    assert landing.deepest_m < (0.7 if gains == "tuned" else 1.5)
+    assert landing.found_s < (1.5 if gains == "tuned" else 3.0 if up < 0.3 else 3.5)
+    # a loop without integral follows an upward force up/kp below its setpoint
+    assert landing.deepest_m < max(0.7 if gains == "tuned" else 1.5, landing.lead_m + 0.3)
     if share < FRICTION * (1.0 - up):
         assert landing.slid_m < 2.5
         assert landing.tilt_deg < 0.5
+
+
+def test_thrust_reduced_at_touchdown_keeps_the_tilt() -> None:
+    """The tilt setpoint against the wind was 17°, rose to 37° within 40 ms of touchdown and tipped the vehicle over."""
+    world = hover(
+        vehicle="x_quad", gains="paper", inner_hz=1000.0, **wind_that_pushes("x_quad", "rigid", 0.25, 0.15)
+    )
+    world.land()
+    world.run_until(lambda _: world.engine.simulator.on_ground, 30.0)
+    world.run_for(0.1)
+    _, x, y, _, thrust_n = world.engine.stack.now.attitude_target.tolist()
+    assert thrust_n < 0.6 * load_vehicle("x_quad").weight_n
+    assert math.degrees(math.acos(1.0 - 2.0 * (x * x + y * y))) < 25.0  # 23.3° seen
 
 
 def test_a_mission_in_strong_wind_lands_as_in_calm_air() -> None:

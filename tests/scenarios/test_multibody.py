@@ -9,6 +9,8 @@ import pytest
 
 from flightstack.testing import World
 
+pytestmark = pytest.mark.long
+
 OUTER_TICKS = 5
 """Inner ticks between two outer ones: an event that one plant has just before such a tick, the other may have after."""
 

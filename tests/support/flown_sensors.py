@@ -85,6 +85,13 @@ class Faults:
     jump_m: float = 0.0
     disturbed_s: tuple[float, float] = (math.inf, math.inf)
     disturbance_gauss: float = 0.0
+    mag_turned_rad: float = 0.0
+    has_mag: bool = True
+    mag_from_s: float = 0.0
+    gnss_period: int = 25
+    """Ticks between two measurements of GNSS."""
+    vertical_jump_m_s: float = 0.0
+    """Error of the vertical velocity of GNSS during ``jump_s``."""
 
 
 def _during(span: tuple[float, float], time_s: float) -> bool:
@@ -99,14 +106,16 @@ def samples(seconds: float, faults: Faults, seed: int = 3) -> Iterator[Any]:
     for tick in range(1, round(seconds / DT_S) + 1):
         time_s = tick * DT_S
         now, v_now = attitude(time_s), velocity(time_s)
-        if tick % 10 == 0:
+        if tick % 10 == 0 and faults.has_mag and time_s >= faults.mag_from_s:
             field = np.array(rotate(conjugate(now), EARTH)) + BODY_FIELD + rng.normal(0.0, 0.003, 3)
+            cosine, sine = math.cos(faults.mag_turned_rad), math.sin(faults.mag_turned_rad)
+            field[:2] = cosine * field[0] - sine * field[1], sine * field[0] + cosine * field[1]
             field[0] += faults.disturbance_gauss * _during(faults.disturbed_s, time_s)
             yield MagSample(time_s, Vector3(*field.tolist()))
         if tick % 12 == 0:
             altitude_m = HOME.altitude_m - position(time_s)[2] + 3.0 + rng.normal(0.0, 0.1)
             yield BaroSample(time_s, 955.0, float(altitude_m), 20.0)
-        if tick % 25 == 0 and time_s > GNSS_DELAY_S and not _during(faults.no_gnss_s, time_s):
+        if tick % faults.gnss_period == 0 and time_s > GNSS_DELAY_S and not _during(faults.no_gnss_s, time_s):
             yield _gnss(frame, time_s, rng, faults)
         rate = np.array(rotation_vector(quaternion_product(conjugate(before), now))) / DT_S
         middle = attitude(time_s - 0.5 * DT_S)
@@ -125,6 +134,7 @@ def _gnss(frame: LocalFrame, time_s: float, rng: np.random.Generator, faults: Fa
     place[0] += faults.jump_m * _during(faults.jump_s, time_s)
     point = frame.to_geo(Vector3(*place.tolist()))
     speed = velocity(then_s) + rng.normal(0.0, 0.05, 3)
+    speed[2] += faults.vertical_jump_m_s * _during(faults.jump_s, time_s)
     return GnssSample(time_s, *point, Vector3(*speed.tolist()), 0.5, 0.8, 0.1, 3, 14)
 
 

@@ -27,6 +27,8 @@ from flightstack.estimation.error_state import (
 from flightstack.estimation.prediction import less_bias, motion_of, moved, with_motion
 from tools import derive_estimator
 
+pytestmark = pytest.mark.long
+
 ANGLE, VELOCITY, DT_S, GRAVITY = Vector3(0.004, -0.007, 0.003), Vector3(0.02, -0.03, -0.08), 0.008, 9.80665
 STEP = 1e-6
 

@@ -17,6 +17,7 @@ from tests.support.sensor_vehicles import X_QUAD, state_at, with_sensors
 
 G = 9.81
 STILL = np.zeros(8, dtype="f4")
+WIRES = np.zeros((3, 6), dtype="f4")
 
 
 def imus(vehicle, state=None, dt_s: float = 0.002, seed: int = 1) -> ImuSet:
@@ -30,7 +31,7 @@ def rows(sensors: ImuSet, count: int, state=None, speeds=STILL) -> np.ndarray:
     at = state_at() if state is None else state
     out = np.empty((count, 6))
     for index in range(count):
-        sensors.measure(at, speeds)
+        sensors.measure(at, speeds, WIRES[: len(sensors.records)])
         out[index] = sensors.records[0]["out"]
     return out
 
@@ -59,7 +60,7 @@ def test_ideal_imu_integrates_to_attitude_and_velocity_of_a_flight() -> None:
     turned, velocity = attitude(), of_mounting()
     for _ in range(5000):
         simulator.apply(command)
-        sensors.measure(state, simulator.frame.rotor_speed_rad_s)
+        sensors.measure(state, simulator.frame.rotor_speed_rad_s, WIRES[:1])
         out = sensors.records[0]["out"]
         step = Rotation.from_rotvec(out[:3] * 0.002)
         middle = turned * Rotation.from_rotvec(out[:3] * 0.001)
@@ -89,7 +90,7 @@ def test_imu_off_centre_feels_the_turn() -> None:
         )
 
     sensors = imus(vehicle, at(0.0))
-    sensors.measure(at(omega * dt), STILL)
+    sensors.measure(at(omega * dt), STILL, WIRES[:1])
     expected = -omega * omega * 0.1 * math.sin(omega * dt / 2) / (omega * dt / 2)
     assert sensors.records[0]["out"] == pytest.approx([0.0, 0.0, omega, expected, 0.0, -G], abs=1e-10)
 
@@ -190,7 +191,7 @@ def test_imu_output_has_its_range_and_its_steps() -> None:
     numbers = {"accel_range_m_s2": 20.0, "accel_resolution_m_s2": 0.5, "gyro_range_deg_s": 90.0}
     sensors = imus(with_sensors(imu=numbers))
     quarter = state_at(velocity=(0.0, 0.0, 1.0), attitude=(math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)))
-    sensors.measure(quarter, STILL)  # 500 m/s² and 785 rad/s
+    sensors.measure(quarter, STILL, WIRES[:1])  # 500 m/s² and 785 rad/s
     out = sensors.records[0]["out"]
     assert out[5] == 20.0
     assert out[2] == pytest.approx(math.radians(90.0))
@@ -206,7 +207,7 @@ def test_second_imu_has_errors_of_its_own_and_leaves_the_first_one_alone() -> No
     pair = imus(with_sensors("consumer", imu={"count": 2.0}))
     first, of_pair = rows(alone, 600), np.empty((600, 2, 6))
     for index in range(600):
-        pair.measure(state_at(), STILL)
+        pair.measure(state_at(), STILL, WIRES[:2])
         of_pair[index] = pair.records["out"]
     assert first.tobytes() == of_pair[:, 0].tobytes()
     between = np.corrcoef(of_pair[:, 0, 0], of_pair[:, 1, 0])[0, 1]

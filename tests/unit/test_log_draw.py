@@ -11,7 +11,7 @@ import pytest
 from flightstack.core.errors import ConfigError
 from flightstack.plan import save_plan
 from gcs_cli.errors import CliError
-from gcs_cli.report.analysis import is_whole, read_flight
+from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.flight_data import Flight, series
 from gcs_cli.report.poses import Run, find_run, poses_of
 from tests.support.commands import gcs
@@ -120,15 +120,6 @@ def test_directories_without_one_log_are_named(tmp_path: Path) -> None:
         find_run(tmp_path)
     with pytest.raises(CliError, match="there is no such directory or log"):
         find_run(tmp_path / "c.ulg")
-
-
-def test_a_log_is_whole_when_messages_fill_it(run: Path) -> None:
-    log = (run / "flight.ulg").read_bytes()
-    assert is_whole(log)
-    assert not is_whole(log[:-1])
-    assert not is_whole(log[: len(log) // 2] + b"\xff" * 40 + log[len(log) // 2 :])
-    assert not is_whole(log[:10])
-    assert not is_whole(b"")
 
 
 def test_a_log_cut_to_its_head_holds_no_flight(run: Path, tmp_path: Path) -> None:

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from flightstack.mavlink.fields import RANGES
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.packed import Packing
-from flightstack.services.telemetry.motion import PACKINGS
+from flightstack.services.telemetry import motion, sensors
 from flightstack.services.telemetry.streams import GROUND_RATES_HZ
 
+PACKINGS = (*motion.PACKINGS, *sensors.PACKINGS)
 SINGLES = st.floats(width=32) | st.sampled_from([0.0, -0.0, math.nan, math.inf, -math.inf])
 BEYOND = st.one_of(
     st.integers(-(2**70), 2**70), st.floats(), st.sampled_from([3.5e38, -1e300, math.nan, math.inf])

@@ -16,15 +16,13 @@ from flightstack.core.errors import ConfigError
 from flightstack.core.port_numbers import GROUND
 from flightstack.params.config import StackConfig
 from flightstack.params.param_file import (
-    NOTHING_LOADED,
+    ParamFile,
     ParamLine,
     begin_param_file,
     format_params,
-    lines_to_save,
     load_into,
     parse_params,
     read_param_file,
-    save,
 )
 from flightstack.params.spec import ParamSpec
 from flightstack.params.store import ParamStore
@@ -144,13 +142,69 @@ def test_saves_changed_and_unknown_but_no_overridden_parameters(tmp_path: Path) 
     store.override("FS_SPEED", 9.0)
     store.override("FS_MODE", 5)
     store.reset(["FS_GAIN"])
-    save(store, loaded, path, 7)
+    file = ParamFile(path, 7, loaded)
+    file.save(store)
     assert [line for line in path.read_text().splitlines() if not line.startswith("#")] == [
         "7\t1\tFS_SPEED\t5.5\t9",
         "7\t1\tLQR_Q\t2.5\t9",
     ]
     store.set("FS_SPEED", 9.0)
-    assert {item.name for item in lines_to_save(store, loaded)} == {"FS_SPEED", "LQR_Q"}
+    file.save(store)
+    assert {item.name: item.value for item in read_param_file(path)} == {"FS_SPEED": 9.0, "LQR_Q": 2.5}
+
+
+def test_two_vehicles_with_one_file_keep_each_other_s_changes(tmp_path: Path) -> None:
+    """Each wrote all that it knew: the second vehicle's write removed what the first had changed."""
+    path = tmp_path / "my.params"
+    path.write_text("1\t1\tLQR_Q\t2.5\t9\n1\t1\tFS_GAIN\t2.0\t9\n")
+    stores = [ParamStore(SPECS) for _ in range(2)]
+    files = [ParamFile(path, 1 + index, load_into(store, path)) for index, store in enumerate(stores)]
+
+    def change(index: int, name: str, value: float) -> dict[str, float]:
+        stores[index].set(name, value)
+        files[index].save(stores[index])
+        return {item.name: item.value for item in read_param_file(path)}
+
+    assert change(0, "FS_SPEED", 5.0) == {"LQR_Q": 2.5, "FS_GAIN": 2.0, "FS_SPEED": 5.0}
+    assert change(1, "FS_MODE", 3) == {"LQR_Q": 2.5, "FS_GAIN": 2.0, "FS_SPEED": 5.0, "FS_MODE": 3}
+    assert change(1, "FS_SPEED", 7.0)["FS_SPEED"] == 7.0
+    assert change(0, "FS_GAIN", 1.0 / 3.0) == {"LQR_Q": 2.5, "FS_SPEED": 7.0, "FS_MODE": 3}
+    path.unlink()
+    assert change(1, "FS_GAIN", 4.0) == {"LQR_Q": 2.5, "FS_SPEED": 7.0, "FS_MODE": 3, "FS_GAIN": 4.0}
+
+
+def test_a_file_damaged_during_a_run_is_not_overwritten(tmp_path: Path) -> None:
+    path = tmp_path / "my.params"
+    path.write_text("1\t1\tFS_GAIN\t2.0\t9\n")
+    store = ParamStore(SPECS)
+    file = ParamFile(path, 1, load_into(store, path))
+    saver = FileSaver(lambda: file.save(store), "not saved")
+    path.write_text("half a line")
+    store.set("FS_SPEED", 5.0)
+    saver.save()
+    assert (
+        saver.take_error() == f"not saved: {path}: line 1: has 1 columns between tabs, expected 5: vehicle, "
+        "component, name, value, type"
+    )
+    assert path.read_text() == "half a line"
+
+
+def test_processes_that_save_to_one_file_lose_no_parameter(tmp_path: Path) -> None:
+    path = tmp_path / "my.params"
+    path.write_text("")
+    script = (
+        "import pathlib, sys\n"
+        "from flightstack.params.param_file import ParamFile\n"
+        "from flightstack.params.spec import ParamSpec\n"
+        "from flightstack.params.store import ParamStore\n"
+        "names = [f'{sys.argv[1]}_{number}' for number in range(40)]\n"
+        "store = ParamStore([ParamSpec(name, 0.0, 0.0, 9.0, '', '') for name in names])\n"
+        f"file = ParamFile(pathlib.Path({str(path)!r}), 1)\n"
+        "for name in names:\n    store.set(name, 1.0)\n    file.save(store)\n"
+    )
+    writers = [subprocess.Popen([sys.executable, "-c", script, name], cwd=ROOT) for name in ("A", "B")]
+    assert [writer.wait() for writer in writers] == [0, 0]
+    assert len(read_param_file(path)) == 80
 
 
 @pytest.mark.parametrize("failing", ["fsync", "replace"])
@@ -158,7 +212,7 @@ def test_a_crash_while_writing_leaves_the_old_file(tmp_path: Path, monkeypatch, 
     path = tmp_path / "my.params"
     store = ParamStore(SPECS)
     store.set("FS_SPEED", 5.0)
-    save(store, NOTHING_LOADED, path, 1)
+    ParamFile(path, 1).save(store)
     before = path.read_bytes()
 
     def fail(*_: object) -> None:
@@ -170,7 +224,7 @@ def test_a_crash_while_writing_leaves_the_old_file(tmp_path: Path, monkeypatch, 
         monkeypatch.setattr(Path, "replace", fail)
     store.set("FS_SPEED", 6.0)
     with pytest.raises(OSError, match="No space"):
-        save(store, NOTHING_LOADED, path, 1)
+        ParamFile(path, 1).save(store)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
 
@@ -190,12 +244,13 @@ def test_the_process_may_die_between_writing_and_renaming(tmp_path: Path) -> Non
     store = ParamStore(SPECS)
     load_into(store, path)
     assert store.value("FS_SPEED") == 5.0
-    save(store, NOTHING_LOADED, path, 1)
+    ParamFile(path, 1).save(store)
     assert read_param_file(path)[0].value == 5.0
 
 
 def saver_of(store: ParamStore, path: Path) -> FileSaver:
-    saver = FileSaver(lambda: save(store, NOTHING_LOADED, path, 1), f"the parameters are not saved to {path}")
+    file = ParamFile(path, 1)
+    saver = FileSaver(lambda: file.save(store), f"the parameters are not saved to {path}")
     store.subscribe(lambda *_: saver.change())
     return saver
 

@@ -29,6 +29,13 @@ def test_built_in_vehicles_have_sensors_of_the_consumer_grade() -> None:
         assert set(sensors.numbers) == REQUIRED
 
 
+def test_each_number_of_a_sensor_has_its_source() -> None:
+    """A data sheet, the source of another autopilot or simulator, or "class value"."""
+    choices = ("count", "position_frd_m")
+    items = [item for table in TABLES.values() for item in table if item.key not in choices]
+    assert [item.key for item in items if not item.source] == []
+
+
 def test_grades_differ_in_their_numbers(tmp_path: Path) -> None:
     consumer, ideal, none = (load_text(tmp_path, f'[sensors]\ngrade = "{grade}"').sensors for grade in GRADES)
     assert consumer == default_sensors()

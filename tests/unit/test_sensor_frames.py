@@ -71,6 +71,16 @@ def test_hil_sensor_opens_what_was_sealed(values, time_us, fields, number) -> No
     assert (other.time_us, other.fields, other.number) == (time_us, fields, number)
 
 
+@pytest.mark.parametrize(("fields", "number"), [(0, 0), (0, 1), (0x3F, 0)])
+def test_sealing_keeps_the_values_of_hil_sensor(fields: int, number: int) -> None:
+    """Without fields the last values may be zero, and the checksum stands in their place in the message."""
+    frame = HilSensorFrame()
+    frame.values[:3] = (1.0, 2.0, 3.0)
+    before = frame.values.tolist()
+    frame.seal(5000, fields, number)
+    assert frame.values.tolist() == before
+
+
 def test_corrupted_hil_sensor_is_refused_and_changes_nothing() -> None:
     data, frame = sealed(range(13)), HilSensorFrame()
     before = frame.values.tobytes()

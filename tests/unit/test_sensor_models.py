@@ -14,7 +14,7 @@ from flightstack.core.geodesy import GeoPoint
 from flightstack.mavlink.dialect import mavlink
 from sim_bridge.plant.dimensions import foot_z_m, propeller_radius_m
 from sim_bridge.sensors.barometer import Barometer, pressure_altitude_m, standard_pressure_hpa
-from sim_bridge.sensors.gnss import GnssReceiver
+from sim_bridge.sensors.gnss import Fix, GnssReceiver
 from sim_bridge.sensors.magnetometer import Magnetometer
 from sim_bridge.sensors.optical_flow import OpticalFlow
 from sim_bridge.sensors.rangefinder import Rangefinder
@@ -100,7 +100,7 @@ def baro(
     vehicle, state=HIGH, airspeed: float = 0.0, speed: float = 0.0, altitude: float = 500.0
 ) -> np.ndarray:
     sensor = Barometer(vehicle, 1, altitude)
-    sensor.measure(state, airspeed, np.full(8, speed, dtype="f4"))
+    sensor.measure(0, state, airspeed, np.full(8, speed, dtype="f4"))
     return sensor.records[0]["out"].copy()
 
 
@@ -140,7 +140,7 @@ def test_barometer_drift_has_the_covariance_of_a_gauss_markov_process() -> None:
     )
     drift = np.empty(20_000)
     for index in range(len(drift)):
-        sensor.measure(HIGH, 0.0, np.zeros(8, dtype="f4"))
+        sensor.measure(index * 200_000, HIGH, 0.0, np.zeros(8, dtype="f4"))
         drift[index] = sensor.records[0]["out"][0] - standard_pressure_hpa(100.0)
     for lag in (0, 5, 10):
         covariance = np.mean(drift[: len(drift) - lag] * drift[lag:])
@@ -148,30 +148,24 @@ def test_barometer_drift_has_the_covariance_of_a_gauss_markov_process() -> None:
         assert covariance == pytest.approx(expected, abs=0.13 * spread**2)  # 4 √(2T / 4000 s)
 
 
+def test_drift_of_a_barometer_follows_the_time_between_its_samples() -> None:
+    """Sampled at 1 Hz in slow exchanges, at a rate of 5 Hz: the correlation time is still 2 s."""
+    numbers = {"rate_hz": 5.0, "drift_hpa": 0.1, "drift_time_s": 2.0}
+    sensor, drift = Barometer(with_sensors(baro=numbers), 1, 0.0), np.empty(10_000)
+    for index in range(len(drift)):
+        out = sensor.measure(index * 1_000_000, HIGH, 0.0, np.zeros(8, dtype="f4"))
+        drift[index] = out[0] - standard_pressure_hpa(100.0)
+    correlation = np.mean(drift[:-1] * drift[1:]) / np.mean(drift * drift)
+    assert correlation == pytest.approx(math.exp(-0.5), abs=0.04)  # with the step of 5 Hz: 0.90
+
+
 # ---------------------------------------------------------------------- GNSS
 
 
-def fixes(receiver: GnssReceiver, count: int, velocity=(0.0, 0.0, 0.0), begin_us: int = 0) -> list:
-    """Return the messages of a receiver that moves at a steady velocity, as (time of reception, message)."""
-    found, period_us = [], 100_000
-    for index in range(count):
-        now_us = begin_us + index * period_us
-        position = np.array(velocity) * now_us * 1e-6
-        receiver.measure(now_us, state_at(position=position, velocity=velocity))
-        for late_us in range(now_us, now_us + period_us, 10_000):
-            if (fix := receiver.due(late_us)) is not None:
-                found.append((late_us, fix))
-    return found
-
-
-def test_gnss_message_is_late_by_the_latency() -> None:
-    """At 10 m/s and 120 ms a receiver is 1.2 m behind."""
-    found = fixes(GnssReceiver(with_sensors(gnss={"latency_s": 0.12}), 1), 20, (10.0, -5.0, 1.0))
-    assert len(found) == 19  # the last one is on its way
-    for received_us, fix in found:
-        true = np.array((10.0, -5.0, 1.0)) * received_us * 1e-6
-        assert true - fix.position_ned_m == pytest.approx([1.2, -0.6, 0.12], abs=1e-9)
-        assert fix.velocity_ned_m_s == pytest.approx((10.0, -5.0, 1.0))
+def fixes(receiver: GnssReceiver, count: int, begin_us: int = 0) -> list[tuple[int, Fix]]:
+    """Return the fixes of a receiver at rest, as (time, fix)."""
+    times_us = [begin_us + 100_000 * index for index in range(count)]
+    return [(time_us, receiver.measure(time_us, state_at())) for time_us in times_us]
 
 
 def test_gnss_errors_are_white_and_correlated_as_given() -> None:
@@ -217,12 +211,12 @@ def test_gnss_has_no_fix_before_its_first_one() -> None:
 def test_jammed_gnss_loses_satellites_accuracy_and_at_last_the_fix() -> None:
     receiver = GnssReceiver(with_sensors("consumer"), 1)
     _, clear = fixes(receiver, 40)[-1]
-    receiver.lost_share = 0.5
+    receiver.jam(0.5)
     _, jammed = fixes(receiver, 40, begin_us=4_000_000)[-1]
     assert (clear.satellites, jammed.satellites) == (14, 7)
     assert jammed.eph_m == pytest.approx(2.0 * clear.eph_m)
     assert jammed.fix_type == mavlink.GPS_FIX_TYPE_3D_FIX
-    receiver.lost_share = 0.8
+    receiver.jam(0.8)
     _, lost = fixes(receiver, 40, begin_us=8_000_000)[-1]
     assert (lost.satellites, lost.fix_type) == (3, mavlink.GPS_FIX_TYPE_NO_FIX)
 
@@ -232,7 +226,7 @@ def test_jammed_gnss_loses_satellites_accuracy_and_at_last_the_fix() -> None:
 
 def test_rangefinder_measures_along_its_axis() -> None:
     """At a tilt of 30° the ground is 1/cos 30° as far; the mounting is 5 cm below the origin."""
-    sensor = Rangefinder(with_sensors(range={"position_frd_m": (0.0, 0.0, 0.05)}), 1)
+    sensor = Rangefinder(with_sensors(range={"position_frd_m": (0.0, 0.0, 0.05)}))
     for angle in (0.0, math.radians(30.0)):
         _, attitude = turned(1.0, 0.0, angle)
         sensor.measure(state_at(position=(3.0, 2.0, FOOT - 10.0), attitude=attitude))
@@ -240,7 +234,7 @@ def test_rangefinder_measures_along_its_axis() -> None:
 
 
 def test_rangefinder_out_of_range_has_no_echo() -> None:
-    sensor = Rangefinder(with_sensors(range={"min_m": 0.3, "max_m": 8.0}), 1)
+    sensor = Rangefinder(with_sensors(range={"min_m": 0.3, "max_m": 8.0}))
     _, over = turned(0.0, 0.0, math.radians(70.0))
     for state in (
         state_at(position=(0.0, 0.0, FOOT - 9.0)),
@@ -252,7 +246,7 @@ def test_rangefinder_out_of_range_has_no_echo() -> None:
 
 
 def test_rangefinder_noise_grows_with_the_distance() -> None:
-    sensor = Rangefinder(with_sensors(range={"noise_m": 0.03, "noise_share": 0.01}), 1)
+    sensor = Rangefinder(with_sensors(range={"noise_m": 0.03, "noise_share": 0.01}))
     for height, expected in ((1.0, math.hypot(0.03, 0.01)), (20.0, math.hypot(0.03, 0.2))):
         out = np.empty(4000)
         for index in range(len(out)):
@@ -271,12 +265,12 @@ def test_optical_flow_is_the_motion_of_the_ground_below_the_lens() -> None:
     later = (rotation * Rotation.from_rotvec(rates * dt)).inv().apply(ground - position - velocity * dt)
     # the point moves against the turn of the body
     expected = np.array([later[1] / later[2], -later[0] / later[2]]) / dt
-    sensor = OpticalFlow(with_sensors(), 1)
+    sensor = OpticalFlow(with_sensors())
     sensor.measure(state_at(position, velocity, attitude, rates))
     assert sensor.records[0]["out"] == pytest.approx([*expected, 1.0], abs=1e-5)
 
 
 def test_optical_flow_near_the_ground_has_no_quality() -> None:
-    sensor = OpticalFlow(with_sensors(flow={"min_height_m": 0.1}), 1)
+    sensor = OpticalFlow(with_sensors(flow={"min_height_m": 0.1}))
     sensor.measure(state_at(position=(0.0, 0.0, FOOT - 0.05), velocity=(1.0, 0.0, 0.0)))
     assert sensor.records[0]["out"].tolist() == [0.0, 0.0, 0.0]

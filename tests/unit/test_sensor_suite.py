@@ -227,6 +227,51 @@ def test_late_sensor_is_older_by_the_delay() -> None:
     assert last.abs_pressure - still.abs_pressure == pytest.approx(since_s - 0.3, abs=2e-3)
 
 
+@pytest.mark.parametrize(("late_s", "exact_s"), [(0.004, 0.004), (0.025, 0.026)])
+def test_delay_is_rounded_up_to_an_exchange_alone(late_s: float, exact_s: float) -> None:
+    """A barometer at 50 Hz, exchanges at 500 Hz: its messages keep their rate, and come between its measurements."""
+    exchanges = Bench(IDEAL, f"sensor:baro:late={late_s}@1", "sensor:baro:drift=1@1").run(2.0)
+    sent = [m for m in of_type(exchanges[500:], "HIL_SENSOR") if m.fields_updated & BARO]
+    still = of_type(exchanges, "HIL_SENSOR")[0].abs_pressure
+    ages = [m.time_usec * 1e-6 - 1.0 - (m.abs_pressure - still) for m in sent]
+    assert ages == pytest.approx([exact_s] * len(sent), abs=1e-4)  # a float of 950 hPa has steps of 6e-5
+    assert len(sent) == pytest.approx(50, abs=2)
+
+
+def test_gnss_message_is_late_by_the_latency() -> None:
+    """A spoofed position that moves at 10 m/s is 1.2 m behind."""
+    vehicle = with_sensors("ideal", gnss={"latency_s": 0.12})
+    fixes = of_type(Bench(vehicle, "sensor:gnss:drift=10,0,0").run(2.0), "HIL_GPS")
+    assert len(fixes) == 19  # the last one is on its way
+    for fix in fixes:
+        north_m = LocalFrame(HOME).to_ned(GeoPoint(fix.lat * 1e-7, fix.lon * 1e-7, fix.alt * 1e-3)).x
+        assert 10.0 * fix.time_usec * 1e-6 - north_m == pytest.approx(1.2, abs=0.02)  # steps of 1e-7 deg
+
+
+def test_drift_goes_on_when_another_fault_begins_and_ends() -> None:
+    exchanges = Bench(IDEAL, "sensor:gyro:drift=10,0,0", "sensor:mag:off@0.5-0.6").run(1.0)
+    rates = [math.degrees(m.xgyro) for m in of_type(exchanges, "HIL_SENSOR")]
+    assert rates == pytest.approx([0.02 * step for step in range(500)], abs=1e-5)
+
+
+def test_sensor_that_is_frozen_from_the_start_has_a_measurement() -> None:
+    frozen = ("sensor:baro:freeze", "sensor:mag:freeze", "sensor:imu:freeze", "sensor:range:freeze")
+    exchanges = Bench(IDEAL, *frozen).run(0.2)
+    last = [m for m in of_type(exchanges, "HIL_SENSOR") if m.fields_updated & BARO][-1]
+    assert last.pressure_alt == pytest.approx(488.0, abs=1e-3)
+    assert last.zacc == pytest.approx(-9.81, abs=1e-6)
+    assert math.hypot(last.xmag, last.ymag, last.zmag) == pytest.approx(0.4836, abs=1e-4)
+    assert of_type(exchanges, "DISTANCE_SENSOR")[-1].current_distance == 20
+
+
+def test_losses_of_a_sensor_do_not_depend_on_another_sensor() -> None:
+    def received(*specs: str) -> list[bool]:
+        sent = of_type(Bench(IDEAL, "sensor:gyro:loss=0.5", *specs).run(0.5), "HIL_SENSOR")
+        return [bool(m.fields_updated & GYRO) for m in sent]
+
+    assert received() == received("sensor:mag:loss=0.5", "sensor:accel:loss=0.5")
+
+
 def test_share_of_measurements_is_lost() -> None:
     _, since = after("sensor:gyro:loss=0.25", "HIL_SENSOR", seconds=5.0)
     lost = sum(not m.fields_updated & GYRO for m in since) / len(since)
@@ -287,6 +332,11 @@ def test_fault_names_its_channels(sensor: str, channels: list[tuple[str, int]]) 
 def test_fault_of_a_sensor_that_is_not_there_is_refused(spec: str, problem: str) -> None:
     with pytest.raises(UsageProblemError, match=problem):
         Simulator(X_QUAD).inject(parse_fault(spec, 4))
+
+
+def test_vibration_of_rotors_without_imbalance_is_refused() -> None:
+    with pytest.raises(UsageProblemError, match="the rotors of the vehicle x_quad have no imbalance"):
+        Simulator(IDEAL).inject(parse_fault("sensor:imu:vibration=10", 4))
 
 
 # ---------------------------------------------------------------------- failures that a client injects
@@ -351,6 +401,18 @@ def test_injected_failure_without_effect_is_answered() -> None:
     assert inject_failure(simulator, mavlink.FAILURE_UNIT_SENSOR_AIRSPEED, off, 0) == UNSUPPORTED
     assert inject_failure(simulator, mavlink.FAILURE_UNIT_SENSOR_MAG, off, math.nan) == DENIED
     assert simulator.faults == ()
+
+
+def test_client_ends_a_fault_of_all_sensors_on_one_of_them() -> None:
+    """The gyro of the second inertial sensor recovers; its accelerometer and the other gyro stay off."""
+    bench = Bench(with_sensors("ideal", imu={"count": 2.0}), "sensor:imu:off")
+    unit, ok = mavlink.FAILURE_UNIT_SENSOR_GYRO, mavlink.FAILURE_TYPE_OK
+    assert inject_failure(bench.simulator, unit, ok, 2) == ACCEPTED
+    sent = of_type(bench.run(0.1)[1:], "HIL_SENSOR")
+    assert {(m.id, m.fields_updated & (ACCEL | GYRO)) for m in sent} == {(0, 0), (1, GYRO)}
+    assert inject_failure(bench.simulator, unit, ok, 0) == ACCEPTED
+    sent = of_type(bench.run(0.1)[1:], "HIL_SENSOR")
+    assert {(m.id, m.fields_updated & (ACCEL | GYRO)) for m in sent} == {(0, GYRO), (1, GYRO)}
 
 
 def test_failure_of_a_sensor_is_unsupported_on_the_true_state() -> None:

@@ -37,14 +37,14 @@ def test_each_vehicle_has_an_instance_and_a_seed() -> None:
 
 
 def test_one_vehicle_has_the_files_that_were_given() -> None:
-    (only,) = vehicles_of(SimOptions(log="a/b.ulg", state="s", params=Path("p.params")))
-    assert {"--log=a/b.ulg", "--state=s", "--params=p.params"} <= set(stack_arguments(only))
+    (only,) = vehicles_of(SimOptions(log="a/b.ulg", state_dir="s", params=Path("p.params")))
+    assert {"--log=a/b.ulg", "--state-dir=s", "--params=p.params"} <= set(stack_arguments(only))
 
 
 def test_several_vehicles_share_no_file() -> None:
-    fleet = vehicles_of(SimOptions(vehicles=2, log="a/b.ulg", state="s"))
+    fleet = vehicles_of(SimOptions(vehicles=2, log="a/b.ulg", state_dir="s"))
     assert [vehicle.log for vehicle in fleet] == ["a/instance-0/b.ulg", "a/instance-1/b.ulg"]
-    assert [vehicle.state for vehicle in fleet] == ["s/instance-0", "s/instance-1"]
+    assert [vehicle.state_dir for vehicle in fleet] == ["s/instance-0", "s/instance-1"]
 
 
 def test_several_vehicles_only_read_the_parameter_file(tmp_path: Path) -> None:
@@ -61,12 +61,12 @@ def test_several_vehicles_only_read_the_parameter_file(tmp_path: Path) -> None:
 def test_files_are_those_of_flightstack_by_default() -> None:
     for vehicle in vehicles_of(SimOptions(vehicles=2)):
         flags = {text.partition("=")[0] for text in stack_arguments(vehicle)}
-        assert not flags & {"--log", "--state", "--params"}
+        assert not flags & {"--log", "--state-dir", "--params"}
 
 
 def test_none_means_no_files_for_all_vehicles() -> None:
-    for vehicle in vehicles_of(SimOptions(vehicles=2, log="none", state="none", params=Path("none"))):
-        assert {"--log=none", "--state=none", "--params=none"} <= set(stack_arguments(vehicle))
+    for vehicle in vehicles_of(SimOptions(vehicles=2, log="none", state_dir="none", params=Path("none"))):
+        assert {"--log=none", "--state-dir=none", "--params=none"} <= set(stack_arguments(vehicle))
 
 
 def test_instances_beyond_the_last_one_are_refused() -> None:

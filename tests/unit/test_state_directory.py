@@ -15,7 +15,7 @@ from tests.support.commands import flightstack_command
 
 SAVED = "1\t1\tMPC_XY_CRUISE\t50\t9\n"
 REFUSED = "line 1: MPC_XY_CRUISE: 50 is outside 0.1 to 20 m/s"
-IN_USE = "is in use by another vehicle: give each its own --instance or --state DIR"
+IN_USE = "is in use by another vehicle: give each its own --instance or --state-dir DIR"
 
 
 @pytest.fixture(autouse=True)
@@ -64,8 +64,8 @@ def test_a_second_vehicle_is_refused_a_state_directory(tmp_path: Path) -> None:
     assert first.open() is None
     (tmp_path / "other").symlink_to("state")
     for name in ("state", "other"):
-        done = flightstack_command("--log", "none", "--instance", "3", "--state", name)
-        assert (done.returncode, done.stderr) == (2, f"flightstack: --state: {name}: {IN_USE}\n")
+        done = flightstack_command("--log", "none", "--instance", "3", "--state-dir", name)
+        assert (done.returncode, done.stderr) == (2, f"flightstack: --state-dir: {name}: {IN_USE}\n")
     first.close()
     second = StateDirectory(Path("state"), 1)
     assert second.open() is None

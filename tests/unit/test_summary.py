@@ -18,6 +18,7 @@ from flightstack.core.errors import ConfigError
 from flightstack.core.geometry_bulk import euler_from_quaternions
 from flightstack.plan import Command, Frame, MissionItem, Plan
 from gcs_cli.errors import FAILED
+from gcs_cli.logs.ulog_parser import ParsedLog
 from gcs_cli.report.analysis import flight_in, read_flight
 from gcs_cli.report.flight_data import Flight, MissionProgress, Status, series
 from gcs_cli.report.flight_figures import attitude_error, rms_command_rate_rad_s2, rms_torque_n_m
@@ -32,8 +33,10 @@ REQUIRED = {
     "sim_time_s", "wall_time_s", "real_time_factor", "waypoints", "rms_tracking_error_m",
     "max_tracking_error_m", "overruns", "log_sha256", "wind_m_s", "gust_m_s", "torque_gust_n_m",
     "battery_start_percent", "battery_capacity_mah", "battery_drain", "faults", "ideal_rotors",
-    "params", "force_n", "torque_n_m", "param", "outcome_text", "drag_n_s_m", "faults_not_begun", "flight_time_s",
+    "params", "force_n", "torque_n_m", "slope_deg", "boat_m_s", "param", "outcome_text",
+    "drag_n_s_m", "faults_not_begun", "flight_time_s",
     "rms_attitude_error_deg", "max_attitude_error_deg", "rms_torque_n_m", "rms_rotor_command_rate_rad_s2",
+    "estimate_error",
 }  # fmt: skip
 
 
@@ -375,6 +378,6 @@ def test_first_instance_of_a_topic_and_first_known_origin_count() -> None:
         start_timestamp=0, last_timestamp=1, data_list=[*topics, topic("vehicle_local_position", 0, **place)],
         msg_info_dict={}, initial_parameters={}, logged_messages=[], file_corruption=False,
     )  # fmt: skip
-    flight = flight_in(log, b"", "log")
+    flight = flight_in(ParsedLog(log, False), "log")
     assert flight.battery.values[:, 0].tolist() == [0.9, 0.9]
     assert flight.local_origin == (47.0, 8.0, 400.0)

@@ -11,7 +11,7 @@ from flightstack.services.commands.context import ACCEPTED, DENIED, REJECTED, UN
 from flightstack.services.files.component_metadata import ComponentMetadata
 from flightstack.services.logs.log_stream import LogStream
 from flightstack.services.routing.peer import Peer
-from flightstack.services.telemetry.telemetry import Telemetry, is_available
+from flightstack.services.telemetry.telemetry import Telemetry
 
 LINK_COMMANDS = frozenset(
     {
@@ -82,7 +82,7 @@ class LinkCommands:
             return Answer(ACCEPTED)
         if number == mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES:
             peer.streams.add_standard_modes()
-        if not is_available(number):
+        if not self._telemetry.is_available(number):
             return Answer(
                 DENIED
             )  # no text: ground stations routinely request messages of gimbals and cameras

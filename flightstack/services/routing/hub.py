@@ -24,7 +24,7 @@ from flightstack.services.registry import Schedule, Service, make_services
 from flightstack.services.routing.peer import Peer, PeerAddress
 from flightstack.services.routing.router import Router
 from flightstack.services.routing.signing_setup import NEVER_FORWARDED, link_signing, signing_setup
-from flightstack.services.telemetry.streams import API_RATES_HZ, GROUND_RATES_HZ, Streams
+from flightstack.services.telemetry.streams import Streams, default_rates_hz
 from flightstack.services.telemetry.telemetry import Telemetry
 from flightstack.services.telemetry.vehicle import status_texts, system_time_at
 from flightstack.vehicle.assembly import VehicleParts
@@ -91,11 +91,11 @@ class GroundHub:
 
     def add_peer(self, address: PeerAddress, permanent: bool = False) -> Peer:
         """Add a peer. A permanent one gets heartbeats before it is heard."""
-        rates = API_RATES_HZ if address.channel == API else GROUND_RATES_HZ
+        rates = default_rates_hz(address.channel == API, self._telemetry.has_sensors)
         signing = link_signing(self.signing, address)
         link = Link(*self._own, keeps_unknown=True, signing=signing)
         signed = signing is not None and signing.requires_signature
-        peer = Peer(link, Streams(rates), permanent, address.channel == TCP, signed)
+        peer = Peer(link, Streams(rates, self._telemetry.streamed), permanent, address.channel == TCP, signed)
         self._peers[address] = peer
         return peer
 

@@ -10,6 +10,7 @@ from flightstack.mavlink.fields import int16, int32, whole
 from flightstack.mavlink.link import Message
 from flightstack.mavlink.packed import Packing
 from flightstack.services.telemetry.fields import NAN, boot_ms, euler_rad, heading_deg, wrapped
+from flightstack.services.telemetry.sensors import pose_and_twist_covariance, reset_counter
 from flightstack.vehicle.status import VehicleStatus, in_single_precision
 
 RPM_PER_RAD_S = 60.0 / (2.0 * math.pi)
@@ -112,11 +113,17 @@ def altitude(f: VehicleStatus) -> Message:
 
 def odometry(f: VehicleStatus) -> Message:
     """ODOMETRY: pose in NED, velocity in the body frame FRD."""
-    x = f.state
+    x, sensed = f.state, f.sensed
+    if sensed is None:
+        covariances = (*UNKNOWN_COVARIANCE, *UNKNOWN_COVARIANCE)
+        resets, estimator = 0, mavlink.MAV_ESTIMATOR_TYPE_NAIVE
+    else:
+        covariances = pose_and_twist_covariance(f, sensed)
+        resets, estimator = reset_counter(sensed), mavlink.MAV_ESTIMATOR_TYPE_AUTOPILOT
     return ODOMETRY(
         f.time_us, mavlink.MAV_FRAME_LOCAL_NED, mavlink.MAV_FRAME_BODY_FRD, *x[:3], *x[6:10],
-        *in_single_precision(_into_body(x[6:10], x[3:6])), *x[10:13], *UNKNOWN_COVARIANCE, *UNKNOWN_COVARIANCE,
-        0, mavlink.MAV_ESTIMATOR_TYPE_NAIVE,
+        *in_single_precision(_into_body(x[6:10], x[3:6])), *x[10:13], *covariances,
+        resets, estimator,
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ ATTITUDE messages per second of wall time, not 2500. At real time, and on an in-
 from __future__ import annotations
 
 import math
+from collections.abc import Set
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
@@ -58,8 +59,28 @@ API_RATES_HZ: dict[int, float] = {
     M.MAVLINK_MSG_ID_MISSION_CURRENT: 5.0,
     M.MAVLINK_MSG_ID_SYS_STATUS: 5.0,
 }
+SENSOR_GROUND_RATES_HZ: dict[int, float] = {
+    **GROUND_RATES_HZ,
+    M.MAVLINK_MSG_ID_SCALED_PRESSURE: 1.0,
+    M.MAVLINK_MSG_ID_WIND_COV: 0.5,
+    M.MAVLINK_MSG_ID_VIBRATION: 0.1,
+}
+SENSOR_API_RATES_HZ: dict[int, float] = {
+    **API_RATES_HZ,
+    M.MAVLINK_MSG_ID_HIGHRES_IMU: 50.0,
+    M.MAVLINK_MSG_ID_WIND_COV: 10.0,
+    M.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 1.0,
+    M.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: 1.0,
+    M.MAVLINK_MSG_ID_SCALED_PRESSURE: 1.0,
+    M.MAVLINK_MSG_ID_VIBRATION: 0.5,
+}
+"""Rates of a vehicle that flies on its sensors."""
 GROUPS: dict[int, tuple[int, ...]] = {
-    M.MAV_DATA_STREAM_RAW_SENSORS: (M.MAVLINK_MSG_ID_GPS_RAW_INT,),
+    M.MAV_DATA_STREAM_RAW_SENSORS: (
+        M.MAVLINK_MSG_ID_GPS_RAW_INT,
+        M.MAVLINK_MSG_ID_SCALED_IMU,
+        M.MAVLINK_MSG_ID_SCALED_PRESSURE,
+    ),
     M.MAV_DATA_STREAM_EXTENDED_STATUS: (
         M.MAVLINK_MSG_ID_SYS_STATUS,
         M.MAVLINK_MSG_ID_MISSION_CURRENT,
@@ -78,12 +99,20 @@ GROUPS: dict[int, tuple[int, ...]] = {
     ),
     M.MAV_DATA_STREAM_EXTRA2: (M.MAVLINK_MSG_ID_VFR_HUD,),
     M.MAV_DATA_STREAM_EXTRA3: (
+        M.MAVLINK_MSG_ID_VIBRATION,
         M.MAVLINK_MSG_ID_SYSTEM_TIME,
         M.MAVLINK_MSG_ID_BATTERY_STATUS,
         M.MAVLINK_MSG_ID_ALTITUDE,
     ),
 }
 """Message groups of REQUEST_DATA_STREAM, as in ArduPilot."""
+
+
+def default_rates_hz(is_api: bool, has_sensors: bool) -> dict[int, float]:
+    """Return the default rates of a link, that of companions and scripts or that of a ground station."""
+    if has_sensors:
+        return SENSOR_API_RATES_HZ if is_api else SENSOR_GROUND_RATES_HZ
+    return API_RATES_HZ if is_api else GROUND_RATES_HZ
 
 
 class _Stream:
@@ -107,8 +136,10 @@ class _Stream:
 class Streams:
     """The telemetry streams of one link."""
 
-    def __init__(self, rates_hz: dict[int, float]) -> None:
+    def __init__(self, rates_hz: dict[int, float], available: Set[int] = STREAMED) -> None:
+        """``available`` are the messages that can be streamed."""
         self._default = rates_hz
+        self.available = available
         self._streams = {message_id: _Stream(message_id, 1.0 / rate) for message_id, rate in rates_hz.items()}
         self._soonest_s = -math.inf
 
@@ -116,11 +147,11 @@ class Streams:
         """Return the interval of a message [µs]; −1 if it is not streamed, 0 if it is not supported."""
         if message_id in self._streams:
             return round(self._streams[message_id].interval_s * 1e6)
-        return -1 if message_id in STREAMED else 0
+        return -1 if message_id in self.available else 0
 
     def set_interval(self, message_id: int, interval_us: float) -> bool:
         """Set an interval as SET_MESSAGE_INTERVAL defines (−1 stops, 0 is the default); return False if denied."""
-        if message_id not in STREAMED or not -1 <= interval_us <= LONGEST_INTERVAL_US:  # True for NaN
+        if message_id not in self.available or not -1 <= interval_us <= LONGEST_INTERVAL_US:  # True for NaN
             return False
         if interval_us == 0 and message_id in self._default:
             self._streams[message_id] = _Stream(message_id, 1.0 / self._default[message_id])

@@ -8,6 +8,7 @@ from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
 from flightstack.mavlink.link import Message
 from flightstack.services.telemetry import modes, motion, vehicle
 from flightstack.services.telemetry.fields import euler_rad, wrapped
+from flightstack.services.telemetry.sensors import SENSED
 from flightstack.vehicle.status import VehicleStatus
 
 MAKERS: dict[int, Callable[[VehicleStatus], Message]] = {
@@ -45,15 +46,10 @@ MAKERS: dict[int, Callable[[VehicleStatus], Message]] = {
 
 STREAMED = frozenset({*MAKERS, FS_LOOP_TIMING_ID})
 """Messages that can be sent at a rate."""
-_AVAILABLE = STREAMED | {
-    mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES,
-    mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED,
-}
-
-
-def is_available(message_id: int) -> bool:
-    """Return True if ``Telemetry`` provides the message."""
-    return message_id in _AVAILABLE
+SENSOR_STREAMED = STREAMED | SENSED.keys()
+"""The same for a vehicle that flies on its sensors."""
+_REQUESTED = frozenset({mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES, mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED})
+"""Further messages on request."""
 
 
 class Telemetry:
@@ -64,13 +60,22 @@ class Telemetry:
         status: Callable[[], VehicleStatus],
         time_us: Callable[[], int],
         loop_timing: Callable[[], Message],
+        has_sensors: bool = False,
     ) -> None:
+        """``has_sensors``: the status has what a vehicle that flies on its sensors knows."""
+        self.has_sensors = has_sensors
+        self.streamed = SENSOR_STREAMED if has_sensors else STREAMED
+        """Messages that can be sent at a rate."""
         self._status_of_now = status
         self._time_us = time_us
         self._loop_timing = loop_timing
         self._status: VehicleStatus | None = None
         self._made: dict[int, tuple[Message, ...]] = {}
         euler_rad(1.0, 0.0, 0.0, 0.0)  # compile now and not at the first message
+
+    def is_available(self, message_id: int) -> bool:
+        """Return True if the message can be requested."""
+        return message_id in self.streamed or message_id in _REQUESTED
 
     def begin_poll(self) -> None:
         """Discard the status and the messages of the last poll."""
@@ -95,7 +100,7 @@ class Telemetry:
         return wrapped(self.time_us // 1000)
 
     def messages(self, message_id: int) -> tuple[Message, ...]:
-        """Return a message of ``STREAMED``, as of this tick: ticks may come between two parts of a poll."""
+        """Return a message of ``streamed``, as of this tick: ticks may come between two parts of a poll."""
         if self._status is not None and self._status.time_us != self._time_us():
             self.begin_poll()
         made = self._made.get(message_id)
@@ -121,6 +126,9 @@ class Telemetry:
         return vehicle.heartbeat(self.status, leaving=True)
 
     def _make(self, message_id: int) -> tuple[Message, ...]:
+        sensed = self.status.sensed
+        if sensed is not None and (sensor_maker := SENSED.get(message_id)) is not None:
+            return sensor_maker(self.status, sensed)
         maker = MAKERS.get(message_id)
         if maker is None:
             return (self._loop_timing(),)

@@ -15,6 +15,7 @@ from flightstack.mavlink.fields import int16, int32, whole
 from flightstack.mavlink.link import Message
 from flightstack.params.vehicle import system_type
 from flightstack.services.telemetry.fields import NAN, boot_ms, wrapped
+from flightstack.services.telemetry.sensors import sensor_health
 from flightstack.vehicle.status import VehicleStatus
 
 MAVLINK_2 = 200
@@ -108,8 +109,10 @@ SENSORS = (
 
 def sys_status(f: VehicleStatus) -> Message:
     """SYS_STATUS with the health bits that MAVSDK and QGroundControl evaluate."""
-    present = SENSORS | mavlink.MAV_SYS_STATUS_GEOFENCE | mavlink.MAV_SYS_STATUS_PREARM_CHECK
-    healthy = present if f.state_is_good else 0
+    checks = mavlink.MAV_SYS_STATUS_GEOFENCE | mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    sensors, good_sensors = (SENSORS, SENSORS) if f.sensed is None else sensor_health(f.sensed)
+    present = sensors | checks
+    healthy = good_sensors | checks if f.state_is_good else 0
     if not f.can_arm():
         healthy &= ~mavlink.MAV_SYS_STATUS_PREARM_CHECK
     if f.fence_breached:

@@ -1,0 +1,61 @@
+"""Height: the barometer and its bias, the range finder above level ground, and resets to GNSS."""
+
+from __future__ import annotations
+
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import FloatArray, Record
+from flightstack.estimation.error_state import BARO_BIAS, ERROR_STATES, POSITION
+from flightstack.estimation.estimator_params import EstimatorParams
+from flightstack.estimation.fusion import LEAST_COS_TILT, cos_tilt_of, fuse_baro, fuse_range
+from flightstack.estimation.kalman import FUSED_S, RANGE, Filter
+from flightstack.estimation.memory import HAS_BARO, HAS_RANGE
+from flightstack.estimation.resets import reset_position
+
+_RANGE_LOST_S = 1.0
+"""Time without an accepted distance after which the next one gives the height of the ground again."""
+
+
+@compiled
+def take_baro(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
+    """Fuse a pressure altitude; the first one gives the barometer's bias."""
+    if m["flags"][HAS_BARO] == 0:
+        _start_baro(m, f, row[1], params)
+    fuse_baro(f, row[1], f.clock[0] - row[0], params)
+
+
+@compiled
+def _start_baro(m: Record, f: Filter, altitude_m: float, params: EstimatorParams) -> None:
+    """Set the barometer's bias so that the first altitude agrees with the height."""
+    p = f.covariance
+    f.nominal[24] = altitude_m + f.nominal[9]
+    at = POSITION + 2
+    for j in range(at):
+        p[j, BARO_BIAS] = p[j, at]
+    for j in range(at, BARO_BIAS):
+        p[j, BARO_BIAS] = p[at, j]
+    for j in range(BARO_BIAS + 1, ERROR_STATES):
+        p[BARO_BIAS, j] = p[at, j]
+    p[BARO_BIAS, BARO_BIAS] = p[POSITION + 2, POSITION + 2] + params.baro_noise_m * params.baro_noise_m
+    m["flags"][HAS_BARO] = 1
+
+
+@compiled
+def take_range(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
+    """Fuse a distance. The first one, and the first after a loss, gives the height of the ground."""
+    cos_tilt = cos_tilt_of(f)
+    if cos_tilt < LEAST_COS_TILT:
+        return
+    if m["flags"][HAS_RANGE] == 1 and f.clock[0] - f.observations[RANGE, FUSED_S] > _RANGE_LOST_S:
+        m["flags"][HAS_RANGE] = 0
+    age_s = f.clock[0] - row[0]
+    if m["flags"][HAS_RANGE] == 0:
+        m["ground_m"][0] = f.nominal[9] - age_s * f.nominal[6] + row[1] * cos_tilt
+        m["flags"][HAS_RANGE] = 1
+    fuse_range(f, row[1] * cos_tilt, m["ground_m"][0], age_s, params)
+
+
+@compiled
+def reset_height(m: Record, f: Filter, row: FloatArray) -> None:
+    """Set the height to that of GNSS; barometer and range finder start again from it."""
+    reset_position(m, f, row, 2, 1)
+    m["flags"][HAS_BARO], m["flags"][HAS_RANGE] = 0, 0

@@ -1,0 +1,124 @@
+"""Horizontal position and velocity: GNSS from its first fix to resets, and the position held without it."""
+
+from __future__ import annotations
+
+import math
+
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import FloatArray, Record
+from flightstack.estimation.error_state import BARO_BIAS, GNSS_BIAS, POSITION, VELOCITY, read_vector
+from flightstack.estimation.estimator_params import EstimatorParams
+from flightstack.estimation.fusion import fuse_gnss, fuse_hold, horizontal_accuracy, vertical_accuracy
+from flightstack.estimation.height_sources import reset_height
+from flightstack.estimation.kalman import (
+    FUSED_S,
+    GNSS_POSITION,
+    GNSS_VELOCITY,
+    Filter,
+    deviation,
+    reset_variance,
+)
+from flightstack.estimation.memory import HAS_GNSS, HAS_YAW
+from flightstack.estimation.resets import count_correction, reset_position, reset_velocity
+
+_GNSS_LOST_S = 1.0
+_HOLD_PERIOD_S = 0.2
+_COUNTED_M = 0.5
+"""Correction by the first measurement after an outage that counts as a reset."""
+_LONGEST_INTERVAL_S = 2.5
+"""Most time that one refused measurement counts."""
+_SPEED_SMOOTHING_S = 2.0
+_MOVES_M_S = 0.15
+
+
+@compiled
+def take_gnss(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
+    """Fuse a GNSS measurement; without a known yaw only its vertical parts. Reset what was refused too long."""
+    if m["flags"][HAS_GNSS] == 0:
+        _start_gnss(m, f, row, params)
+    elapsed_s = max(0.0, row[0] - m["last_gnss_s"][0])
+    m["last_gnss_s"][0] = row[0]
+    first = 0 if m["flags"][HAS_YAW] == 1 else 2
+    outage_s = f.clock[0] - f.observations[GNSS_POSITION, FUSED_S]
+    position, velocity = read_vector(f.nominal, 7), read_vector(f.nominal, 4)
+    fuse_gnss(f, row, f.clock[0] - row[0], elapsed_s, first, params)
+    dx, dy = f.nominal[7] - position.x, f.nominal[8] - position.y
+    if outage_s > _GNSS_LOST_S and dx * dx + dy * dy > _COUNTED_M * _COUNTED_M:
+        count_correction(m, f, position, velocity)
+    _count_refused(m, f, first, min(elapsed_s, _LONGEST_INTERVAL_S))
+    share = min(elapsed_s / _SPEED_SMOOTHING_S, 1.0)
+    for axis in range(2):
+        m["gnss_speed_m_s"][axis] += share * (row[4 + axis] - m["gnss_speed_m_s"][axis])
+    refused, limit_s = m["refused_s"], params.reset_s
+    velocity_s, position_s = max(refused[0], refused[1]), max(refused[3], refused[4])
+    if velocity_s > limit_s:
+        reset_velocity(m, f, row, 0, 2)
+    if velocity_s > limit_s or position_s > limit_s:
+        reset_position(m, f, row, 0, 2)
+    if refused[2] > limit_s:
+        reset_velocity(m, f, row, 2, 1)
+    if refused[5] > limit_s:
+        reset_height(m, f, row)
+
+
+@compiled
+def _count_refused(m: Record, f: Filter, first: int, elapsed_s: float) -> None:
+    """Add up the time between refused measurements; an accepted one ends it. Time without any does not count."""
+    refused = m["refused_s"]
+    for i in range(6):
+        axis = i - 3 if i >= 3 else i
+        if axis < first or f.observations[GNSS_VELOCITY + i, FUSED_S] == f.clock[0]:
+            refused[i] = 0.0
+        elif refused[i] == 0.0:
+            refused[i] = 1e-6  # the series begins
+        else:
+            refused[i] += elapsed_s
+
+
+@compiled
+def _start_gnss(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
+    """Account for the errors of the first GNSS position, which becomes the origin, in the covariance."""
+    p, share = f.covariance, params.gnss_bias_share
+    for axis in range(3):
+        accuracy_m = vertical_accuracy(row) if axis == 2 else horizontal_accuracy(row)
+        variance = accuracy_m * accuracy_m
+        at = POSITION + axis
+        p[at, at] += variance
+        if axis == 2:
+            p[at, BARO_BIAS] += variance
+            p[BARO_BIAS, BARO_BIAS] += variance
+        reset_variance(p, GNSS_BIAS + axis, 1, share * share * variance)
+    m["last_gnss_s"][0] = row[0]
+    m["flags"][HAS_GNSS] = 1
+
+
+@compiled
+def is_velocity_measured(f: Filter) -> bool:
+    """Return True if a GNSS velocity was accepted within the last second."""
+    fused_s: float = f.observations[GNSS_VELOCITY, FUSED_S]
+    return fused_s > 0.0 and f.clock[0] - fused_s < _GNSS_LOST_S
+
+
+@compiled
+def is_platform_at_rest(m: Record, f: Filter) -> bool:
+    """Return False if GNSS measures that what the vehicle stands on moves, as a boat does."""
+    north, east = m["gnss_speed_m_s"][0], m["gnss_speed_m_s"][1]
+    is_measured = m["flags"][HAS_GNSS] == 1 and f.clock[0] - m["last_gnss_s"][0] < _GNSS_LOST_S
+    return not is_measured or math.sqrt(north * north + east * east) < _MOVES_M_S
+
+
+@compiled
+def hold_position(m: Record, f: Filter, params: EstimatorParams) -> bool:
+    """Hold the horizontal position while the velocity is not measured; return True if it was fused."""
+    hold, now_s = m["hold"], f.clock[0]
+    is_used = m["flags"][HAS_GNSS] == 1 and m["flags"][HAS_YAW] == 1
+    if is_velocity_measured(f) or (is_used and deviation(f, VELOCITY, 2) < params.hold_velocity_m_s):
+        hold[2] = 0.0
+        return False
+    if hold[2] == 0.0:
+        hold[0], hold[1] = f.nominal[7], f.nominal[8]
+    if now_s - hold[2] < _HOLD_PERIOD_S:
+        return False
+    fuse_hold(f, hold[0], hold[1], params)
+    hold[2] = now_s
+    return True

@@ -1,0 +1,53 @@
+"""The estimator and its sensors as seen from outside. Each record is made when it is first asked for."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+from flightstack.core.contract import FloatArray, Quaternion, Record, Vector3
+from flightstack.estimation.error_state import Nominal
+from flightstack.estimation.estimator_report import EstimatorReport, estimator_report, nominal_of
+from flightstack.estimation.motion_covariance import motion_covariance, pose_covariance, twist_covariance
+from flightstack.estimation.sensor_feed import NewestSamples
+from flightstack.estimation.vibration import Vibration, vibration_of
+
+
+class Sensed:
+    """What a vehicle that flies on its sensors knows at one time."""
+
+    def __init__(self, memory: Record, samples: NewestSamples) -> None:
+        """``memory`` is the estimator's record; both change with time, so read this before the next sample."""
+        self.memory = memory
+        self.samples = samples
+
+    @cached_property
+    def report(self) -> EstimatorReport:
+        """The estimator's knowledge of itself."""
+        return estimator_report(self.memory)
+
+    @cached_property
+    def nominal(self) -> Nominal:
+        """State at the delayed horizon."""
+        return nominal_of(self.memory)
+
+    @property
+    def time_s(self) -> float:
+        """Time of the newest sample of the inertial sensor."""
+        return float(self.memory["output"][0])
+
+    @cached_property
+    def vibration(self) -> Vibration:
+        """Vibration of the inertial sensor."""
+        return vibration_of(self.samples.imu_track.rows)
+
+    def pose_covariance(self, attitude: Quaternion) -> FloatArray:
+        """Return the covariance of position and attitude, shape (6, 6)."""
+        return pose_covariance(self.memory, attitude)
+
+    def twist_covariance(self, attitude: Quaternion, velocity_ned_m_s: Vector3) -> FloatArray:
+        """Return the covariance of velocity in body axes and rates, shape (6, 6)."""
+        return twist_covariance(self.memory, attitude, velocity_ned_m_s)
+
+    def motion_covariance(self, attitude: Quaternion, force_frd_m_s2: Vector3) -> FloatArray:
+        """Return the covariance of position, velocity and acceleration in NED, shape (9, 9)."""
+        return motion_covariance(self.memory, attitude, force_frd_m_s2)

@@ -1,0 +1,167 @@
+"""Yaw: the magnetometer with the Earth's field, and GNSS velocity through the bank of yaw models."""
+
+from __future__ import annotations
+
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import FloatArray, Record, Vector3
+from flightstack.core.geometry import rotate, wrap_pi
+from flightstack.core.portable_math import atan2, sin_cos
+from flightstack.estimation.alignment import align_yaw, set_field
+from flightstack.estimation.error_state import (
+    ATTITUDE,
+    EARTH_FIELD,
+    read_nominal,
+    read_vector,
+    turn_between,
+    turned,
+)
+from flightstack.estimation.estimator_params import EstimatorParams
+from flightstack.estimation.fusion import fuse_field, speed_accuracy
+from flightstack.estimation.kalman import DECLINATION, KNOWN_FIELD, Filter, Noise, clear, fuse, reset_variance
+from flightstack.estimation.memory import (
+    HAS_GNSS,
+    HAS_MAG,
+    HAS_YAW,
+    LANDED,
+    MAG_FAULT,
+    YAW_TURN,
+    YAW_UPDATES,
+    YAW_VARIANCE,
+)
+from flightstack.estimation.prediction import DeltaSample, less_bias
+from flightstack.estimation.resets import count_yaw_reset, reset_position, reset_velocity
+from flightstack.estimation.yaw_estimator import (
+    attitude_of,
+    likeliest,
+    mean_turn,
+    predict_models,
+    start_models,
+    tilt_variance,
+    update_models,
+    variance_of,
+)
+
+_LARGEST_TURN_RAD = 0.5
+"""Change of the declination beyond which the yaw is aligned again instead of corrected."""
+_DECLINATION_NOISE_RAD = 0.01
+_COUNTED_TURN_RAD = 0.01
+_CONVERGED_RAD = 0.262
+"""Deviation of the models' yaw at which it is used: 15 degrees, as in PX4."""
+_WRONG_YAW_RAD = 0.436
+"""Difference at which the filter's yaw is wrong if GNSS velocities are refused too: 25 degrees, as in PX4."""
+_REFUSED_S = 1.0
+
+
+@compiled
+def take_field(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
+    """Fuse a magnetic field; the first one after the alignment gives the yaw if that is unknown."""
+    field, earth = read_vector(row, 1), m["earth"]
+    if m["flags"][MAG_FAULT] == 1:
+        return
+    m["field"][0], m["field"][1], m["field"][2] = field.x, field.y, field.z
+    if m["flags"][HAS_MAG] == 0:
+        m["flags"][HAS_MAG] = 1
+        if m["flags"][HAS_YAW] == 0:
+            count_yaw_reset(m, align_yaw(f, field, read_vector(earth, 0), earth[3], params))
+            m["flags"][HAS_YAW] = 1
+        else:
+            level = rotate(read_nominal(f.nominal).attitude, field)
+            set_field(f, level, read_vector(earth, 0), earth[3], params)
+    fuse_field(f, field, params)
+
+
+@compiled
+def take_earth_field(m: Record, f: Filter, params: EstimatorParams) -> None:
+    """Correct yaw and field with the Earth's field, now known.
+
+    On the ground, or if it is far off, the yaw is aligned again. In flight it changes as far as it depends on the
+    field.
+    """
+    if m["flags"][HAS_MAG] == 0 or m["flags"][MAG_FAULT] == 1:
+        return
+    known, before = read_vector(m["earth"], 0), read_nominal(f.nominal)
+    held = before.earth_field_ned_gauss
+    was_rad = atan2(held.y, held.x)
+    change_rad = wrap_pi(atan2(known.y, known.x) - was_rad)
+    if m["flags"][LANDED] == 1 or abs(change_rad) > _LARGEST_TURN_RAD:
+        align_yaw(f, read_vector(m["field"], 0), known, m["earth"][3], params)
+    else:
+        _fuse_declination(f, was_rad, change_rad)
+        for axis in range(3):
+            value = known.x if axis == 0 else known.y if axis == 1 else known.z
+            noise = params.earth_field_gauss + params.field_scale * abs(value)
+            clear(f.h)
+            f.h[EARTH_FIELD + axis] = 1.0
+            of_model = Noise(noise, noise, noise, 1e3, 0.0)
+            fuse(f, KNOWN_FIELD + axis, value - f.nominal[16 + axis], of_model, 0.0)
+    turn_rad = turn_between(before.attitude, read_nominal(f.nominal).attitude)
+    if abs(turn_rad) > _COUNTED_TURN_RAD:
+        count_yaw_reset(m, turn_rad)
+
+
+@compiled
+def _fuse_declination(f: Filter, was_rad: float, change_rad: float) -> None:
+    """Turn the Earth's field by a change of the declination; the yaw follows as far as it depends on it."""
+    north, east = f.nominal[16], f.nominal[17]
+    square = north * north + east * east
+    clear(f.h)
+    f.h[EARTH_FIELD] = -east / square
+    f.h[EARTH_FIELD + 1] = north / square
+    noise = Noise(_DECLINATION_NOISE_RAD, _DECLINATION_NOISE_RAD, _DECLINATION_NOISE_RAD, 1e3, 0.0)
+    fuse(f, DECLINATION, change_rad, noise, 0.0)
+    sine, cosine = sin_cos(was_rad + change_rad)
+    along = north * cosine + east * sine
+    across = f.nominal[17] * cosine - f.nominal[16] * sine
+    # the linear update would lengthen the field
+    f.nominal[16] = along * cosine - across * sine
+    f.nominal[17] = along * sine + across * cosine
+
+
+@compiled
+def predict_yaw(m: Record, f: Filter, step: DeltaSample) -> None:
+    """Move the models over a step of the flight."""
+    if m["yaw_fix"][YAW_UPDATES] > 0.0:
+        angle = less_bias(step.angle_rad, read_vector(f.nominal, 10), step.dt_s)
+        velocity = less_bias(step.velocity_m_s, read_vector(f.nominal, 13), step.dt_s)
+        predict_models(m["yaw_models"], angle, velocity, step.dt_s)
+
+
+@compiled
+def take_velocity(m: Record, f: Filter, row: FloatArray) -> None:
+    """Weigh the models with a GNSS velocity; reset the yaw if it is unknown, or wrong."""
+    models, fix, flags = m["yaw_models"], m["yaw_fix"], m["flags"]
+    if flags[LANDED] == 1 or flags[HAS_GNSS] == 0:
+        fix[YAW_UPDATES] = 0.0
+        return
+    attitude, noise_m_s = read_nominal(f.nominal).attitude, max(speed_accuracy(row), 0.1)
+    if fix[YAW_UPDATES] == 0.0:
+        start_models(models, attitude, row[4], row[5], noise_m_s * noise_m_s)
+    else:
+        update_models(models, row[4], row[5], noise_m_s * noise_m_s)
+    fix[YAW_UPDATES] += 1.0
+    fix[YAW_TURN] = mean_turn(models, attitude)
+    fix[YAW_VARIANCE] = variance_of(models, attitude, fix[YAW_TURN])
+    if fix[YAW_VARIANCE] > _CONVERGED_RAD * _CONVERGED_RAD:
+        return
+    if flags[HAS_YAW] == 0:
+        _reset_to_models(m, f, row)
+    elif max(m["refused_s"][0], m["refused_s"][1]) > _REFUSED_S and abs(fix[YAW_TURN]) > _WRONG_YAW_RAD:
+        flags[MAG_FAULT] = flags[HAS_MAG]
+        _reset_to_models(m, f, row)
+
+
+@compiled
+def _reset_to_models(m: Record, f: Filter, row: FloatArray) -> None:
+    """Take tilt and yaw from the models, velocity and position from GNSS."""
+    models, before = m["yaw_models"], read_nominal(f.nominal).attitude
+    best = likeliest(models)
+    q = attitude_of(models, best)
+    q = turned(q, Vector3(0.0, 0.0, m["yaw_fix"][YAW_TURN] - turn_between(before, q)))
+    f.nominal[0], f.nominal[1], f.nominal[2], f.nominal[3] = q.w, q.x, q.y, q.z
+    for axis in range(2):
+        reset_variance(f.covariance, ATTITUDE + axis, 1, tilt_variance(models, best, axis))
+    reset_variance(f.covariance, ATTITUDE + 2, 1, m["yaw_fix"][YAW_VARIANCE])
+    count_yaw_reset(m, turn_between(before, q))
+    m["flags"][HAS_YAW] = 1
+    reset_velocity(m, f, row, 0, 2)
+    reset_position(m, f, row, 0, 2)

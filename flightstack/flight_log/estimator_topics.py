@@ -1,0 +1,257 @@
+"""Topics of the estimator's knowledge, with PX4's names and fields, so that PX4's tools for its estimator read them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from flightstack.core.contract import FloatArray
+from flightstack.estimation.error_state import NOMINAL_SIZE
+from flightstack.estimation.estimator_report import ControlFlags, RejectionFlags
+from flightstack.estimation.kalman import BARO, GNSS_POSITION, GNSS_VELOCITY, MAG, OBSERVATIONS, RANGE
+from flightstack.estimation.sensed import Sensed
+from flightstack.flight_log.topics import Derived, Field, Group, Topic
+
+_DEVICE = 1
+"""Device id of the sensors in use, as in the topics of the measurements."""
+
+
+class ReportColumns(NamedTuple):
+    """First column of each part of an estimator's row."""
+
+    solution: int = 0
+    control: int = 1
+    rejected: int = 2
+    accuracies: int = 3  # horizontal, vertical
+    ratios: int = 5  # heading, velocity, position, height, height above ground
+    resets: int = 10  # velocity, position, quaternion
+    vibration: int = 13
+    horizon_us: int = 16
+    nominal: int = 17
+    variances: int = 17 + NOMINAL_SIZE  # 24, of which the last, PX4's terrain, is zero
+    innovations: int = 17 + NOMINAL_SIZE + 24
+    innovation_variances: int = 17 + NOMINAL_SIZE + 24 + OBSERVATIONS
+    squared_ratios: int = 17 + NOMINAL_SIZE + 24 + 2 * OBSERVATIONS
+    size: int = 17 + NOMINAL_SIZE + 24 + 3 * OBSERVATIONS
+
+
+AT = ReportColumns()
+_STATES = 24
+_KNOWN_VARIANCES = 23
+
+
+def _bit(column: int, flag: int) -> Derived:
+    """Return a function of the rows: 1 where the flag is set in a column."""
+    shift = flag.bit_length() - 1
+
+    def derive(rows: FloatArray) -> FloatArray:
+        return ((rows[:, column].astype(np.int64) >> shift) & 1).astype(np.float64)
+
+    return derive
+
+
+_CONTROL: dict[str, int | None] = {
+    "cs_tilt_align": ControlFlags.TILT_ALIGN,
+    "cs_yaw_align": ControlFlags.YAW_ALIGN,
+    "cs_gps": ControlFlags.GNSS_POSITION,
+    "cs_opt_flow": None,
+    "cs_mag_hdg": None,
+    "cs_mag_3d": ControlFlags.MAG_3D,
+    "cs_mag_dec": None,
+    "cs_in_air": ControlFlags.IN_AIR,
+    "cs_wind": ControlFlags.WIND,
+    "cs_baro_hgt": ControlFlags.BARO_HEIGHT,
+    "cs_rng_hgt": ControlFlags.RANGE_HEIGHT,
+    "cs_gps_hgt": ControlFlags.GNSS_HEIGHT,
+    "cs_ev_pos": None,
+    "cs_ev_yaw": None,
+    "cs_ev_hgt": None,
+    "cs_vehicle_at_rest": ControlFlags.VEHICLE_AT_REST,
+    "cs_inertial_dead_reckoning": ControlFlags.INERTIAL_DEAD_RECKONING,
+    "cs_fake_pos": ControlFlags.FAKE_POSITION,
+    "cs_gnss_vel": ControlFlags.GNSS_VELOCITY,
+}
+"""Fields of ``estimator_status_flags``; a sensor that the filter does not have is never in use."""
+_FAULTS = (
+    "fs_bad_mag_x", "fs_bad_mag_y", "fs_bad_mag_z", "fs_bad_hdg", "fs_bad_mag_decl", "fs_bad_airspeed",
+    "fs_bad_sideslip", "fs_bad_optflow_x", "fs_bad_optflow_y", "fs_bad_acc_bias", "fs_bad_acc_vertical",
+    "fs_bad_acc_clipping",
+)  # fmt: skip
+_REJECTED: dict[str, int | None] = {
+    "reject_hor_vel": RejectionFlags.VELOCITY_HORIZONTAL,
+    "reject_ver_vel": RejectionFlags.VELOCITY_VERTICAL,
+    "reject_hor_pos": RejectionFlags.POSITION_HORIZONTAL,
+    "reject_ver_pos": RejectionFlags.POSITION_VERTICAL,
+    "reject_yaw": None,
+    "reject_airspeed": None,
+    "reject_sideslip": None,
+    "reject_hagl": RejectionFlags.HEIGHT_ABOVE_GROUND,
+    "reject_optflow_x": None,
+    "reject_optflow_y": None,
+}
+
+
+def _flag_fields(column: int, flags: Mapping[str, int | None]) -> list[Field]:
+    return [Field("bool", name, 0, _bit(column, flag) if flag else None) for name, flag in flags.items()]
+
+
+_SAMPLE = Field("uint64_t", "timestamp_sample", 0, AT.horizon_us)
+
+
+def _innovation_topic(name: str, first: int, default: float) -> Topic:
+    """Return a topic of PX4's ``estimator_innovations`` kind, of values by row of the filter's observations."""
+
+    def missing(field: str, length: int = 0) -> Field:
+        return Field("float", field, length, default=default)
+
+    return Topic(
+        name,
+        (
+            _SAMPLE,
+            Field("float", "gps_hvel", 2, first + GNSS_VELOCITY),
+            Field("float", "gps_vvel", 0, first + GNSS_VELOCITY + 2),
+            Field("float", "gps_hpos", 2, first + GNSS_POSITION),
+            Field("float", "gps_vpos", 0, first + GNSS_POSITION + 2),
+            missing("ev_hvel", 2), missing("ev_vvel"), missing("ev_hpos", 2), missing("ev_vpos"),
+            Field("float", "rng_vpos", 0, first + RANGE),
+            Field("float", "baro_vpos", 0, first + BARO),
+            missing("aux_hvel", 2), missing("aux_vvel"), missing("flow", 2), missing("terr_flow", 2),
+            missing("heading"),
+            Field("float", "mag_field", 3, first + MAG),
+            missing("drag", 2), missing("airspeed"), missing("beta"),
+            Field("float", "hagl", 0, first + RANGE),
+            missing("hagl_rate"),
+        ),
+    )  # fmt: skip
+
+
+ESTIMATOR = Group(
+    "estimator",
+    AT.size,
+    (
+        Topic(
+            "estimator_status",
+            (
+                _SAMPLE,
+                Field("uint64_t", "control_mode_flags", 0, AT.control),
+                Field("float", "output_tracking_error", 3),  # the output follows the filter at once
+                Field("uint32_t", "filter_fault_flags"),
+                Field("float", "pos_horiz_accuracy", 0, AT.accuracies),
+                Field("float", "pos_vert_accuracy", 0, AT.accuracies + 1),
+                Field("float", "hdg_test_ratio", 0, AT.ratios),
+                Field("float", "mag_test_ratio", 0, AT.ratios),
+                Field("float", "vel_test_ratio", 0, AT.ratios + 1),
+                Field("float", "pos_test_ratio", 0, AT.ratios + 2),
+                Field("float", "hgt_test_ratio", 0, AT.ratios + 3),
+                Field("float", "tas_test_ratio"),
+                Field("float", "hagl_test_ratio", 0, AT.ratios + 4),
+                Field("float", "beta_test_ratio"),
+                Field("uint32_t", "accel_device_id", default=_DEVICE),
+                Field("uint32_t", "gyro_device_id", default=_DEVICE),
+                Field("uint32_t", "baro_device_id", default=_DEVICE),
+                Field("uint32_t", "mag_device_id", default=_DEVICE),
+                Field("uint16_t", "gps_check_fail_flags"),
+                Field("uint16_t", "solution_status_flags", 0, AT.solution),
+                Field("uint8_t", "reset_count_vel_ne", 0, AT.resets),
+                Field("uint8_t", "reset_count_pos_ne", 0, AT.resets + 1),
+                Field("uint8_t", "reset_count_quat", 0, AT.resets + 2),
+            ),
+        ),
+        Topic(
+            "estimator_status_flags",
+            (
+                _SAMPLE,
+                *_flag_fields(AT.control, _CONTROL),
+                *(Field("bool", name) for name in _FAULTS),
+                *_flag_fields(AT.rejected, _REJECTED),
+            ),
+        ),
+        Topic(
+            "estimator_states",
+            (
+                _SAMPLE,
+                Field("float", "states", _STATES, AT.nominal),
+                Field("float", "covariances", _STATES, AT.variances),
+                Field("uint8_t", "n_states", default=_STATES),
+            ),
+        ),
+        Topic(
+            "estimator_sensor_bias",
+            (
+                _SAMPLE,
+                Field("uint32_t", "gyro_device_id", default=_DEVICE),
+                Field("float", "gyro_bias", 3, AT.nominal + 10),
+                Field("float", "gyro_bias_variance", 3, AT.variances + 9),
+                Field("uint32_t", "accel_device_id", default=_DEVICE),
+                Field("float", "accel_bias", 3, AT.nominal + 13),
+                Field("float", "accel_bias_variance", 3, AT.variances + 12),
+                Field("uint32_t", "mag_device_id", default=_DEVICE),
+                Field("float", "mag_bias", 3, AT.nominal + 19),
+                Field("float", "mag_bias_variance", 3, AT.variances + 18),
+                Field("bool", "gyro_bias_valid", default=1),
+                Field("bool", "accel_bias_valid", default=1),
+                Field("bool", "mag_bias_valid", default=1),
+            ),
+        ),
+        Topic(
+            "vehicle_imu_status",
+            (
+                Field("uint32_t", "accel_device_id", default=_DEVICE),
+                Field("uint32_t", "gyro_device_id", default=_DEVICE),
+                Field("float", "accel_vibration_metric", 0, AT.vibration + 2),
+                Field("float", "gyro_vibration_metric", 0, AT.vibration + 1),
+                Field("float", "delta_angle_coning_metric", 0, AT.vibration),
+            ),
+        ),
+        _innovation_topic("estimator_innovations", AT.innovations, math.nan),
+        _innovation_topic("estimator_innovation_variances", AT.innovation_variances, math.nan),
+        _innovation_topic("estimator_innovation_test_ratios", AT.squared_ratios, math.nan),
+    ),
+)
+
+
+WIND_GROUP = Group(
+    "wind",
+    5,
+    (
+        Topic(
+            "wind",
+            (
+                Field("uint64_t", "timestamp_sample", 0, 0),
+                Field("float", "windspeed_north", 0, 1),
+                Field("float", "windspeed_east", 0, 2),
+                Field("float", "variance_north", 0, 3),
+                Field("float", "variance_east", 0, 4),
+            ),
+        ),
+    ),
+)
+
+
+def fill_wind(row: FloatArray, sensed: Sensed) -> None:
+    """Fill a row of ``WIND_GROUP``."""
+    report, wind = sensed.report, sensed.report.nominal
+    row[:] = _us(report.horizon_s), wind.wind_north_m_s, wind.wind_east_m_s, *report.wind_variances
+
+
+def _us(time_s: float) -> int:
+    return max(0, round(time_s * 1e6))
+
+
+def fill_estimator(row: FloatArray, sensed: Sensed) -> None:
+    """Fill a row of ``ESTIMATOR``."""
+    report, resets = sensed.report, sensed.report.resets
+    row[: AT.nominal] = (
+        report.solution, report.control, report.rejected,
+        report.horizontal_accuracy_m, report.vertical_accuracy_m,
+        report.field_ratio, report.velocity_ratio, report.position_ratio, report.height_ratio,
+        0.0 if report.range is None else report.range.ratio,
+        resets.velocity & 0xFF, resets.position & 0xFF, resets.yaw & 0xFF,
+        *sensed.vibration, _us(report.horizon_s),
+    )  # fmt: skip
+    row[AT.nominal : AT.variances] = sensed.memory["nominal"]
+    row[AT.variances : AT.variances + _KNOWN_VARIANCES] = report.variances[:_KNOWN_VARIANCES]
+    row[AT.innovations :].reshape(3, OBSERVATIONS)[:] = sensed.memory["observations"][:, :3].T

@@ -1,0 +1,68 @@
+"""Missions of a vehicle that estimates its state from its sensors."""
+
+from __future__ import annotations
+
+import pytest
+
+from flightstack.core.errors import ConfigError
+from flightstack.testing import World
+from tests.support.estimate_errors import Watch
+
+
+def test_square_on_sensors_is_completed_within_the_limits_of_gnss() -> None:
+    with World(vehicle="x_quad", state="estimated") as world:
+        watch = Watch(world)
+        flight = world.fly("square")
+    assert flight.completed, flight.outcome
+    errors = watch.errors()  # measured: 0.24°, 0.60°, 0.05 m/s, 0.52 m, 0.56 m, 0.31 m
+    assert errors.tilt_deg < 0.5
+    assert errors.yaw_deg < 2.0
+    assert errors.velocity_m_s < 0.15
+    assert errors.horizontal_m < 0.7
+    assert errors.landing_m < 1.5
+
+
+def test_flights_on_sensors_of_one_seed_are_equal_to_the_byte() -> None:
+    logs = []
+    for seed in (4, 4, 5):
+        with World(vehicle="x_quad", state="estimated", seed=seed) as world:
+            logs.append(world.fly("hop").log.content)
+    assert logs[0] == logs[1] != logs[2]
+
+
+def test_vehicle_on_sensors_refuses_to_arm_before_its_position_is_known() -> None:
+    with World(vehicle="x_quad", state="estimated") as world:
+        assert not world.engine.stack.now.has_state
+        world.wait_until_ready()
+        assert 0.4 < world.time_s < 5.0
+        world.arm()
+
+
+@pytest.mark.parametrize(
+    ("conditions", "text"),
+    [({"state": "guessed"}, "is not one of estimated, truth")],
+)
+def test_source_of_the_state_is_checked(conditions: dict, text: str) -> None:
+    with pytest.raises(ConfigError, match=text):
+        World(**conditions)
+
+
+def test_vehicle_does_not_tilt_for_a_reset_of_its_position() -> None:
+    with World(vehicle="x_quad", state="estimated") as world:
+        world.wait_until_ready()
+        world.takeoff(5.0)
+        world.run_until("mode == 'HOLD'")
+        world.fault("sensor:gnss:bias=15,-10,0")
+        world.run_until(lambda _: any("Estimate reset by" in text for text in world.texts), 30.0)
+        tilts = []
+        for _ in range(20):
+            tilts.append(max(abs(world.state.roll_deg), abs(world.state.pitch_deg)))
+            world.step()
+        assert max(tilts) < 15.0  # 12.0, on the way back to the goal; 45 without the shift
+        error_m = world.engine.stack.now.setpoint[:2] - world.engine.stack.now.state[:2]
+        assert max(abs(error_m)) < 0.5
+
+
+def test_square_on_sensors_is_flown_by_the_loops_in_c() -> None:
+    with World(vehicle="x_quad", state="estimated", loops="c") as world:
+        assert world.fly("square").completed

@@ -1,0 +1,101 @@
+"""Parsing of ULog files against pyulog alone."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import pytest
+from pyulog import ULog
+
+from flightstack.core.errors import ConfigError
+from flightstack.flight_log.ulog import HEADER_SIZE
+from flightstack.testing import World
+from gcs_cli.logs.ulog_parser import LogBytes, parse_ulog
+
+
+@pytest.fixture(scope="module")
+def log() -> bytes:
+    """A flight with texts and changed parameters."""
+    with World(vehicle="x_quad") as world:
+        world.arm()
+        world.takeoff(2.0)
+        world.param_set("MPC_XY_CRUISE", 3.0)
+        world.run_for(2.0)
+        world.param_set("MPC_XY_CRUISE", 4.0)
+        world.land()
+        world.run_until("not armed")
+        return world.flight().log.content
+
+
+def assert_equal(content: bytes) -> None:
+    """Compare everything that a reader uses with pyulog's own parser."""
+    (ours, _), theirs = parse_ulog(content, "log"), ULog(LogBytes(content))
+    assert ours.data_list == theirs.data_list
+    assert (ours.start_timestamp, ours.last_timestamp) == (theirs.start_timestamp, theirs.last_timestamp)
+    assert ours.changed_parameters == theirs.changed_parameters
+    assert ours.initial_parameters == theirs.initial_parameters
+    assert ours.msg_info_dict == theirs.msg_info_dict
+    assert ours.file_corruption == theirs.file_corruption
+    texts = [(text.timestamp, text.log_level, text.message) for text in theirs.logged_messages]
+    assert [(text.timestamp, text.log_level, text.message) for text in ours.logged_messages] == texts
+    drops = [(drop.timestamp, drop.duration) for drop in theirs.dropouts]
+    assert [(drop.timestamp, drop.duration) for drop in ours.dropouts] == drops
+
+
+def test_log_is_parsed_as_pyulog_does(log: bytes) -> None:
+    assert not parse_ulog(log, "log").damaged
+    assert len(parse_ulog(log, "log").log.changed_parameters) == 2
+    assert_equal(log)
+
+
+def test_only_wanted_topics_are_given(log: bytes) -> None:
+    found = parse_ulog(log, "log", ["vehicle_attitude"]).log.data_list
+    assert [item.name for item in found] == ["vehicle_attitude"]
+    assert found == ULog(LogBytes(log), ["vehicle_attitude"]).data_list
+
+
+@pytest.mark.parametrize("size", [-1, -7, -100])
+def test_cut_log_is_damaged_and_parsed_as_pyulog_does(log: bytes, size: int) -> None:
+    assert parse_ulog(log[:size], "log").damaged
+    assert_equal(log[:size])
+
+
+def test_log_with_bytes_of_no_message_is_damaged_and_parsed_as_pyulog_does(log: bytes) -> None:
+    middle = len(log) // 2
+    broken = log[:middle] + b"\xff" * 40 + log[middle:]
+    assert parse_ulog(broken, "log").damaged
+    assert_equal(broken)
+
+
+def test_row_of_another_size_is_damage(log: bytes) -> None:
+    data = log + struct.pack("<HBH", 5, ord("D"), 0) + b"abc"
+    assert parse_ulog(data, "log").damaged
+    assert_equal(data)
+
+
+def test_row_of_no_subscription_is_damage(log: bytes) -> None:
+    data = log + struct.pack("<HBH", 5, ord("D"), 999) + b"abc"
+    assert parse_ulog(data, "log").damaged
+    assert_equal(data)
+
+
+def test_dropout_has_the_latest_time_before_it(log: bytes) -> None:
+    assert_equal(log + struct.pack("<HBH", 2, ord("O"), 17))
+
+
+def test_subscription_id_that_is_used_again_is_parsed_as_pyulog_does(log: bytes) -> None:
+    name = b"vehicle_attitude"
+    assert_equal(log + struct.pack("<HBBH", 3 + len(name), ord("A"), 0, 0) + name)
+
+
+@pytest.mark.parametrize("content", [b"", b"ULog", bytes(HEADER_SIZE)])
+def test_what_is_no_log_is_refused(content: bytes) -> None:
+    with pytest.raises(ConfigError, match="is not a readable flight log"):
+        parse_ulog(content, "log")
+
+
+def test_file_on_disk_equals_its_bytes(log: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "flight.ulg"
+    path.write_bytes(log)
+    assert parse_ulog(log, "log").log.data_list == ULog(str(path)).data_list
