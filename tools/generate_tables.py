@@ -9,6 +9,7 @@ from dataclasses import fields
 from flightstack.commander.failsafe import RULES, Action, Rule
 from flightstack.core.contract import LoopFlags, LoopStatus
 from flightstack.core.enums import NAVIGATION_STATE
+from flightstack.flight_log.sensor_recorder import SENSOR_GROUPS
 from flightstack.flight_log.topics import EVENT_TOPICS, OUTER_TOPICS, Field, Topic, inner_topics
 from flightstack.params.behaviour import Behaviour
 from sim_bridge.plant.fault_table import SENSORS, TABLE, Row
@@ -28,6 +29,11 @@ WATCHED = {
     "ATTITUDE": "roll or pitch beyond `FD_FAIL_R`, `FD_FAIL_P`, or the thrust axis off its reference by `FS_ATT_ERR`",
     "ROTOR": "a measured rotor speed differs from its command by `FS_ROT_ERR` for `FD_ACT_MOT_TOUT`",
     "BATTERY_EMERGENCY": "charge at or below `BAT_EMERGEN_THR`",
+    "IMU_FAULT": "no measurement of the inertial sensor for 0.04 s, or 100 equal ones",
+    "ATTITUDE_DOUBTFUL": "standard deviation of the estimated tilt above `FS_TILT_DEV`",
+    "POSITION_LOST": "dead reckoning for `FS_DEAD_RECK_T`, or standard deviation of the estimated position above "
+    "`COM_POS_FS_EPH`",
+    "GNSS_REFUSED": "positions of GNSS are refused for 1 s",
     "FENCE": "outside the geofence, `GF_MAX_HOR_DIST` or `GF_MAX_VER_DIST`",
     "POSITION_ERROR": "the position differs from its setpoint by `FS_POS_ERR` for `FS_POS_ERR_T`",
     "BATTERY_CRITICAL": "charge at or below `BAT_CRIT_THR`",
@@ -63,6 +69,24 @@ TOPICS = {
     "vehicle_status": "arming state, navigation state, failsafe",
     "mission_result": "current and reached mission item",
     "vehicle_land_detected": "stages of the land detector",
+    "sensor_combined": "each measurement of the inertial sensor",
+    "vehicle_magnetometer": "each measurement of the magnetic field",
+    "vehicle_air_data": "each measurement of the barometer; density of dry air",
+    "vehicle_gps_position": "each fix of the receiver, with the time of its reception",
+    "distance_sensor": "each measurement of the rangefinder",
+    "estimator_status": "flags, ratios of innovations to their gates, accuracies [1σ], numbers of resets",
+    "estimator_status_flags": "the same flags by name; a sensor that the filter does not have is never in use",
+    "estimator_states": "attitude, velocity, position, biases, fields and wind at the horizon, and their variances",
+    "estimator_sensor_bias": "estimated biases and their variances",
+    "vehicle_imu_status": "vibration",
+    "wind": "wind, while it is observed",
+    "estimator_innovations": "innovations by sensor; NaN for a sensor that the filter does not have",
+    "estimator_innovation_variances": "variances of the innovations",
+    "estimator_innovation_test_ratios": "squares of the ratios of the innovations to their gates",
+    "vehicle_attitude_groundtruth": "true attitude",
+    "vehicle_angular_velocity_groundtruth": "true rates",
+    "vehicle_local_position_groundtruth": "true position and velocity, in the vehicle's local frame",
+    "vehicle_global_position_groundtruth": "true position, 10 times a second",
     "home_position": "home",
     "vehicle_command": "each command received",
     "vehicle_command_ack": "each acknowledgement sent",
@@ -250,6 +274,16 @@ def bit_table(bits: type) -> str:
     return "\n| bit | meaning |\n|---|---|\n" + "".join(rows)
 
 
+ON_SENSORS = """
+## On sensors
+
+Only a vehicle that flies on its sensors (`--state estimated`) writes these topics: measurements as they arrive, the
+estimator's twice a second, the truth a hundred times. PX4's `Tools/ecl_ekf`, `gcs estimate` and PlotJuggler's layouts
+for PX4 read them. The information `estimator_start` holds the estimator's memory at the start of the log, so that
+`gcs estimate` repeats the flown estimate.
+"""
+
+
 def topics_page() -> str:
     """Return the page of the log topics."""
     note = NOTE.format(source="flightstack/flight_log")
@@ -264,6 +298,8 @@ def topics_page() -> str:
             "\n## On change\n",
             topic_table(EVENT_TOPICS),
             f"\n`vehicle_status.nav_state`: {states}.\n",
+            ON_SENSORS,
+            topic_table(topic for group in SENSOR_GROUPS for topic in group.topics),
             "\n## Bits\n\n`wrench.status`:\n",
             bit_table(LoopStatus),
             "\n`vehicle_attitude_setpoint.loop_flags`:\n",

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from flightstack.commander.estimate_checks import estimate_refusals
 from flightstack.commander.transitions import TERMINATED, Need
 from flightstack.core.enums import Mode
+from flightstack.estimation.health import EstimateHealth
 from flightstack.params.behaviour import Behaviour
 
 THROTTLE_CENTRED = 0.2
@@ -34,6 +36,8 @@ class ArmingFacts(NamedTuple):
     """Reason that the mode cannot take off from the ground; empty if it can."""
     is_at_rest: bool = True
     """True if the vehicle neither falls nor rises."""
+    health: EstimateHealth | None = None
+    """Health of the estimate; None on the simulator's state."""
     step_refusal: str = ""
     """Reason that the simulator's time steps cannot be flown, a sentence; empty if they can."""
 
@@ -50,8 +54,9 @@ def arming_refusals(facts: ArmingFacts, behaviour: Behaviour) -> tuple[str, ...]
     flies_sticks = facts.mode in (Mode.POSITION, Mode.ALTITUDE)
     would_climb = flies_sticks and facts.manual_fresh and facts.throttle > THROTTLE_CENTRED
     gcs = "the ground station is lost" if facts.gcs_heard else "no ground station was heard"
+    estimate = estimate_refusals(facts.health)
     checks = (
-        (facts.state_is_valid, Need.STATE.value),
+        (facts.state_is_valid or bool(estimate), Need.STATE.value),
         (facts.state_is_fresh or not facts.state_is_valid, "the state is frozen or missing"),
         (not facts.mode_fault, facts.mode_fault),
         (not facts.step_refusal, facts.step_refusal),
@@ -65,4 +70,4 @@ def arming_refusals(facts: ArmingFacts, behaviour: Behaviour) -> tuple[str, ...]
         (not would_climb, "the throttle is above the centre"),
         (facts.offboard_fresh or facts.mode is not Mode.OFFBOARD, Need.OFFBOARD_STREAM.value),
     )
-    return tuple(sentence for passed, sentence in checks if not passed)
+    return estimate + tuple(sentence for passed, sentence in checks if not passed)

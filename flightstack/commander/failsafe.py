@@ -35,10 +35,13 @@ class Failsafe(Enum):
     """Conditions that trigger a failsafe."""
 
     NOT_FINITE = auto()
+    IMU_FAULT = auto()
     STATE_STALE = auto()
     ATTITUDE = auto()
+    ATTITUDE_DOUBTFUL = auto()
     ROTOR = auto()
     BATTERY_EMERGENCY = auto()
+    POSITION_LOST = auto()
     FENCE = auto()
     POSITION_ERROR = auto()
     BATTERY_CRITICAL = auto()
@@ -46,6 +49,7 @@ class Failsafe(Enum):
     OFFBOARD_LOST = auto()
     GCS_LOST = auto()
     BATTERY_LOW = auto()
+    GNSS_REFUSED = auto()
 
 
 class Phase(Enum):
@@ -113,6 +117,7 @@ FENCE_ACTIONS = {
     5: Action.LAND,
 }
 FAULT_ACTIONS = {0: Action.WARN, 1: Action.HOLD, 2: Action.LAND, 3: Action.RETURN, 4: Action.TERMINATE}
+POSITION_ACTIONS = {0: Action.ALTITUDE, 1: Action.LAND}
 CRITICAL_ACTIONS = {0: Action.WARN, 1: Action.RETURN, 2: Action.LAND, 3: Action.RETURN}
 EMERGENCY_ACTIONS = {0: Action.WARN, 1: Action.RETURN, 2: Action.LAND, 3: Action.LAND}
 WARN_ONLY = {0: Action.WARN}
@@ -147,14 +152,20 @@ NEVER, USER = False, True
 RULES = (
     Rule(F.NOT_FINITE, "State or controller output is not finite", "State and controller output are finite again",
          "", {0: Action.BLIND}, NOW, NEVER, FLIGHT),
+    Rule(F.IMU_FAULT, "Inertial sensor is missing or stuck", "Inertial sensor measures again",
+         "", {0: Action.BLIND}, NOW, NEVER, FLIGHT),
     Rule(F.STATE_STALE, "State is frozen or missing", "State is fresh again",
          "", {0: Action.BLIND}, NOW, NEVER, FLIGHT),
     Rule(F.ATTITUDE, "Attitude is beyond its limits", "Attitude is within its limits again",
          "attitude_failure_action", FAULT_ACTIONS, NOW, NEVER, FLIGHT),
+    Rule(F.ATTITUDE_DOUBTFUL, "Attitude estimate is doubtful", "Attitude estimate is good again",
+         "attitude_doubt_action", FAULT_ACTIONS, NOW, USER, FLIGHT),
     Rule(F.ROTOR, "A rotor does not follow its command", "All rotors follow their commands again",
          "rotor_failure_action", FAULT_ACTIONS, NOW, USER, FLIGHT),
     Rule(F.BATTERY_EMERGENCY, "Battery level is dangerously low", "Battery level has left emergency",
          "low_battery_action", EMERGENCY_ACTIONS, DELAYED, NEVER, FLIGHT),
+    Rule(F.POSITION_LOST, "Position is lost", "Position is known again",
+         "position_loss_action", POSITION_ACTIONS, NOW, USER, FLIGHT),
     Rule(F.FENCE, "Geofence breached", "Inside the geofence again",
          "fence_action", FENCE_ACTIONS, DELAYED, USER, FLIGHT),
     Rule(F.POSITION_ERROR, "Position is far from its setpoint", "Position follows its setpoint again",
@@ -169,6 +180,8 @@ RULES = (
          "gcs_loss_action", LINK_ACTIONS, DELAYED, USER, LANDING_GOES_ON),
     Rule(F.BATTERY_LOW, "Battery level is low", "Battery level is no longer low",
          "", WARN_ONLY, NOW, USER, FLIGHT),
+    Rule(F.GNSS_REFUSED, "GNSS contradicts the estimate, spoofing suspected", "GNSS agrees with the estimate again",
+         "gnss_doubt_action", FAULT_ACTIONS, NOW, USER, FLIGHT),
 )
 # fmt: on
 RULE_OF: Mapping[Failsafe, Rule] = {rule.failsafe: rule for rule in RULES}
@@ -187,6 +200,7 @@ STEERS = frozenset({Action.POSITION, Action.ALTITUDE, Action.HOLD, Action.RETURN
 LINK_FAILSAFES = frozenset({Failsafe.MANUAL_LOST, Failsafe.OFFBOARD_LOST, Failsafe.GCS_LOST})
 
 BEYOND_REACH: Mapping[Failsafe, frozenset[Action]] = {
+    Failsafe.POSITION_LOST: frozenset({Action.POSITION, Action.HOLD, Action.RETURN}),
     Failsafe.POSITION_ERROR: frozenset({Action.POSITION, Action.HOLD, Action.RETURN}),
 }
 """Actions that cannot be flown while a failsafe is active: a vehicle that cannot hold its position cannot return."""

@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from flightstack.commander.arming_checks import ArmingFacts
+from flightstack.commander.estimate_checks import estimate_failsafes
 from flightstack.commander.failsafe import Action, Decision, Failsafe, Phase, action_of
 from flightstack.commander.failsafe_step import (
     IDLE,
@@ -28,6 +29,7 @@ from flightstack.commander.transitions import Event, Status
 from flightstack.commander.user_takeover import UserTakeover, conflicting_failsafes
 from flightstack.core.contract import FloatArray
 from flightstack.core.enums import STREAM_MODES, Mode
+from flightstack.estimation.health import EstimateHealth
 from flightstack.guidance.fence import Fence
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
@@ -104,6 +106,8 @@ class FailsafeMonitor:
         self.on_ground = True
         """True if the vehicle is landed, or in ground contact before the land detector reports landed."""
         self.battery_level = 0
+        self._health: EstimateHealth | None = None
+        self._estimate: frozenset[Failsafe] = frozenset()  # conditions of the estimate
         self._reading: BatteryReading | None = None
         self._source = source
         self._state = state
@@ -162,10 +166,25 @@ class FailsafeMonitor:
             fence_breach=breach,
             battery_level=self.battery_level,
             battery_remaining=self._source.battery.remaining,
+            health=self._health,
             step_refusal=self._source.step_refusal,
         )
 
+    @property
+    def position_is_known(self) -> bool:
+        """True unless the estimate of the position is lost."""
+        return Failsafe.POSITION_LOST not in self._estimate
+
+    @property
+    def velocity_is_known(self) -> bool:
+        """True unless the estimate of the velocity is too uncertain to brake by."""
+        return self._health is None or self._health.velocity_m_s <= self._behaviour.velocity_accuracy_m_s
+
     # ------------------------------------------------------------------ inputs
+
+    def take_health(self, health: EstimateHealth) -> None:
+        """Take the health of the estimate; only of a vehicle that flies on its sensors."""
+        self._health, self._estimate = health, estimate_failsafes(health, self._behaviour)
 
     def set_behaviour(self, behaviour: Behaviour) -> None:
         """Set new parameters, from the next outer tick on."""
@@ -225,6 +244,7 @@ class FailsafeMonitor:
         if (
             faults.is_quiet
             and not (breached or entries or states.is_stale or self.battery_level or self.links.gcs_lost)
+            and not self._estimate
             and mode not in STREAM_MODES
         ):
             return None
@@ -257,7 +277,7 @@ class FailsafeMonitor:
             Failsafe.MANUAL_LOST: links.manual_lost and flies_sticks,
         }
         present = {failsafe for failsafe, holds in conditions.items() if holds}
-        present |= self.faults.failsafes()
+        present |= self.faults.failsafes() | self._estimate
         return frozenset(present.union(BATTERY_FAILSAFES[: self.battery_level]))
 
     def _update_battery_level(self) -> None:

@@ -38,6 +38,7 @@ class Facts(NamedTuple):
     """State of the vehicle at an event."""
 
     state_is_valid: bool
+    position_is_known: bool
     upright: bool
     landed: bool
     has_mission: bool
@@ -57,6 +58,7 @@ class Need(Enum):
     """A condition of a rule; the value is the refusal."""
 
     STATE = "no valid position and attitude yet"
+    POSITION = "the position is lost"
     UPRIGHT = "the vehicle is tilted by more than 30 degrees"
     ON_GROUND = "the vehicle is in the air"
     IN_AIR = "the vehicle is on the ground"
@@ -71,6 +73,7 @@ def is_met(need: Need, status: Status, facts: Facts) -> bool:
     """Return True if ``need`` is met."""
     return {
         Need.STATE: facts.state_is_valid,
+        Need.POSITION: facts.position_is_known,
         Need.UPRIGHT: facts.upright,
         Need.ON_GROUND: facts.landed or not status.armed,
         Need.IN_AIR: status.armed and not facts.landed,
@@ -106,14 +109,24 @@ RULES = (
     Rule(Event.DISARM, FLYABLE, (Need.ON_GROUND,), False, Mode.HOLD),
     Rule(Event.FORCE_DISARM, FLYABLE, (), False, Mode.HOLD),
     Rule(Event.TERMINATE, tuple(Mode), (), False, Mode.TERMINATION),
-    Rule(Event.SELECT_TAKEOFF, FLYABLE, (Need.STATE, Need.ON_GROUND), None, Mode.TAKEOFF),
-    Rule(Event.SELECT_MISSION, FLYABLE, (Need.STATE, Need.MISSION, Need.TAKES_OFF), None, Mode.MISSION),
-    Rule(Event.SELECT_HOLD, FLYABLE, (Need.STATE,), None, Mode.HOLD),
-    Rule(Event.SELECT_RETURN, FLYABLE, (Need.STATE, Need.IN_AIR), None, Mode.RETURN),
+    Rule(Event.SELECT_TAKEOFF, FLYABLE, (Need.STATE, Need.POSITION, Need.ON_GROUND), None, Mode.TAKEOFF),
+    Rule(
+        Event.SELECT_MISSION,
+        FLYABLE,
+        (Need.STATE, Need.POSITION, Need.MISSION, Need.TAKES_OFF),
+        None,
+        Mode.MISSION,
+    ),
+    Rule(Event.SELECT_HOLD, FLYABLE, (Need.STATE, Need.POSITION), None, Mode.HOLD),
+    Rule(Event.SELECT_RETURN, FLYABLE, (Need.STATE, Need.POSITION, Need.IN_AIR), None, Mode.RETURN),
     Rule(Event.SELECT_LAND, FLYABLE, (Need.STATE, Need.IN_AIR), None, Mode.LAND),
-    Rule(Event.SELECT_POSITION, FLYABLE, (Need.STATE, Need.MANUAL_STREAM), None, Mode.POSITION),
+    Rule(
+        Event.SELECT_POSITION, FLYABLE, (Need.STATE, Need.POSITION, Need.MANUAL_STREAM), None, Mode.POSITION
+    ),
     Rule(Event.SELECT_ALTITUDE, FLYABLE, (Need.STATE, Need.MANUAL_STREAM), None, Mode.ALTITUDE),
-    Rule(Event.SELECT_OFFBOARD, FLYABLE, (Need.STATE, Need.OFFBOARD_STREAM), None, Mode.OFFBOARD),
+    Rule(
+        Event.SELECT_OFFBOARD, FLYABLE, (Need.STATE, Need.POSITION, Need.OFFBOARD_STREAM), None, Mode.OFFBOARD
+    ),
     Rule(Event.TAKEOFF_REACHED, (Mode.TAKEOFF,), (Need.ARMED,), None, Mode.HOLD),
     Rule(Event.MISSION_FINISHED, (Mode.MISSION,), (), None, Mode.HOLD),
     Rule(Event.MISSION_ASKS_RETURN, (Mode.MISSION,), (Need.ARMED,), None, Mode.RETURN),

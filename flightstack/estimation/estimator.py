@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,10 @@ import numpy as np
 from flightstack.core.contract import FloatArray, Quaternion, RecordArray, Vector3, VehicleState
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.portable_math import atan2
-from flightstack.estimation.delayed_filter import IMU_SIZE, field_kernel, imu_kernel, push_kernel
+from flightstack.estimation.delayed_filter import field_kernel, imu_kernel, push_kernel
 from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits
 from flightstack.estimation.fusion import GNSS_SIZE
+from flightstack.estimation.imu_track import IMU_SIZE
 from flightstack.estimation.memory import ALIGNED, LANDED, MEMORY
 from flightstack.estimation.rings import BARO_RING, GNSS_RING, MAG_RING, RANGE_RING
 from flightstack.estimation.sensor_samples import (
@@ -23,6 +25,8 @@ from flightstack.estimation.sensor_samples import (
     MagSample,
     RangeSample,
 )
+
+_pack_imu = struct.Struct(f"={IMU_SIZE}d").pack_into
 
 
 class Estimator:
@@ -38,20 +42,25 @@ class Estimator:
         record["clock"][1] = self.params.imu_noise_share
         record["earth"][3] = math.nan
         self.frame: LocalFrame | None = None
-        self._record = record
+        self._record, self._flags, self._state = record, record["flags"], record["state"]
         self._imu = np.zeros(IMU_SIZE)
         self._gnss = np.zeros(GNSS_SIZE)
         self._mag = np.zeros(4)
         self._pair = np.zeros(2)
 
+    def set_params(self, params: EstimatorParams, limits: GnssLimits) -> None:
+        """Set the parameters; those of the initial uncertainty have no effect after the alignment."""
+        self.params, self.limits = params, limits
+        self._record["params"] = params
+
     @property
     def aligned(self) -> bool:
         """True if the filter has an attitude."""
-        return bool(self._record["flags"][ALIGNED])
+        return bool(self._flags[ALIGNED])
 
     def set_landed(self, landed: bool) -> None:
         """Tell the filter whether the vehicle stands on the ground."""
-        self._record["flags"][LANDED] = landed
+        self._flags[LANDED] = landed
 
     def set_declination(self, declination_rad: float) -> None:
         """Set the magnetic declination, which holds until the Earth's field is known."""
@@ -65,14 +74,17 @@ class Estimator:
 
     def imu(self, sample: ImuSample) -> None:
         """Take a sample of the IMU."""
-        x = self._imu
-        x[0], x[1] = sample.time_s, sample.dt_s
-        x[2:5], x[5:8] = sample.gyro_frd_rad_s, sample.accel_frd_m_s2
-        imu_kernel(self.memory, x)
+        time_s, dt_s, gyro, accel = sample
+        _pack_imu(self._imu.data, 0, time_s, dt_s, *gyro, *accel)
+        imu_kernel(self.memory, self._imu)
+
+    def imu_row(self, row: FloatArray) -> None:
+        """Take a sample of the IMU in its array form, shape (8,)."""
+        imu_kernel(self.memory, row)
 
     def mag(self, sample: MagSample) -> None:
         """Take a sample of the magnetometer."""
-        self._mag[0], self._mag[1:] = sample.time_s - self.params.mag_delay_s, sample.field_frd_gauss
+        self._mag[:] = (sample.time_s - self.params.mag_delay_s, *sample.field_frd_gauss)
         push_kernel(self.memory, MAG_RING, self._mag)
 
     def baro(self, sample: BaroSample) -> None:
@@ -118,8 +130,12 @@ class Estimator:
 
     def state(self) -> VehicleState:
         """Return the output at the time of the latest IMU sample."""
-        x = self._record["output"].tolist()
-        return VehicleState(Vector3(*x[8:11]), Vector3(*x[5:8]), Quaternion(*x[1:5]), Vector3(*x[11:14]))
+        x = self._state.tolist()
+        return VehicleState(Vector3(*x[0:3]), Vector3(*x[3:6]), Quaternion(*x[6:10]), Vector3(*x[10:13]))
+
+    def write_state(self, out: FloatArray) -> None:
+        """Write the output to ``out``, shape (13,), in the order of ``VehicleState``."""
+        out[:] = self._state
 
     def deviations(self) -> FloatArray:
         """Return the standard deviation of each error state, shape (27,)."""

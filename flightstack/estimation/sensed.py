@@ -38,7 +38,7 @@ class Sensed:
     @cached_property
     def vibration(self) -> Vibration:
         """Vibration of the inertial sensor."""
-        return vibration_of(self.samples.past_imu)
+        return vibration_of(self.samples.imu_track.rows)
 
     def pose_covariance(self, attitude: Quaternion) -> FloatArray:
         """Return the covariance of position and attitude, shape (6, 6)."""

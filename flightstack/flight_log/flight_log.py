@@ -177,6 +177,11 @@ class FlightLog:
         self.flush()
         self._write(ulog.logged_string(time_us, level, text))
 
+    def information(self, key: str, value: bytes) -> None:
+        """Write an information message after the buffered rows."""
+        self.flush()
+        self._write(ulog.information(key, value))
+
     def parameter(self, name: str, value: float) -> None:
         """Write a changed parameter after the buffered rows."""
         self.flush()

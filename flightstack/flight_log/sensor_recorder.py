@@ -6,10 +6,11 @@ from collections.abc import Callable
 from typing import Any
 
 from flightstack.core.contract import FloatArray, Vector3
-from flightstack.core.geodesy import LocalFrame
+from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import Sample
-from flightstack.estimation.sensor_samples import BaroSample, GnssSample, ImuSample, MagSample, RangeSample
+from flightstack.estimation.sensor_samples import BaroSample, GnssSample, MagSample, RangeSample
+from flightstack.estimation.snapshot import ESTIMATOR_START
 from flightstack.flight_log.estimator_topics import ESTIMATOR, WIND_GROUP, fill_estimator, fill_wind
 from flightstack.flight_log.flight_log import FlightLog
 from flightstack.flight_log.recorder import FlightRecorder
@@ -36,7 +37,6 @@ SENSOR_GROUPS = (
 TRUTH_INTERVAL_US, GLOBAL_INTERVAL_US, ESTIMATOR_INTERVAL_US = 10_000, 100_000, 500_000
 """Intervals of PX4's logger."""
 _FILLS: dict[type, tuple[Group, Callable[[FloatArray, Any], None]]] = {
-    ImuSample: (IMU_GROUP, fill_imu),
     MagSample: (MAG_GROUP, fill_mag),
     BaroSample: (BARO_GROUP, fill_baro),
     GnssSample: (GNSS_GROUP, fill_gnss),
@@ -47,38 +47,53 @@ _FILLS: dict[type, tuple[Group, Callable[[FloatArray, Any], None]]] = {
 class SensorRecorder:
     """Records every sample, and at intervals the estimator and the truth, while a log is open."""
 
-    def __init__(self, recorder: FlightRecorder, frame: LocalFrame) -> None:
-        """``frame`` is the vehicle's local frame, that of the true state."""
+    def __init__(self, recorder: FlightRecorder, frame: LocalFrame, home: GeoPoint) -> None:
+        """``frame`` is the vehicle's local frame; ``home`` is the origin of the true position."""
         self._recorder = recorder
-        self._frame = frame
-        self._log: FlightLog | None = None  # to which the times below apply
+        self._frame, self._true_frame = frame, LocalFrame(home)
+        self._offset_m = Vector3(0.0, 0.0, 0.0)  # of the true frame's origin in the vehicle's
+        self._log: FlightLog | None = None
         self._truth_us = self._global_us = self._estimator_us = 0
 
-    def sample(self, sample: Sample) -> None:
-        """Record a sample that the estimator takes."""
+    def begin(self, estimator: Callable[[], bytes]) -> None:
+        """Record the estimator's snapshot in a new log; call before the estimator takes the next sample."""
         log = self._recorder.log
+        if log is not self._log:
+            self._log = log
+            if log is not None:
+                self._offset_m = self._frame.to_ned(self._true_frame.origin)
+                self._truth_us = self._global_us = self._estimator_us = 0
+                log.information(ESTIMATOR_START, estimator())
+
+    def imu(self, row: FloatArray) -> None:
+        """Record a sample of the inertial sensor that the estimator takes, in its array form."""
+        log = self._log
+        if log is not None:
+            fill_imu(log.sampled[IMU_GROUP.name].append(round(row[0] * 1e6)), row)
+
+    def sample(self, sample: Sample) -> None:
+        """Record a sample of another sensor that the estimator takes."""
+        log = self._log
         if log is not None and (known := _FILLS.get(type(sample))) is not None:
             group, fill = known
             fill(log.sampled[group.name].append(round(sample.time_s * 1e6)), sample)
 
-    def state(self, time_us: int, truth: FloatArray, sensed: Sensed) -> None:
-        """Record the true state, shape (13,), and what the vehicle knows, if they are due."""
-        log = self._recorder.log
-        if log is None:
-            return
-        if log is not self._log:
-            self._log = log
-            self._truth_us = self._global_us = self._estimator_us = time_us
-        if time_us < self._truth_us:
+    def state(self, time_us: int, truth: FloatArray, sense: Callable[[], Sensed]) -> None:
+        """Record the true state, shape (13,), and what ``sense`` returns, if they are due."""
+        log = self._log
+        if log is None or time_us < self._truth_us:
             return
         self._truth_us = time_us + TRUTH_INTERVAL_US
-        log.sampled[TRUTH_GROUP.name].append(time_us)[:] = truth
+        row = log.sampled[TRUTH_GROUP.name].append(time_us)
+        row[:] = truth
+        row[:3] += self._offset_m
         if time_us >= self._global_us:
             self._global_us = time_us + GLOBAL_INTERVAL_US
-            place = self._frame.to_geo(Vector3(*truth[:3].tolist()))
+            place = self._true_frame.to_geo(Vector3(*truth[:3].tolist()))
             log.sampled[TRUTH_GLOBAL_GROUP.name].append(time_us)[:] = place
         if time_us >= self._estimator_us:
             self._estimator_us = time_us + ESTIMATOR_INTERVAL_US
+            sensed = sense()
             fill_estimator(log.sampled[ESTIMATOR.name].append(time_us), sensed)
             if sensed.report.wind_is_observed:
                 fill_wind(log.sampled[WIND_GROUP.name].append(time_us), sensed)

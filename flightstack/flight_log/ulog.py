@@ -63,8 +63,10 @@ def _keyed(kind: str, key: str, value: bytes) -> bytes:
     return _message(kind, bytes([len(name)]) + name + value)
 
 
-def information(key: str, value: str | int | float) -> bytes:
+def information(key: str, value: str | int | float | bytes) -> bytes:
     """Return an information message; an int is stored as int32_t if it fits, else int64_t, a float as double."""
+    if isinstance(value, bytes):
+        return _keyed("I", f"uint8_t[{len(value)}] {key}", value)
     if isinstance(value, str):
         text = value.encode()
         return _keyed("I", f"char[{len(text)}] {key}", text)

@@ -10,10 +10,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flightstack.core.compiled import direct
-from flightstack.core.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, STATE_SIZE, FloatArray, RecordArray
+from flightstack.core.contract import (
+    ATTITUDE_TARGET_SIZE,
+    SETPOINT_SIZE,
+    STATE_SIZE,
+    FloatArray,
+    RecordArray,
+    Vector3,
+)
 from flightstack.core.enums import STREAM_MODES, Mode
 from flightstack.core.portable_math import atan2, distance
 from flightstack.guidance.kernels import (
+    DESCEND,
+    DESCEND_LEVEL,
     TRAJECTORY_SIZE,
     goal_kernel,
     levelling_kernel,
@@ -50,6 +59,9 @@ ARRIVED_M = 0.5
 # looking up a member of an enumeration takes seven times as long as looking up a name or a key
 _OFFBOARD = Mode.OFFBOARD
 _NUMBER = {mode: int(mode) for mode in Mode}
+_YAW_AT = 9  # of trajectory and setpoint
+_NUMBER_WITHOUT_POSITION = _NUMBER | {Mode.LAND: DESCEND, Mode.POSITION: int(Mode.ALTITUDE)}
+_NUMBER_WITHOUT_VELOCITY = _NUMBER_WITHOUT_POSITION | {Mode.LAND: DESCEND_LEVEL}
 _STREAM_NUMBERS = frozenset(int(mode) for mode in STREAM_MODES)
 
 
@@ -86,6 +98,7 @@ class Navigator:
         views = (self._mission[name].data for name in MissionProgress._fields)
         self._current, self._reached, self._finished, self._wants_return = views
         self._reported = 0
+        self._numbers = _NUMBER
         self._is_repositioning = False
         self._mode_target: RecordArray = np.zeros(1, MODE_TARGET)
         self._land = np.array(LandMemory(1.0, 0.0, 0.0, 0.0))
@@ -248,6 +261,29 @@ class Navigator:
         self._trajectory[:6] = state[:6]
         self._trajectory[6:9] = 0.0
 
+    def set_known(self, position: bool, velocity: bool) -> bool:
+        """Fly with or without horizontal position and velocity; return True if that is a change.
+
+        Without a position, LAND descends where the vehicle is, and POSITION holds the altitude alone. A landing goes on
+        where the position is known again.
+        """
+        numbers = _NUMBER if position else _NUMBER_WITHOUT_POSITION if velocity else _NUMBER_WITHOUT_VELOCITY
+        if numbers is self._numbers:
+            return False
+        self._numbers = numbers
+        self._mode_target["x"], self._mode_target["y"] = self._trajectory[:2]
+        return True
+
+    def shift(self, position_m: Vector3, velocity_m_s: Vector3, yaw_rad: float) -> None:
+        """Shift the reference by a reset of the estimate, so that the vehicle does not move; goals keep their place."""
+        t = self._trajectory
+        t[0:3] += position_m
+        t[3:6] += velocity_m_s
+        self.setpoint[0:3] += position_m
+        self.setpoint[3:6] += velocity_m_s
+        t[_YAW_AT] += yaw_rad
+        self.setpoint[_YAW_AT] += yaw_rad
+
     def enter(self, mode: Mode, takeoff_altitude_m: float = 0.0) -> None:
         """Set the target of ``mode``, from the present reference."""
         t, target, p = self._reference(), self._mode_target[0], self.params
@@ -365,7 +401,7 @@ class Navigator:
 
         ``attitude_target`` (5,) is the loops' last one.
         """
-        number = _NUMBER[mode]
+        number = self._numbers[mode]
         if number in _STREAM_NUMBERS:
             self._fly_stream(
                 number, state, self._trajectory, self._stream, self._land, attitude_target,

@@ -201,6 +201,37 @@ class Behaviour:
         "FS_POS_ACT", 2, 0, 4, "", "Position error action",
         choices=((0, "Warning"), (2, "Land"), (4, "Terminate")), group="Failure Detector",
     )  # fmt: skip
+    dead_reckoning_s: float = _param(
+        "FS_DEAD_RECK_T", 5, 0.5, 60, "s", "Dead reckoning after which the position is lost",
+        group="Failure Detector",
+    )  # fmt: skip
+    position_accuracy_m: float = _param(
+        "COM_POS_FS_EPH", 5, -1, 400, "m", "Standard deviation at which the position is lost; -1 off"
+    )
+    velocity_accuracy_m_s: float = _param(
+        "COM_VEL_FS_EVH",
+        1,
+        0,
+        20,
+        "m/s",
+        "Standard deviation above which a descent without position does not brake",
+    )
+    position_loss_action: int = _param(
+        "COM_POSCTL_NAVL", 0, 0, 1, "", "Position loss action; without manual control the vehicle lands",
+        choices=((0, "Altitude mode"), (1, "Land")),
+    )  # fmt: skip
+    tilt_accuracy_deg: float = _param(
+        "FS_TILT_DEV", 10, 0, 45, "deg", "Standard deviation at which the attitude is doubtful; 0 off",
+        group="Failure Detector",
+    )  # fmt: skip
+    attitude_doubt_action: int = _param(
+        "FS_TILT_ACT", 2, 0, 4, "", "Doubtful attitude action",
+        choices=((0, "Warning"), (2, "Land"), (4, "Terminate")), group="Failure Detector",
+    )  # fmt: skip
+    gnss_doubt_action: int = _param(
+        "FS_GNSS_ACT", 0, 0, 3, "", "Refused GNSS action",
+        choices=((0, "Warning"), (1, "Hold"), (2, "Land"), (3, "Return")), group="Failure Detector",
+    )  # fmt: skip
     rotor_check: int = _param(
         "FD_ACT_EN", 1, 0, 1, "", "Compare commanded and measured rotor speeds", choices=((0, "Off"), (1, "On")),
     )  # fmt: skip

@@ -16,7 +16,7 @@ from flightstack.control.controller import controller_of
 from flightstack.control.controller_loading import check_python, load_controller
 from flightstack.control.loop_parameters import loop_numbers
 from flightstack.core.errors import ConfigError
-from flightstack.core.geodesy import GeoPoint, LocalFrame
+from flightstack.core.geodesy import GeoPoint
 from flightstack.firmware.c_loops import LoopsSetup
 from flightstack.firmware.choice import PYTHON, parse_loops
 from flightstack.firmware.law_tree import law_tree, own_params
@@ -40,7 +40,7 @@ from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.assembly import VehicleParts, assemble
 from flightstack.vehicle.autopilot import TickingAutopilot
-from flightstack.vehicle.estimation import Estimation, SensorAutopilot
+from flightstack.vehicle.estimation import Estimation, SensorAutopilot, Users
 from flightstack.vehicle.flight_state import FlightState
 from flightstack.vehicle.journal import Journal
 from flightstack.vehicle.parameters import (
@@ -56,7 +56,7 @@ _KERNELS = (
     "follow_rotors", "detect", "fence_step", "store_outer_row", "outer_heading", "euler_rad",
 )  # fmt: skip
 _LOOP_KERNELS = ("inner_kernel", "outer_kernel")
-_ESTIMATOR_KERNELS = ("imu_kernel", "push_kernel", "realign_kernel")
+_ESTIMATOR_KERNELS = ("imu_kernel", "push_kernel", "field_kernel")
 _REAL_TIME_KERNELS = ("stream_kernel",)
 """Kernels that a vehicle in lockstep compiles or loads at their first use."""
 
@@ -84,6 +84,11 @@ class Stack(NamedTuple):
     autopilot: TickingAutopilot
     estimation: Estimation | None
     """None for a vehicle that flies on the simulator's state."""
+
+    @property
+    def is_ready(self) -> bool:
+        """True if the state is known well enough to take off: at once on the simulator's, after seconds on sensors."""
+        return self.estimation is None or self.estimation.is_ready()
 
     @property
     def now(self) -> FlightState:
@@ -195,7 +200,7 @@ def _join(
         simulator.state, simulator.rotor_speed_rad_s, simulator,
     )  # fmt: skip
     parts.warm_up(with_streams=not config.lockstep)
-    autopilot, estimation = _on_sensors(parts, simulator, recorder, config.home)
+    autopilot, estimation = _on_sensors(parts, simulator, params, recorder, config.home)
     connect_parameters(params, parts, recorder)
     timing = LoopTiming(round(1e9 / loop_rates.inner_hz))
     report = TimingReport(timing, loop_rates, config.lockstep)
@@ -216,7 +221,11 @@ def _join(
 
 
 def _on_sensors(
-    parts: VehicleParts, simulator: SimulatorEndpoint, recorder: FlightRecorder, home: GeoPoint
+    parts: VehicleParts,
+    simulator: SimulatorEndpoint,
+    params: ParamStore,
+    recorder: FlightRecorder,
+    home: GeoPoint,
 ) -> tuple[TickingAutopilot, Estimation | None]:
     """Return the autopilot to tick; that of a vehicle on sensors estimates its state first.
 
@@ -224,8 +233,9 @@ def _on_sensors(
     """
     if simulator.sensors is None:
         return parts.autopilot, None
-    sensor_recorder = SensorRecorder(recorder, LocalFrame(home))
-    estimation = Estimation(simulator.sensors, parts.now, parts.area, sensor_recorder, simulator.truth)
+    users = Users(parts.area, parts.failsafes, parts.navigator, parts.backend, parts.journal)
+    sensor_recorder = SensorRecorder(recorder, parts.places.frame, home)
+    estimation = Estimation(simulator.sensors, parts.now, users, params, sensor_recorder, simulator.truth)
     estimation.warm_up()
     return SensorAutopilot(parts.autopilot, estimation), estimation
 

@@ -39,9 +39,9 @@ def fly_plan(
 
 
 def await_state(world: World, step: Callable[[], bool | None]) -> None:
-    """Run until the vehicle knows its state, as one on sensors does after seconds, or for ``READY_S``."""
+    """Run until the vehicle may fly on its state, as one on sensors does after seconds, or for ``READY_S``."""
     end_s = world.time_s + READY_S
-    while not world.engine.stack.now.has_state and world.time_s < end_s and not step():
+    while not world.engine.stack.is_ready and world.time_s < end_s and not step():
         pass
 
 

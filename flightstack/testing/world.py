@@ -193,12 +193,12 @@ class World:
         )
 
     def wait_until_ready(self, timeout_s: float = 60.0) -> None:
-        """Run until the state is known: at once with the simulator's state, after seconds on sensors.
+        """Run until the vehicle may fly on its state: at once on the simulator's, after seconds on sensors.
 
         Raise ConditionTimeoutError after ``timeout_s`` of simulated time.
         """
         __tracebackhide__ = True
-        self.run_until(lambda _: self.engine.stack.now.has_state, timeout_s)
+        self.run_until(lambda _: self.engine.stack.is_ready, timeout_s)
 
     def watch(self, callback: Callable[[], None]) -> None:
         """Call ``callback`` after every outer tick."""

@@ -33,7 +33,7 @@ class FlightState:
     row: FloatArray
     """Newest row of the inner loop, shape (48,)."""
     has_state: bool = False
-    """True once the simulator has sent a state."""
+    """True once position and attitude are known: from the simulator's first state, or the estimator's origin."""
     time_us: int = 0
     """Vehicle time of the newest tick."""
     status: Status = DISARMED

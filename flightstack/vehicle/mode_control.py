@@ -35,6 +35,7 @@ class Readiness:
         known = self._failsafes.arming_facts(now.status.mode, now.has_state)
         return Facts(
             state_is_valid=known.state_is_valid and known.state_is_fresh,
+            position_is_known=self._failsafes.position_is_known,
             upright=known.upright,
             landed=now.landed,
             has_mission=bool(self._mission.items),

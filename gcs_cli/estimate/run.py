@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +15,7 @@ from flightstack.estimation.error_state import ERROR_STATES, NOMINAL_SIZE
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.kalman import OBSERVATION_COLUMNS, OBSERVATIONS
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, ImuSample, MagSample, RangeSample
+from flightstack.estimation.snapshot import ESTIMATOR_START, restored
 from gcs_cli.errors import CliError
 from gcs_cli.estimate.log_samples import Landed, params_of, samples_of
 from gcs_cli.estimate.track import Track
@@ -39,12 +41,14 @@ class Estimate:
     resets: FloatArray
 
 
-def run(log: Recording) -> Estimate:
-    """Run the filter; raise CliError if the log's sensors do not suffice."""
-    params, limits, declination_rad = params_of(log)
-    estimator = Estimator(params, limits)
-    if math.isfinite(declination_rad):
-        estimator.set_declination(declination_rad)
+def run(log: Recording, given: Mapping[str, float]) -> Estimate:
+    """Run the filter with parameters ``given`` by name; raise CliError if the log's sensors do not suffice.
+
+    The log of a vehicle of this version has the filter's memory at its start in ``log.info``: without other parameters
+    the filter continues from it, and so repeats the flown estimate.
+    """
+    estimator = None if given else _continued(log)
+    estimator = estimator or _new(log, given)
     keeper = _Keeper(estimator)
     year = log.year or FIELD_YEAR
     for sample in samples_of(log):
@@ -66,6 +70,19 @@ def run(log: Recording) -> Estimate:
         elif isinstance(sample, Landed):
             estimator.set_landed(sample.is_landed)
     return keeper.result(log)
+
+
+def _continued(log: Recording) -> Estimator | None:
+    start = log.info.get(ESTIMATOR_START)
+    return restored(start) if isinstance(start, bytes) else None
+
+
+def _new(log: Recording, given: Mapping[str, float]) -> Estimator:
+    params, limits, declination_rad = params_of(log, given)
+    estimator = Estimator(params, limits)
+    if math.isfinite(declination_rad):
+        estimator.set_declination(declination_rad)
+    return estimator
 
 
 class _Keeper:

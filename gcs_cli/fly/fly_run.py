@@ -193,6 +193,8 @@ def _run_info(options: FlyOptions, flown: Flown, outcome: Outcome) -> RunInfo:
         torque_gust=options.torque_gust,
         force=options.force,
         torque=options.torque,
+        slope=options.slope,
+        boat=options.boat,
         battery_start=options.battery_start,
         battery_capacity=options.battery_capacity,
         battery_drain=options.battery_drain,

@@ -58,7 +58,7 @@ def export_mcap(recording: Recording, path: Path) -> int:
             at_ns = max(0, recording.unix_ns(channel.time_us[row]))
             data = _encode(channel.row(row)).encode()
             writer.add_message(numbers[index], at_ns, data, at_ns, sequence)
-        writer.add_metadata("flight", {name: str(value) for name, value in recording.info.items()})
+        writer.add_metadata("flight", {name: str(value) for name, value in recording.facts.items()})
         writer.add_metadata("parameters", {name: repr(value) for name, value in recording.parameters.items()})
         writer.finish()
     return sum(len(channel.time_us) for channel in channels)

@@ -34,7 +34,7 @@ def export_parquet(recording: Recording, folder: Path, overwrite: bool) -> int:
         "source": recording.source,
         "start_us": str(recording.start_us),
         "start_utc": start_utc(recording) or "",
-        "info": json.dumps(dict(recording.info), default=str),
+        "info": json.dumps(recording.facts, default=str),
     }
 
     def write(path: Path, columns: dict[str, Any]) -> None:

@@ -107,6 +107,11 @@ class Recording:
         return (self.end_us - self.start_us) * 1e-6
 
     @property
+    def facts(self) -> dict[str, Any]:
+        """``info`` without binary entries."""
+        return {name: value for name, value in self.info.items() if not isinstance(value, bytes)}
+
+    @property
     def year(self) -> float | None:
         """Date of the log as a year with a fraction; None if unknown."""
         seconds = None if self.epoch_us is None else (self.epoch_us + self.start_us) * 1e-6

@@ -76,6 +76,8 @@ _CONDITIONS = (
     ("torque_gust_n_m", "gusty torque [N m]"),
     ("force_n", "force N, E, D [N]"),
     ("torque_n_m", "torque x, y, z [N m]"),
+    ("slope_deg", "slope of the ground [°]"),
+    ("boat_m_s", "velocity of the ground N, E [m/s]"),
     ("battery_start_percent", "battery at the start [%]"),
     ("battery_capacity_mah", "battery capacity [mAh]"),
     ("battery_drain", "battery drain, times"),

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from pyulog import ULog
 
+from flightstack.estimation.snapshot import ESTIMATOR_START
 from flightstack.testing import World
+from gcs_cli.estimate.result import OWN, TRUTH, estimate_log
+from gcs_cli.logs.ulog_reader import read_ulog
 
 TOPICS = {
     "sensor_combined": 500.0, "vehicle_magnetometer": 100.0, "vehicle_air_data": 50.0,
@@ -86,3 +90,21 @@ def test_log_with_the_true_state_has_no_topics_of_sensors() -> None:
         world.run_for(0.5)
         names = {data.name for data in ULog(io.BytesIO(world.engine.newest_log())).data_list}
     assert names.isdisjoint(TOPICS)
+
+
+def test_filter_repeats_the_flown_estimate_from_the_log(content: bytes) -> None:
+    """Equal but for the single precision of the log, of GNSS velocities and of the estimate itself."""
+    result = estimate_log(read_ulog(content, "hop"))
+    assert set(result.others) == {OWN, TRUTH}
+    flown = result.against[OWN]
+    assert np.abs(flown.tilt_deg).max() < 1e-4  # measured: 3e-6°
+    assert np.abs(flown.yaw_deg).max() < 1e-4
+    assert np.abs(flown.velocity_m_s).max() < 1e-5
+    assert np.abs(flown.position_m).max() < 1e-4
+
+
+def test_filter_starts_anew_on_the_log_of_another_version(content: bytes) -> None:
+    recording = read_ulog(content, "hop")
+    start = bytes(4) + recording.info[ESTIMATOR_START][4:]
+    result = estimate_log(replace(recording, info={**recording.info, ESTIMATOR_START: start}))
+    assert 0.01 < np.abs(result.against[OWN].yaw_deg).max() < 10.0

@@ -28,6 +28,8 @@ from flightstack.params.behaviour import FIELDS, SPECS, Behaviour
 DEFAULTS = Behaviour()
 PARAMETER = {attribute: name for name, attribute in FIELDS.items()}
 AIRBORNE = [phase for phase in Phase if phase not in (Phase.DISARMED, Phase.STANDING)]
+POSITION_FAULTS = {Failsafe.POSITION_LOST, Failsafe.POSITION_ERROR}
+"""Failsafes without which a vehicle cannot hold its position."""
 DEMANDS = [Demand(failsafe, action) for failsafe in Failsafe for action in Action]
 
 
@@ -58,6 +60,7 @@ ACTIONS_OF_PX4 = {
         0: "POSITION", 1: "ALTITUDE", 3: "RETURN", 4: "LAND", 5: "HOLD", 6: "TERMINATE", 7: "DISARM"
     },
     "GF_ACTION": {0: "NONE", 1: "WARN", 2: "HOLD", 3: "RETURN", 4: "TERMINATE", 5: "LAND"},
+    "COM_POSCTL_NAVL": {0: "ALTITUDE", 1: "LAND"},
     "COM_ACT_FAIL_ACT": {0: "WARN", 1: "HOLD", 2: "LAND", 3: "RETURN", 4: "TERMINATE"},
 }  # fmt: skip
 FAILSAFE_OF = {
@@ -65,6 +68,7 @@ FAILSAFE_OF = {
     "NAV_RCL_ACT": Failsafe.MANUAL_LOST,
     "COM_OBL_RC_ACT": Failsafe.OFFBOARD_LOST,
     "GF_ACTION": Failsafe.FENCE,
+    "COM_POSCTL_NAVL": Failsafe.POSITION_LOST,
     "COM_ACT_FAIL_ACT": Failsafe.ROTOR,
 }
 
@@ -134,7 +138,7 @@ def test_of_every_pair_the_more_severe_action_wins(phase: Phase) -> None:
             assert decision == NOTHING
             continue
         severest = max(d.action for d in counted)
-        lost = any(d.failsafe is Failsafe.POSITION_ERROR and d.action > Action.WARN for d in counted)
+        lost = any(d.failsafe in POSITION_FAULTS and d.action > Action.WARN for d in counted)
         if lost and severest in (Action.POSITION, Action.HOLD, Action.RETURN):
             severest = Action.LAND
         if lost and severest is Action.ALTITUDE and any(d.action is Action.POSITION for d in counted):
@@ -150,7 +154,7 @@ def test_among_equals_the_higher_row_is_the_cause() -> None:
     for action in (Action.WARN, Action.HOLD, Action.LAND, Action.TERMINATE):
         for one, other in itertools.combinations(Failsafe, 2):
             decision = decide_for(Demand(other, action), Demand(one, action), phase=Phase.MISSION)
-            lands = {one, other} & {Failsafe.POSITION_ERROR} and action is Action.HOLD
+            lands = {one, other} & POSITION_FAULTS and action is Action.HOLD
             assert decision == Decision(Action.LAND if lands else action, one)
 
 

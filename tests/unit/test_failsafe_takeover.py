@@ -19,7 +19,13 @@ from flightstack.commander.user_takeover import REPETITION_S, UserTakeover, conf
 from flightstack.params.behaviour import Behaviour, with_assignments
 
 FENCE_LANDS = with_assignments(Behaviour(), ["GF_ACTION=5", "COM_FAIL_ACT_T=5", "COM_LOW_BAT_ACT=3"])
-NEVER = {Failsafe.NOT_FINITE, Failsafe.STATE_STALE, Failsafe.ATTITUDE, Failsafe.BATTERY_EMERGENCY}
+NEVER = {
+    Failsafe.NOT_FINITE,
+    Failsafe.IMU_FAULT,
+    Failsafe.STATE_STALE,
+    Failsafe.ATTITUDE,
+    Failsafe.BATTERY_EMERGENCY,
+}
 
 
 class TakeoverCase:

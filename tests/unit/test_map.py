@@ -39,7 +39,7 @@ metres = st.floats(-20_000.0, 20_000.0)
 
 
 def drawn(scene: MapScene, view: Viewport) -> list[str]:
-    return rows_of_text(draw_map(scene, view, DARK).segments()).splitlines()
+    return rows_of_text(draw_map(scene, view, DARK).rows()).splitlines()
 
 
 @given(metres, metres, st.floats(0.01, 100.0), st.floats(0.0, 160.0), st.floats(0.0, 96.0))
@@ -218,7 +218,7 @@ def test_any_places_are_drawn(places, heading):
     )
     scene = MapScene(crafts[0], crafts[0].place, crafts[0].place, 0, plan, np.array(places), crafts)
     view = Viewport(width=30, height=10).fitted(scene.extent())
-    assert len(draw_map(scene, view, DARK, grid=True, cursor=(3, 3)).segments()) == 10
+    assert len(draw_map(scene, view, DARK, grid=True, cursor=(3, 3)).rows()) == 10
 
 
 def position(north_m: float, system: int = 1, hdg: int = 65535):

@@ -24,6 +24,7 @@ EVERYTHING = list(itertools.product(ALL_STATUSES, ALL_FACTS, Event))
 
 READY = Facts(
     state_is_valid=True,
+    position_is_known=True,
     upright=True,
     landed=True,
     has_mission=True,
@@ -131,6 +132,7 @@ def test_without_a_valid_state_nothing_flies() -> None:
 REFUSALS = [
     (Need.STATE, STANDING, READY._replace(state_is_valid=False), Event.ARM),
     (Need.STATE, FLYING, IN_AIR._replace(state_is_valid=False), Event.SELECT_HOLD),
+    (Need.POSITION, FLYING, IN_AIR._replace(position_is_known=False), Event.SELECT_HOLD),
     (Need.UPRIGHT, STANDING, READY._replace(upright=False), Event.ARM),
     (Need.ON_GROUND, FLYING, IN_AIR, Event.DISARM),
     (Need.ON_GROUND, FLYING, IN_AIR, Event.SELECT_TAKEOFF),

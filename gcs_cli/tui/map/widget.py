@@ -58,7 +58,7 @@ class MapWidget(CanvasWidget):
         self._adjust_view()
         if self.view.width and self.view.height:
             canvas = draw_map(scene, self.view, watch_app(self).palette, grid=self._grid, cursor=self.cursor)
-            self.draw(canvas.segments())
+            self.draw(canvas)
 
     def _adjust_view(self) -> None:
         vehicle = self.scene.vehicle

@@ -58,7 +58,7 @@ class PlotWidget(CanvasWidget):
         else:
             canvas = Canvas(self.size.width, self.size.height)
             canvas.label(2, 1, "nothing is plotted: press Enter to add fields", colours.muted)
-        self.draw(canvas.segments())
+        self.draw(canvas)
 
     def zoom(self, steps: int) -> None:
         """Show a longer (positive) or shorter time."""

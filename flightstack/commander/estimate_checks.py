@@ -1,0 +1,60 @@
+"""Checks of the estimate of a vehicle that flies on its sensors: before arming, and in flight. Pure.
+
+Names and limits are PX4's, https://docs.px4.io/main/en/flying/pre_flight_checks.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from flightstack.commander.failsafe import Failsafe
+from flightstack.estimation.health import EstimateHealth
+from flightstack.params.behaviour import Behaviour
+
+MISSING_S = 1.0
+"""Age of the newest measurement at which a sensor is missing."""
+IMU_MISSING_S = 0.04
+"""The same of the inertial sensor; before it, the rotor speeds are not yet held."""
+MOST_GYRO_BIAS_RAD_S, MOST_ACCEL_BIAS_M_S2 = 0.1125, 0.3
+"""Three quarters of the limits that PX4 sets to the biases, EKF2_GYR_B_LIM and EKF2_ABL_LIM."""
+MOST_RATIO, MOST_HEIGHT_RATIO = 0.5, 1.0
+"""Largest mean test ratios: PX4's defaults of COM_ARM_EKF_VEL, _POS, _YAW and _HGT."""
+REFUSED_S = 1.0
+"""Time of refused GNSS positions after which spoofing is suspected."""
+
+PREFLIGHT: tuple[tuple[str, Callable[[EstimateHealth], bool]], ...] = (
+    ("the inertial sensor is missing", lambda h: h.imu_age_s < MISSING_S and not h.imu_is_stuck),
+    ("the compass is missing", lambda h: h.mag_age_s < MISSING_S),
+    ("the barometer is missing", lambda h: h.baro_age_s < MISSING_S),
+    ("GNSS has no fix", lambda h: h.fix_age_s < MISSING_S),
+    ("the attitude is not aligned yet", lambda h: h.aligned),
+    ("the GNSS fix is not accurate enough yet", lambda h: h.has_origin or not h.fix_age_s < MISSING_S),
+    ("the gyroscope bias is too high", lambda h: h.gyro_bias_rad_s < MOST_GYRO_BIAS_RAD_S),
+    ("the accelerometer bias is too high", lambda h: h.accel_bias_m_s2 < MOST_ACCEL_BIAS_M_S2),
+    ("the velocity estimate is not stable", lambda h: h.velocity_ratio < MOST_RATIO),
+    ("the position estimate is not stable", lambda h: h.position_ratio < MOST_RATIO),
+    ("the height estimate is not stable", lambda h: h.height_ratio < MOST_HEIGHT_RATIO),
+    ("the heading estimate is not stable", lambda h: h.heading_ratio < MOST_RATIO),
+)
+"""Reasons not to arm, each with the condition under which it does not apply."""
+
+
+def estimate_refusals(health: EstimateHealth | None) -> tuple[str, ...]:
+    """Return every reason not to arm; none for a vehicle that flies on the simulator's state."""
+    return () if health is None else tuple(text for text, passes in PREFLIGHT if not passes(health))
+
+
+def estimate_failsafes(health: EstimateHealth | None, behaviour: Behaviour) -> frozenset[Failsafe]:
+    """Return the conditions of failsafes in flight."""
+    if health is None:
+        return frozenset()
+    b, limit_m = behaviour, behaviour.position_accuracy_m
+    is_far_off = 0.0 < limit_m < health.horizontal_m
+    conditions = (
+        (Failsafe.IMU_FAULT, health.imu_age_s > IMU_MISSING_S or health.imu_is_stuck),
+        (Failsafe.ATTITUDE_DOUBTFUL, health.tilt_rad > math.radians(b.tilt_accuracy_deg) > 0.0),
+        (Failsafe.POSITION_LOST, health.unaided_s > b.dead_reckoning_s or is_far_off),
+        (Failsafe.GNSS_REFUSED, health.refused_s > REFUSED_S),
+    )
+    return frozenset(failsafe for failsafe, holds in conditions if holds)
