@@ -28,6 +28,7 @@ NAMES = (
     "COM_POSCTL_NAVL",
     "COM_POS_FS_EPH",
     "COM_RC_LOSS_T",
+    "COM_VEL_FS_EVH",
     "FD_ACT_EN",
     "FD_ACT_MOT_TOUT",
     "FD_FAIL_P",
