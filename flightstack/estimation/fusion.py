@@ -14,6 +14,7 @@ from flightstack.estimation.derived_generated import (
 )
 from flightstack.estimation.error_state import (
     BARO_BIAS,
+    ERROR_STATES,
     GNSS_BIAS,
     GYRO_BIAS,
     POSITION,
@@ -83,13 +84,13 @@ def _drift_gnss_bias(
 ) -> None:
     """Propagate the Gauss-Markov process of the GNSS position bias."""
     kept = max(0.0, 1.0 - elapsed_s / params.gnss_bias_s)
-    for axis in range(3):
-        at = GNSS_BIAS + axis
-        spread = params.gnss_bias_share * (epv_m if axis == 2 else eph_m)
-        f.nominal[25 + axis] *= kept
-        for j in range(f.ph.size):
-            f.covariance[at, j] *= kept
+    for at in range(GNSS_BIAS, ERROR_STATES):
+        spread = params.gnss_bias_share * (epv_m if at == GNSS_BIAS + 2 else eph_m)
+        f.nominal[at + 1] *= kept
+        for j in range(at + 1):
             f.covariance[j, at] *= kept
+        for j in range(at, ERROR_STATES):
+            f.covariance[at, j] *= kept
         f.covariance[at, at] += (1.0 - kept * kept) * spread * spread
 
 

@@ -86,7 +86,6 @@ def _start_gnss(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) 
         p[at, at] += variance
         if axis == 2:
             p[at, BARO_BIAS] += variance
-            p[BARO_BIAS, at] += variance
             p[BARO_BIAS, BARO_BIAS] += variance
         reset_variance(p, GNSS_BIAS + axis, 1, share * share * variance)
     m["last_gnss_s"][0] = row[0]
@@ -109,15 +108,17 @@ def is_platform_at_rest(m: Record, f: Filter) -> bool:
 
 
 @compiled
-def hold_position(m: Record, f: Filter, params: EstimatorParams) -> None:
-    """Hold the horizontal position while the velocity is not measured."""
+def hold_position(m: Record, f: Filter, params: EstimatorParams) -> bool:
+    """Hold the horizontal position while the velocity is not measured; return True if it was fused."""
     hold, now_s = m["hold"], f.clock[0]
     is_used = m["flags"][HAS_GNSS] == 1 and m["flags"][HAS_YAW] == 1
     if is_velocity_measured(f) or (is_used and deviation(f, VELOCITY, 2) < params.hold_velocity_m_s):
         hold[2] = 0.0
-        return
+        return False
     if hold[2] == 0.0:
         hold[0], hold[1] = f.nominal[7], f.nominal[8]
-    if now_s - hold[2] >= _HOLD_PERIOD_S:
-        fuse_hold(f, hold[0], hold[1], params)
-        hold[2] = now_s
+    if now_s - hold[2] < _HOLD_PERIOD_S:
+        return False
+    fuse_hold(f, hold[0], hold[1], params)
+    hold[2] = now_s
+    return True

@@ -79,7 +79,7 @@ class SensorRecorder:
             fill(log.sampled[group.name].append(round(sample.time_s * 1e6)), sample)
 
     def state(self, time_us: int, truth: FloatArray, sense: Callable[[], Sensed]) -> None:
-        """Record the true state, shape (13,), and what the vehicle knows, as ``sense`` returns, if due."""
+        """Record the true state, shape (13,), and what ``sense`` returns, if they are due."""
         log = self._log
         if log is None or time_us < self._truth_us:
             return

@@ -16,6 +16,7 @@ from flightstack.core.atomic_file import write_text_atomically
 from flightstack.core.contract import FloatArray
 from flightstack.core.geodesy import LocalFrame
 from flightstack.plan import NAV_COMMANDS, Command, MissionItem, Plan
+from gcs_cli.report.estimate_error import estimate_figures
 from gcs_cli.report.flight_data import Flight
 from gcs_cli.report.flight_figures import (
     attitude_error,
@@ -90,6 +91,7 @@ def summarise(flight: Flight, plan: Plan, run: RunInfo) -> dict[str, Any]:
         "real_time_factor": _rounded(factor),
         "waypoints": waypoint_rows(flight, plan),
         **_control(flight),
+        "estimate_error": estimate_figures(flight),
         "overruns": run.overruns if run.overruns is not None else flight.overruns,
         "log_sha256": file_sha256(run.log_path) if run.log_path and run.log_path.exists() else None,
     }

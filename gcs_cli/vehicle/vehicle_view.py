@@ -172,7 +172,12 @@ def _gnss(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
 
 def _estimator_status(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     ratios = (message.vel_ratio, message.pos_horiz_ratio, message.pos_vert_ratio, message.mag_ratio)
-    return view._replace(estimator=_estimator(message.flags, ratios))
+    horizontal_m, vertical_m = (
+        accuracy if accuracy > 0.0 else None  # the true state has none
+        for accuracy in (message.pos_horiz_accuracy, message.pos_vert_accuracy)
+    )
+    health = _estimator(message.flags, ratios)._replace(horizontal_m=horizontal_m, vertical_m=vertical_m)
+    return view._replace(estimator=health)
 
 
 def _ekf_status(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
@@ -206,7 +211,8 @@ def _wind(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
 
 
 def _wind_cov(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    return view._replace(wind_ned_m_s=_vector(message.wind_x, message.wind_y, message.wind_z))
+    vertical_m_s = message.wind_z if math.isfinite(message.wind_z) else 0.0  # NaN: unknown
+    return view._replace(wind_ned_m_s=_vector(message.wind_x, message.wind_y, vertical_m_s))
 
 
 def _attitude(view: VehicleView, message: Any, _now_s: float) -> VehicleView:

@@ -278,7 +278,7 @@ def test_both_rings_wrap_many_times_at_full_rate(tmp_path: Path) -> None:
 
 @BOTH
 def test_an_interrupt_at_any_access_neither_loses_nor_swaps_an_octet(flags: int, tmp_path: Path) -> None:
-    """They strike at every access of the main loop, at every second one, …: where both handle a FIFO, they are masked."""
+    """They strike at each access of the main loop, at each second one, …: where both handle a FIFO, they are masked."""
     board, rng = Board(tmp_path, flags=flags, options=("-DF28_BAUD=2500000UL",)), random.Random(5)
     for every in range(1, 9):
         board.c.fake_strike_every(every)

@@ -36,6 +36,7 @@ REQUIRED = {
     "params", "force_n", "torque_n_m", "slope_deg", "boat_m_s", "param", "outcome_text",
     "drag_n_s_m", "faults_not_begun", "flight_time_s",
     "rms_attitude_error_deg", "max_attitude_error_deg", "rms_torque_n_m", "rms_rotor_command_rate_rad_s2",
+    "estimate_error",
 }  # fmt: skip
 
 

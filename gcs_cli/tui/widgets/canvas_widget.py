@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gcs_cli.tui.widgets.canvas import Canvas
+from gcs_cli.charts.canvas import Canvas
 from gcs_cli.tui.widgets.drawing import LinesWidget
 
 
