@@ -62,7 +62,7 @@ def parse_ulog(content: bytes, source: object, topics: list[str] | None = None) 
 
     Raise ConfigError, which names ``source``.
     """
-    rows = _Rows()
+    rows = _Rows(topics)
     is_whole = rows.gather(content)
     try:
         # pyulog reports damage on stdout, which belongs to the command's own output
@@ -78,7 +78,9 @@ def parse_ulog(content: bytes, source: object, topics: list[str] | None = None) 
 class _Rows:
     """The rows of each subscription, and the messages that define all the rest."""
 
-    def __init__(self) -> None:
+    def __init__(self, topics: list[str] | None) -> None:
+        self._topics = topics
+        self._wanted: set[int] = set()  # subscription ids of ``topics``: pyulog sees the times of no others
         self.are_regular = True
         """True if no subscription id is used twice, and no data is appended."""
         self._rows: dict[int, list[bytes]] = {}
@@ -98,7 +100,7 @@ class _Rows:
             if kind == DATA_TYPE:
                 number, row = content[at + 3] | content[at + 4] << 8, content[at + _ROW_AT : after]
                 time = row[7::-1]  # big-endian, so that bytes compare as numbers do
-                if time > latest_time:
+                if time > latest_time and number in self._wanted:
                     latest, latest_time = (at, after), time
                 if number in rows:
                     rows[number].append(row)
@@ -118,6 +120,8 @@ class _Rows:
         if kind == _SUBSCRIPTION_TYPE:
             number = int.from_bytes(message[1:3], "little")
             self.are_regular &= number not in self._rows
+            if self._topics is None or message[3:].decode(errors="replace") in self._topics:
+                self._wanted.add(number)
         elif kind == _FLAG_TYPE:
             self.are_regular &= not any(message[_INCOMPATIBLE_AT:])
 

@@ -28,9 +28,9 @@ def log() -> bytes:
         return world.flight().log.content
 
 
-def assert_equal(content: bytes) -> None:
+def assert_equal(content: bytes, topics: list[str] | None = None) -> None:
     """Compare everything that a reader uses with pyulog's own parser."""
-    (ours, _), theirs = parse_ulog(content, "log"), ULog(LogBytes(content))
+    (ours, _), theirs = parse_ulog(content, "log", topics), ULog(LogBytes(content), topics)
     assert ours.data_list == theirs.data_list
     assert (ours.start_timestamp, ours.last_timestamp) == (theirs.start_timestamp, theirs.last_timestamp)
     assert ours.changed_parameters == theirs.changed_parameters
@@ -53,6 +53,11 @@ def test_only_wanted_topics_are_given(log: bytes) -> None:
     found = parse_ulog(log, "log", ["vehicle_attitude"]).log.data_list
     assert [item.name for item in found] == ["vehicle_attitude"]
     assert found == ULog(LogBytes(log), ["vehicle_attitude"]).data_list
+
+
+@pytest.mark.parametrize("topic", ["vehicle_attitude", "battery_status", "mission_result"])
+def test_log_of_some_topics_ends_with_the_last_of_them(log: bytes, topic: str) -> None:
+    assert_equal(log, [topic])
 
 
 @pytest.mark.parametrize("size", [-1, -7, -100])
