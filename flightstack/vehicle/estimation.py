@@ -79,7 +79,7 @@ class Estimation:
 
     def sensed(self) -> Sensed:
         """Return what the estimator and its sensors know now; valid until the next update."""
-        return Sensed(self.estimator.memory[0], self._feed.newest)
+        return Sensed(self.estimator.memory[0], self._feed.newest, self._now.has_state)
 
     def warm_up(self) -> None:
         """Compile the kernels of the estimator, or load them from the cache."""

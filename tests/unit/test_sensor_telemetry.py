@@ -309,6 +309,18 @@ def test_messages_of_absurd_measurements_are_sent(values: list[float]) -> None:
             assert Link(1, 1).encode(message)
 
 
+def test_places_on_earth_are_not_sent_before_the_first_fix() -> None:
+    memory, samples = sensed_after(SECONDS)[1].memory[0], sensed_after(SECONDS)[0].samples
+    for message_id in (
+        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        mavlink.MAVLINK_MSG_ID_HOME_POSITION,
+        mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
+    ):
+        assert sent(message_id, Sensed(memory, samples, has_origin=False)) == []
+        assert len(sent(message_id, Sensed(memory, samples))) == 1
+    assert sent(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, Sensed(memory, samples, has_origin=False))
+
+
 # ---------------------------------------------------------------------- streams
 
 
