@@ -13,6 +13,7 @@ from flightstack.control.controller_loading import load_controller
 from flightstack.control.loop_parameters import loop_numbers
 from flightstack.params.behaviour import SPECS, Behaviour
 from flightstack.params.config import identity_specs
+from flightstack.params.estimator import ESTIMATOR_SPECS
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
 from flightstack.params.spec import ParamSpec
 from flightstack.params.vehicle import DEFAULT_VEHICLE, load_vehicle
@@ -31,6 +32,8 @@ PX4 has the parameter with the same meaning and unit. A change takes effect at o
 table says "at the next start". Defaults of the loops are those of the vehicle {vehicle} and the gains {gains}; others
 give other defaults, normalised in the same way.
 
+The parameters of the estimator (EKF2) exist on a vehicle that flies on its sensors, `--state estimated`.
+
 Values come, each stronger than the one before, from the defaults, the gains file (`--gains`), the parameter file
 (`--params FILE`, of `flightstack` by default `vehicle.params` in its state directory, `runs/state-<instance>`) and the
 command line (`--param NAME=VALUE`, for this run alone). What a ground station sets is saved in the parameter file, in
@@ -46,7 +49,7 @@ precision of a float32, which MAVLink carries. A controller from another package
 def all_specs() -> list[ParamSpec]:
     """Return every declaration, with both built-in controllers."""
     vehicle, tilt_rad = load_vehicle(DEFAULT_VEHICLE), math.radians(Behaviour().max_tilt_deg)
-    specs = {spec.name: spec for spec in (*SPECS.values(), *identity_specs(1))}
+    specs = {spec.name: spec for spec in (*SPECS.values(), *ESTIMATOR_SPECS.values(), *identity_specs(1))}
     for name in CONTROLLERS:
         numbers = loop_numbers(vehicle, load_controller(name), open_gains(DEFAULT_GAINS), tilt_rad)
         specs.update({spec.name: spec for spec in numbers.specs})

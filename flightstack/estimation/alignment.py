@@ -127,18 +127,20 @@ def set_field(
     start = earth if known else Vector3(cosine * horizontal, sine * horizontal, level.z)
     write_vector(f.nominal, 16, start)
     write_vector(f.nominal, 19, Vector3(0.0, 0.0, 0.0))
-    is_certain = known or math.isfinite(declination_rad)
-    _set_field_variances(f.covariance, start, 0.0 if is_certain else params.declination_rad, params)
+    scale = params.field_scale if known else 1.0  # ``level`` is the measurement itself, which is fused next
+    turn_rad = 0.0 if known or math.isfinite(declination_rad) else params.declination_rad
+    _set_field_variances(f.covariance, start, scale, turn_rad, params)
 
 
 @compiled
-def _set_field_variances(p: Covariance, earth: Vector3, turn_rad: float, params: EstimatorParams) -> None:
-    """Set the covariance of the field: along it by the sensor's scale, across it by the error of its direction."""
-    size, turn = params.field_scale * params.field_scale, turn_rad * turn_rad
+def _set_field_variances(
+    p: Covariance, earth: Vector3, scale: float, turn_rad: float, params: EstimatorParams
+) -> None:
+    """Set the covariance of the field: along it by a share of it, across it by an error of its direction."""
+    size, turn = scale * scale, turn_rad * turn_rad
     reset_variance(p, EARTH_FIELD, 3, params.earth_field_gauss * params.earth_field_gauss)
     p[EARTH_FIELD, EARTH_FIELD] += size * earth.x * earth.x + turn * earth.y * earth.y
     p[EARTH_FIELD, EARTH_FIELD + 1] = (size - turn) * earth.x * earth.y
-    p[EARTH_FIELD + 1, EARTH_FIELD] = (size - turn) * earth.x * earth.y
     p[EARTH_FIELD + 1, EARTH_FIELD + 1] += size * earth.y * earth.y + turn * earth.x * earth.x
     p[EARTH_FIELD + 2, EARTH_FIELD + 2] += size * earth.z * earth.z
     reset_variance(p, BODY_FIELD, 3, params.body_field_gauss * params.body_field_gauss)

@@ -56,8 +56,8 @@ from flightstack.estimation.rings import (
     MAG_ROWS,
     RANGE_RING,
     RANGE_ROWS,
-    TRACK_COLUMNS,
     Rings,
+    count_of_measurements,
     is_due,
     newest_time,
     pop,
@@ -142,7 +142,6 @@ def imu_kernel(memory: RecordArray, sample: FloatArray) -> None:
     # the mean specific force acts in the attitude in the middle of the sample
     dv = _in_start_frame(angle, delta_velocity)
     write_motion(output, time_s, moved(start, angle, dv, dt_s, params.gravity_m_s2))
-    write_vector(output, TRACK_COLUMNS, less_bias(gyro, n.gyro_bias_rad_s, 1.0))
     if sums[0] >= params.period_s - 0.25 * dt_s:
         step = take_step(sums, time_s)
         slot = push(r, IMU_RING, IMU_ROWS)
@@ -151,6 +150,18 @@ def imu_kernel(memory: RecordArray, sample: FloatArray) -> None:
         for _ in range(_STEPS):
             if not _advance(m, f, r, time_s - params.delay_s, params):
                 break
+    _write_state(m, less_bias(gyro, n.gyro_bias_rad_s, 1.0))
+
+
+@compiled
+def _write_state(m: Record, rates: Vector3) -> None:
+    """Write the output in the order of ``VehicleState``."""
+    output, state = m["output"], m["state"]
+    for i in range(3):
+        state[i], state[3 + i] = output[8 + i], output[5 + i]
+    for i in range(4):
+        state[6 + i] = output[1 + i]
+    write_vector(state, 10, rates)
 
 
 @compiled
@@ -221,16 +232,16 @@ def _advance(m: Record, f: Filter, r: Rings, horizon_s: float, params: Estimator
     predict_yaw(m, f, step)
     predict(f, step, params)
     _account_for_gap(m, f)
-    if m["flags"][LANDED] == 1 and _stands(m, params):
-        _rest(m, f, step, params)
-    else:
-        hold_position(m, f, params)
+    stands = m["flags"][LANDED] == 1 and _stands(m, params)
+    has_changed = _rest(m, f, step, params) if stands else hold_position(m, f, params)
     before = count_of_resets(m)
-    _fuse_waiting(m, f, r, params)
+    if _fuse_waiting(m, f, r, params):
+        has_changed = True
     share = 1.0 if params.output_s <= step.dt_s else step.dt_s / params.output_s
     if count_of_resets(m) != before:
         share = 1.0
-    follow(r, m["output"], motion_of(read_nominal(f.nominal)), share, params.gravity_m_s2)
+    if has_changed or share < 1.0:  # else the output has moved as the filter has
+        follow(r, m["output"], motion_of(read_nominal(f.nominal)), share, params.gravity_m_s2)
     pop(r, IMU_RING, IMU_ROWS)
     return True
 
@@ -257,21 +268,22 @@ def _stands(m: Record, params: EstimatorParams) -> bool:
 
 
 @compiled
-def _rest(m: Record, f: Filter, step: DeltaSample, params: EstimatorParams) -> None:
-    """Fuse rest ten times a second."""
+def _rest(m: Record, f: Filter, step: DeltaSample, params: EstimatorParams) -> bool:
+    """Fuse rest ten times a second; return True if it was."""
     if f.clock[0] - m["rest_s"][0] < _REST_PERIOD_S:
-        return
+        return False
     m["rest_s"][0] = f.clock[0]
     if is_platform_at_rest(m, f):
         fuse_rest_velocity(f, params)
     density = max(step.gyro_density.x, step.gyro_density.y, step.gyro_density.z)
     fuse_rest_rate(f, mean_rate(m["sums"]), density / _REST_MEAN_S, params)
+    return True
 
 
 @compiled
-def _fuse_waiting(m: Record, f: Filter, r: Rings, params: EstimatorParams) -> None:
-    """Fuse all measurements that are due; drop those that are too late."""
-    now_s = f.clock[0]
+def _fuse_waiting(m: Record, f: Filter, r: Rings, params: EstimatorParams) -> bool:
+    """Fuse all measurements that are due; drop those that are too late. Return False if none was due."""
+    now_s, waiting = f.clock[0], count_of_measurements(r)
     for _ in range(MAG_ROWS):
         row = r.mag[slot_of(r, MAG_RING, MAG_ROWS, 0)]
         if not is_due(r, MAG_RING, row[0], now_s):
@@ -301,3 +313,4 @@ def _fuse_waiting(m: Record, f: Filter, r: Rings, params: EstimatorParams) -> No
             take_gnss(m, f, row, params)
             take_velocity(m, f, row)
         pop(r, GNSS_RING, GNSS_ROWS)
+    return count_of_measurements(r) != waiting

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from typing import Any
 
 import numpy as np
@@ -25,8 +26,7 @@ from flightstack.estimation.sensor_samples import (
     RangeSample,
 )
 
-_STATE_AT = np.array([8, 9, 10, 5, 6, 7, 1, 2, 3, 4, 11, 12, 13])
-"""Places of position, velocity, attitude and rates in the output."""
+_pack_imu = struct.Struct(f"={IMU_SIZE}d").pack_into
 
 
 class Estimator:
@@ -42,12 +42,16 @@ class Estimator:
         record["clock"][1] = self.params.imu_noise_share
         record["earth"][3] = math.nan
         self.frame: LocalFrame | None = None
-        self._record = record
-        self._flags, self._output = record["flags"], record["output"]
+        self._record, self._flags, self._state = record, record["flags"], record["state"]
         self._imu = np.zeros(IMU_SIZE)
         self._gnss = np.zeros(GNSS_SIZE)
         self._mag = np.zeros(4)
         self._pair = np.zeros(2)
+
+    def set_params(self, params: EstimatorParams, limits: GnssLimits) -> None:
+        """Set the parameters; those of the initial uncertainty have no effect after the alignment."""
+        self.params, self.limits = params, limits
+        self._record["params"] = params
 
     @property
     def aligned(self) -> bool:
@@ -70,10 +74,9 @@ class Estimator:
 
     def imu(self, sample: ImuSample) -> None:
         """Take a sample of the IMU."""
-        x = self._imu
-        x[0], x[1] = sample.time_s, sample.dt_s
-        x[2:5], x[5:8] = sample.gyro_frd_rad_s, sample.accel_frd_m_s2
-        imu_kernel(self.memory, x)
+        time_s, dt_s, gyro, accel = sample
+        _pack_imu(self._imu.data, 0, time_s, dt_s, *gyro, *accel)
+        imu_kernel(self.memory, self._imu)
 
     def imu_row(self, row: FloatArray) -> None:
         """Take a sample of the IMU in its array form, shape (8,)."""
@@ -81,7 +84,7 @@ class Estimator:
 
     def mag(self, sample: MagSample) -> None:
         """Take a sample of the magnetometer."""
-        self._mag[0], self._mag[1:] = sample.time_s - self.params.mag_delay_s, sample.field_frd_gauss
+        self._mag[:] = (sample.time_s - self.params.mag_delay_s, *sample.field_frd_gauss)
         push_kernel(self.memory, MAG_RING, self._mag)
 
     def baro(self, sample: BaroSample) -> None:
@@ -127,12 +130,12 @@ class Estimator:
 
     def state(self) -> VehicleState:
         """Return the output at the time of the latest IMU sample."""
-        x = self._record["output"].tolist()
-        return VehicleState(Vector3(*x[8:11]), Vector3(*x[5:8]), Quaternion(*x[1:5]), Vector3(*x[11:14]))
+        x = self._state.tolist()
+        return VehicleState(Vector3(*x[0:3]), Vector3(*x[3:6]), Quaternion(*x[6:10]), Vector3(*x[10:13]))
 
-    def write_state(self, state: FloatArray) -> None:
-        """Write the output at the time of the latest IMU sample in the array form of ``VehicleState``, shape (13,)."""
-        self._output.take(_STATE_AT, None, state, "clip")
+    def write_state(self, out: FloatArray) -> None:
+        """Write the output to ``out``, shape (13,), in the order of ``VehicleState``."""
+        out[:] = self._state
 
     def deviations(self) -> FloatArray:
         """Return the standard deviation of each error state, shape (27,)."""

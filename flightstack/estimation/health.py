@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from flightstack.core.contract import Record
-from flightstack.estimation.error_state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION
+from flightstack.estimation.error_state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY
 from flightstack.estimation.kalman import BARO, FUSED_S, GNSS_POSITION, GNSS_VELOCITY, MAG, TEST_RATIO
 from flightstack.estimation.memory import ALIGNED
 from flightstack.estimation.sensor_feed import NewestSamples
@@ -33,6 +33,8 @@ class EstimateHealth(NamedTuple):
     refused_s: float
     """Time for which horizontal positions of GNSS have arrived and were refused."""
     horizontal_m: float
+    velocity_m_s: float
+    """Horizontal."""
     tilt_rad: float
     gyro_bias_rad_s: float
     accel_bias_m_s2: float
@@ -44,7 +46,7 @@ class EstimateHealth(NamedTuple):
 
 NO_HEALTH = EstimateHealth(
     False, False, math.inf, False, math.inf, math.inf, math.inf, math.inf, 0.0, math.inf, math.inf,
-    0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    math.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
 )  # fmt: skip
 _RATIOS_AT = EstimateHealth._fields.index("velocity_ratio")
 
@@ -75,6 +77,7 @@ def estimate_health(
         horizon_s - max(position_s, velocity_s) if has_origin else math.inf,
         horizon_s - position_s if has_origin and fix_age_s < 1.0 else 0.0,
         math.sqrt(variance[POSITION] + variance[POSITION + 1]),
+        math.sqrt(variance[VELOCITY] + variance[VELOCITY + 1]),
         math.sqrt(max(variance[ATTITUDE], variance[ATTITUDE + 1])),
         max(map(abs, nominal[_GYRO_BIAS_AT])),
         max(map(abs, nominal[_ACCEL_BIAS_AT])),

@@ -28,10 +28,13 @@ def _start_baro(m: Record, f: Filter, altitude_m: float, params: EstimatorParams
     """Set the barometer's bias so that the first altitude agrees with the height."""
     p = f.covariance
     f.nominal[24] = altitude_m + f.nominal[9]
-    for j in range(ERROR_STATES):
-        p[BARO_BIAS, j] = p[POSITION + 2, j]
-    for j in range(ERROR_STATES):
-        p[j, BARO_BIAS] = p[j, POSITION + 2]
+    at = POSITION + 2
+    for j in range(at):
+        p[j, BARO_BIAS] = p[j, at]
+    for j in range(at, BARO_BIAS):
+        p[j, BARO_BIAS] = p[at, j]
+    for j in range(BARO_BIAS + 1, ERROR_STATES):
+        p[BARO_BIAS, j] = p[at, j]
     p[BARO_BIAS, BARO_BIAS] = p[POSITION + 2, POSITION + 2] + params.baro_noise_m * params.baro_noise_m
     m["flags"][HAS_BARO] = 1
 

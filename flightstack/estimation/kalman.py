@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple, TypeAlias
 
+import numpy as np
+
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
 from flightstack.estimation.error_state import (
@@ -42,6 +44,8 @@ _ADAPTATION = 0.01
 
 _LARGEST_CORRELATION = 0.95
 
+HOLDS_HORIZONTAL = 2.0
+
 Observations: TypeAlias = Annotated[FloatArray, OBSERVATIONS, OBSERVATION_COLUMNS]
 
 
@@ -50,6 +54,7 @@ class Filter(NamedTuple):
 
     nominal: Annotated[FloatArray, 28]
     covariance: Covariance
+    """Only the elements on and above the diagonal count."""
     observations: Observations
     h: ErrorVector
     """Jacobian of the measurement at hand."""
@@ -77,12 +82,10 @@ def clear(x: ErrorVector) -> None:
         x[i] = 0.0
 
 
-@compiled
-def mirror(p: Covariance) -> None:
-    """Copy the elements above the diagonal below it."""
-    for i in range(ERROR_STATES):
-        for j in range(i):
-            p[i, j] = p[j, i]
+def symmetric(p: Covariance) -> Covariance:
+    """Return a covariance with the elements below the diagonal, which the filter does not keep."""
+    whole: FloatArray = np.triu(p) + np.triu(p, 1).T
+    return whole
 
 
 @compiled
@@ -91,7 +94,9 @@ def _project(f: Filter) -> float:
     clear(f.ph)
     for k in range(ERROR_STATES):
         if f.h[k] != 0.0:
-            for i in range(ERROR_STATES):
+            for i in range(k):
+                f.ph[i] += f.h[k] * f.covariance[i, k]
+            for i in range(k, ERROR_STATES):
                 f.ph[i] += f.h[k] * f.covariance[k, i]
     total = 0.0
     for i in range(ERROR_STATES):
@@ -105,7 +110,7 @@ def _correct(f: Filter, innovation: float, variance: float) -> None:
     p, gain, ph = f.covariance, f.gain, f.ph
     for i in range(ERROR_STATES):
         own = gain[i] * variance - ph[i]
-        for j in range(ERROR_STATES):
+        for j in range(i, ERROR_STATES):
             p[i, j] += own * gain[j] - gain[i] * ph[j]
     for i in range(ERROR_STATES):
         p[i, i] = max(p[i, i], 1e-12)
@@ -118,7 +123,7 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
     """Fuse a scalar measurement with the Jacobian ``f.h``; return True if it is within its gate.
 
     With ``holds`` above zero, tilt, velocity, position and accelerometer bias keep their values and their
-    uncertainty (a Schmidt-Kalman update).
+    uncertainty (a Schmidt-Kalman update); with ``HOLDS_HORIZONTAL``, horizontal velocity and position.
     """
     o = f.observations
     least, largest = noise.least * noise.least, noise.largest * noise.largest
@@ -141,7 +146,10 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
     o[row, NOISE] = min(max(r + _ADAPTATION * (estimate - r), least), largest)
     for i in range(ERROR_STATES):
         f.gain[i] = f.ph[i] / variance
-    if holds > 0.0:
+    if holds == HOLDS_HORIZONTAL:
+        for i in range(2):
+            f.gain[3 + i], f.gain[6 + i] = 0.0, 0.0
+    elif holds > 0.0:
         f.gain[0], f.gain[1] = 0.0, 0.0
         for i in range(3, 9):
             f.gain[i] = 0.0
@@ -156,8 +164,10 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
 def reset_variance(p: Covariance, at: int, count: int, variance: float) -> None:
     """Make ``count`` states from ``at`` independent of all others, each with ``variance``."""
     for i in range(at, at + count):
-        for j in range(ERROR_STATES):
-            p[i, j], p[j, i] = 0.0, 0.0
+        for j in range(i):
+            p[j, i] = 0.0
+        for j in range(i, ERROR_STATES):
+            p[i, j] = 0.0
         p[i, i] = variance
 
 

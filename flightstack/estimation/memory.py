@@ -56,7 +56,8 @@ MEMORY = np.dtype(
         ("means", "f8", (RINGS, MEAN_SIZE)),
         ("sums", "f8", (SUMS_SIZE,)),
         ("alignment", "f8", (ALIGNMENT_SIZE,)),
-        ("output", "f8", (TRACK_COLUMNS + 3,)),
+        ("output", "f8", (TRACK_COLUMNS,)),
+        ("state", "f8", (13,)),  # the output as VehicleState
         ("earth", "f8", (4,)),  # field NED [gauss], declination [rad], NaN if unknown
         ("field", "f8", (3,)),  # of the body [gauss], the last one at the horizon
         ("last_imu_s", "f8", (1,)),

@@ -12,6 +12,7 @@ import numpy as np
 
 from flightstack.core.contract import FloatArray, Quaternion, Record, Vector3
 from flightstack.estimation.error_state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY
+from flightstack.estimation.kalman import symmetric
 
 _USED = ACCEL_BIAS + 3
 _UPPER: dict[int, Any] = {size: np.triu_indices(size) for size in (6, 9)}
@@ -44,7 +45,7 @@ def upper_triangle(matrix: FloatArray) -> list[float]:
 
 def _transformed(memory: Record, jacobian: FloatArray) -> FloatArray:
     with np.errstate(all="ignore"):  # a diverged filter has infinite covariances
-        result: FloatArray = jacobian @ memory["covariance"][:_USED, :_USED] @ jacobian.T
+        result: FloatArray = jacobian @ symmetric(memory["covariance"][:_USED, :_USED]) @ jacobian.T
     return result
 
 

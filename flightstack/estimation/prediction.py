@@ -24,7 +24,7 @@ from flightstack.estimation.error_state import (
     write_nominal,
 )
 from flightstack.estimation.estimator_params import EstimatorParams
-from flightstack.estimation.kalman import Filter, mirror
+from flightstack.estimation.kalman import Filter
 
 
 class DeltaSample(NamedTuple):
@@ -142,6 +142,5 @@ def predict(f: Filter, sample: DeltaSample, params: EstimatorParams) -> None:
     after = moved(motion_of(n), angle, delta_velocity, sample.dt_s, params.gravity_m_s2)
     predict_covariance(f.covariance, middle, delta_velocity, sample.dt_s)
     _add_process_noise(f, middle, sample, params)
-    mirror(f.covariance)
     write_nominal(f.nominal, with_motion(n, after))
     f.clock[0] = sample.time_s

@@ -41,6 +41,15 @@ def slot_of(rings: Rings, ring: int, size: int, number: int) -> int:
 
 
 @compiled
+def count_of_measurements(rings: Rings) -> int:
+    """Return the number of rows that wait in all rings but that of the IMU."""
+    total: int = 0
+    for ring in range(IMU_RING):
+        total += rings.cursors[ring, 1]
+    return total
+
+
+@compiled
 def is_due(rings: Rings, ring: int, row_s: float, now_s: float) -> bool:
     """Return True if the ring has rows and its oldest one, measured at ``row_s``, is not in the future."""
     count: int = rings.cursors[ring, 1]

@@ -68,8 +68,8 @@ class StateEstimator(Protocol):
         """Take a sample of the rangefinder."""
         ...
 
-    def write_state(self, state: FloatArray) -> None:
-        """Write the state at the time of the newest sample of the inertial sensor, shape (13,)."""
+    def write_state(self, out: FloatArray) -> None:
+        """Write the state at the time of the newest sample of the inertial sensor, as ``VehicleState``, shape (13,)."""
         ...
 
 

@@ -72,14 +72,18 @@ def take_field(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) -
 
 @compiled
 def take_earth_field(m: Record, f: Filter, params: EstimatorParams) -> None:
-    """Correct yaw and field with the Earth's field, now known, as far as they depend on it."""
+    """Correct yaw and field with the Earth's field, now known.
+
+    On the ground, or if it is far off, the yaw is aligned again. In flight it changes as far as it depends on the
+    field.
+    """
     if m["flags"][HAS_MAG] == 0 or m["flags"][MAG_FAULT] == 1:
         return
     known, before = read_vector(m["earth"], 0), read_nominal(f.nominal)
     held = before.earth_field_ned_gauss
     was_rad = atan2(held.y, held.x)
     change_rad = wrap_pi(atan2(known.y, known.x) - was_rad)
-    if abs(change_rad) > _LARGEST_TURN_RAD:
+    if m["flags"][LANDED] == 1 or abs(change_rad) > _LARGEST_TURN_RAD:
         align_yaw(f, read_vector(m["field"], 0), known, m["earth"][3], params)
     else:
         _fuse_declination(f, was_rad, change_rad)

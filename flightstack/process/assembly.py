@@ -200,7 +200,7 @@ def _join(
         simulator.state, simulator.rotor_speed_rad_s, simulator,
     )  # fmt: skip
     parts.warm_up(with_streams=not config.lockstep)
-    autopilot, estimation = _on_sensors(parts, simulator, recorder, config.home)
+    autopilot, estimation = _on_sensors(parts, simulator, params, recorder, config.home)
     connect_parameters(params, parts, recorder)
     timing = LoopTiming(round(1e9 / loop_rates.inner_hz))
     report = TimingReport(timing, loop_rates, config.lockstep)
@@ -221,7 +221,11 @@ def _join(
 
 
 def _on_sensors(
-    parts: VehicleParts, simulator: SimulatorEndpoint, recorder: FlightRecorder, home: GeoPoint
+    parts: VehicleParts,
+    simulator: SimulatorEndpoint,
+    params: ParamStore,
+    recorder: FlightRecorder,
+    home: GeoPoint,
 ) -> tuple[TickingAutopilot, Estimation | None]:
     """Return the autopilot to tick; that of a vehicle on sensors estimates its state first.
 
@@ -231,7 +235,7 @@ def _on_sensors(
         return parts.autopilot, None
     users = Users(parts.area, parts.failsafes, parts.navigator, parts.backend, parts.journal)
     sensor_recorder = SensorRecorder(recorder, parts.places.frame, home)
-    estimation = Estimation(simulator.sensors, parts.now, users, sensor_recorder, simulator.truth)
+    estimation = Estimation(simulator.sensors, parts.now, users, params, sensor_recorder, simulator.truth)
     estimation.warm_up()
     return SensorAutopilot(parts.autopilot, estimation), estimation
 

@@ -24,7 +24,7 @@ from gcs_cli.fly.fly_options import outer_rate_hz
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.endpoint import LOOPBACK, parse_endpoint, vehicle_connection
-from gcs_cli.report.run_directory import LOG_NAME, SIMULATOR, STACK
+from gcs_cli.run_directory import LOG_NAME, SIMULATOR, STACK
 
 READY = b"ready\n"
 """Line of the guard when both processes have their ports."""

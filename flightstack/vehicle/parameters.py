@@ -10,7 +10,8 @@ from flightstack.control.backend import ControlBackend
 from flightstack.control.controller_loading import controller_error
 from flightstack.flight_log.recorder import FlightRecorder
 from flightstack.params.behaviour import FIELDS, SPECS, Behaviour
-from flightstack.params.config import StackConfig, identity_specs
+from flightstack.params.config import ESTIMATED, StackConfig, identity_specs
+from flightstack.params.estimator import ESTIMATOR_SPECS
 from flightstack.params.param_file import NOTHING_LOADED, LoadedParams, load_into
 from flightstack.params.spec import ParamSpec
 from flightstack.params.store import ParamStore, apply_assignments
@@ -27,7 +28,8 @@ class Parameters(NamedTuple):
 
 def declared(config: StackConfig, of_loops: Iterable[ParamSpec]) -> list[ParamSpec]:
     """Return the declarations of all parameters; raise ConfigError if a controller redeclares a name."""
-    specs = {spec.name: spec for spec in (*SPECS.values(), *identity_specs(config.system_id))}
+    of_estimator = ESTIMATOR_SPECS.values() if config.state == ESTIMATED else ()
+    specs = {spec.name: spec for spec in (*SPECS.values(), *of_estimator, *identity_specs(config.system_id))}
     for spec in of_loops:
         if specs.setdefault(spec.name, spec) is not spec:
             problem = f"declares the parameter {spec.name}, which the vehicle has already"

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import webbrowser
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -12,10 +12,11 @@ import typer
 
 from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.core.errors import ConfigError
+from flightstack.params.estimator import ESTIMATOR_SPECS
 from flightstack.params.store import read_assignment
 from flightstack.process.command_line import make_app
 from gcs_cli.errors import USAGE, CliError
-from gcs_cli.estimate.log_samples import READ_PARAMETERS
+from gcs_cli.estimate.log_samples import DECLINATION
 from gcs_cli.estimate.result import Result, estimate_log, quantities, render, rows_of
 from gcs_cli.logs.reader import log_file, read_log
 from gcs_cli.settings import JsonOption, OpenOption, OverwriteOption, output_of
@@ -39,7 +40,10 @@ def estimate(
     param: Annotated[
         list[str] | None,
         typer.Option(
-            "--param", metavar="NAME=VALUE", help="Replace a parameter of the log.", show_default=False
+            "--param",
+            metavar="NAME=VALUE",
+            help="Set a parameter of the filter (EKF2_…).",
+            show_default=False,
         ),
     ] = None,
     overwrite: OverwriteOption = False,
@@ -48,20 +52,18 @@ def estimate(
 ) -> None:
     """Estimate attitude, velocity, position from a log.
 
-    Compares the result with the log's own estimate, and with truth where the log has it. Delays of the sensors,
-    declination and limits of GNSS accuracy are the log's parameters: EKF2_GPS_DELAY, EKF2_MAG_DELAY, EKF2_BARO_DELAY,
-    EKF2_RNG_DELAY, EKF2_MAG_DECL, EKF2_REQ_EPH, EKF2_REQ_EPV, EKF2_REQ_SACC, EKF2_REQ_NSATS.
+    Compares the result with the log's own estimate, and with truth where the log has it. Parameters are those of the
+    vehicle's estimator. A log of PX4 gives the delays of its sensors, EKF2_MAG_DECL and EKF2_REQ_EPH, _EPV, _SACC and
+    _NSATS; a log of this flight stack gives all.
     """
     page = out if out is not None or not open_page else log_file(log).with_suffix(".html")
     if page is not None:
         if page.suffix.lower() not in (".html", ".htm"):
             raise CliError(f"--out {page}: give the page a name that ends in .html", USAGE)
         check_new(page, overwrite)
+    given = _given(param or ())
     recording = read_log(log)
-    replaced = _replaced(param or ())
-    if replaced:
-        recording = replace(recording, parameters={**recording.parameters, **replaced}, info=recording.facts)
-    result = estimate_log(recording)
+    result = estimate_log(recording, given)
     if page is not None:
         write_text_atomically(page, render(result, recording))
     sentence = "\n".join(_lines(result, page))
@@ -71,17 +73,24 @@ def estimate(
         webbrowser.open(page.resolve().as_uri())
 
 
-def _replaced(assignments: Sequence[str]) -> dict[str, float]:
-    """Return the parameters of ``--param``; raise CliError (usage) for one that the estimator does not read."""
+def _given(assignments: Sequence[str]) -> dict[str, float]:
+    """Return the parameters of ``--param``; raise CliError (usage) for one that the estimator does not have."""
     found = {}
     for text in assignments:
         try:
             name, value = read_assignment(text)
         except ConfigError as error:
             raise CliError(str(error), USAGE) from None
-        if name not in READ_PARAMETERS:
-            raise CliError(f"--param {name}: the estimator reads {', '.join(READ_PARAMETERS)}", USAGE)
-        found[name] = value
+        spec = ESTIMATOR_SPECS.get(name)
+        if spec is None and name != DECLINATION:
+            names = [*ESTIMATOR_SPECS, DECLINATION]
+            near = difflib.get_close_matches(name, names, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(names)}"
+            raise CliError(f"--param {name}: the estimator has no such parameter; {hint}", USAGE)
+        accepted = value if spec is None else spec.accepted(value)
+        if isinstance(accepted, str):
+            raise CliError(f"--param {name}: {accepted}", USAGE)
+        found[name] = accepted
     return found
 
 

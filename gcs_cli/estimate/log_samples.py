@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from flightstack.core.contract import FloatArray, Vector3
-from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits
+from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits, tuning_of
 from flightstack.estimation.sensor_samples import (
     BaroSample,
     GnssSample,
@@ -17,6 +18,7 @@ from flightstack.estimation.sensor_samples import (
     MagSample,
     RangeSample,
 )
+from flightstack.params.estimator import ESTIMATOR_SPECS
 from gcs_cli.errors import CliError
 from gcs_cli.logs.recording import Recording, Topic
 
@@ -33,17 +35,15 @@ class Landed(NamedTuple):
 _ORDER: dict[type, int] = {ImuSample: 1, Landed: 2}
 """At equal times, measurements precede the IMU, whose step may fuse them, and the land detector, which reads the state,
 comes last."""
-READ_PARAMETERS = (
-    "EKF2_GPS_DELAY", "EKF2_MAG_DELAY", "EKF2_BARO_DELAY", "EKF2_RNG_DELAY", "EKF2_MAG_DECL",
+DECLINATION = "EKF2_MAG_DECL"
+_OF_SENSORS = (
+    "EKF2_GPS_DELAY", "EKF2_MAG_DELAY", "EKF2_BARO_DELAY", "EKF2_RNG_DELAY",
     "EKF2_REQ_EPH", "EKF2_REQ_EPV", "EKF2_REQ_SACC", "EKF2_REQ_NSATS",
 )  # fmt: skip
-"""Parameters of a log that the estimator reads, with PX4's names and units."""
-_LARGEST_DELAY_S = 0.35
-"""The ring of IMU steps holds a little more."""
+"""Parameters that describe the sensors of a vehicle, which hold for any filter."""
 _STANDARD_PRESSURE_HPA = 1013.25
 _IN_AIR_BIT = 1 << 7
 """``estimator_status.control_mode_flags`` of PX4."""
-_HORIZON_MARGIN_S = 0.012
 _LONGEST_IMU_STEP_S = 0.1
 _ROUNDING_S = 1e-7
 """Difference of two times that is one of their rounding: the stated step is exact."""
@@ -78,35 +78,21 @@ def samples_of(log: Recording) -> list[Sample | Landed]:
     return sorted(found, key=lambda sample: (sample.time_s, _ORDER.get(type(sample), 0)))
 
 
-def params_of(log: Recording) -> tuple[EstimatorParams, GnssLimits, float]:
-    """Return the filter's parameters, limits of GNSS, and declination [rad] from the parameters of the log."""
-    logged = {name: float(value) for name, value in log.parameters.items()}
+def params_of(
+    log: Recording, given: Mapping[str, float] = MappingProxyType({})
+) -> tuple[EstimatorParams, GnssLimits, float]:
+    """Return the filter's parameters, limits of GNSS, and declination [rad], NaN if unknown.
 
-    def get(name: str, otherwise: float) -> float:
-        return logged.get(name, otherwise)
-
-    delays_s = [
-        min(max(get(f"EKF2_{sensor}_DELAY", 0.0) * 1e-3, 0.0), _LARGEST_DELAY_S)
-        for sensor in ("GPS", "MAG", "BARO", "RNG")
-    ]
-    base = EstimatorParams()
-    if "EKF2_GPS_DELAY" not in logged:
-        delays_s[0] = base.gnss_delay_s
-    params = base._replace(
-        gnss_delay_s=delays_s[0],
-        mag_delay_s=delays_s[1],
-        baro_delay_s=delays_s[2],
-        range_delay_s=delays_s[3],
-        delay_s=max(delays_s) + _HORIZON_MARGIN_S,
-    )
-    least = GnssLimits()
-    limits = GnssLimits(
-        get("EKF2_REQ_EPH", least.eph_m),
-        get("EKF2_REQ_EPV", least.epv_m),
-        get("EKF2_REQ_SACC", least.speed_accuracy_m_s),
-        get("EKF2_REQ_NSATS", least.satellites),
-    )
-    return params, limits, math.radians(get("EKF2_MAG_DECL", math.nan))
+    A log of this flight stack gives all parameters, another one those of its sensors; ``given`` replaces them.
+    """
+    is_own = log.info.get("sys_name") == "flightstack"
+    logged = {
+        name: min(max(float(value), ESTIMATOR_SPECS[name].low), ESTIMATOR_SPECS[name].high)
+        for name, value in log.parameters.items()
+        if name in (ESTIMATOR_SPECS if is_own else _OF_SENSORS)
+    }
+    declination_deg = given.get(DECLINATION, log.parameters.get(DECLINATION, math.nan))
+    return *tuning_of({**logged, **given}), math.radians(declination_deg)
 
 
 def _rows(topic: Topic, names: list[str]) -> FloatArray | None:

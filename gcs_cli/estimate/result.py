@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -70,9 +71,12 @@ class Result:
         return None if found is None else summary_of(found)
 
 
-def estimate_log(log: Recording) -> Result:
-    """Run the filter over a log and compare it; raise CliError if the log's sensors do not suffice."""
-    estimate = run(log)
+def estimate_log(log: Recording, given: Mapping[str, float] = MappingProxyType({})) -> Result:
+    """Run the filter over a log, with parameters ``given`` by name, and compare it.
+
+    Raise CliError if the log's sensors do not suffice.
+    """
+    estimate = run(log, given)
     others = {OWN: logged_track(log), TRUTH: logged_track(log, "_groundtruth")}
     known = {name: track for name, track in others.items() if track is not None}
     reference = known.get(TRUTH, known.get(OWN, estimate.track))

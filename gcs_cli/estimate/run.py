@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -40,13 +41,14 @@ class Estimate:
     resets: FloatArray
 
 
-def run(log: Recording) -> Estimate:
-    """Run the filter; raise CliError if the log's sensors do not suffice.
+def run(log: Recording, given: Mapping[str, float]) -> Estimate:
+    """Run the filter with parameters ``given`` by name; raise CliError if the log's sensors do not suffice.
 
-    The log of a vehicle of this version has the filter's memory at its start in ``log.info``: the filter continues from
-    it, and so repeats the flown estimate.
+    The log of a vehicle of this version has the filter's memory at its start in ``log.info``: without other parameters
+    the filter continues from it, and so repeats the flown estimate.
     """
-    estimator = _continued(log) or _new(log)
+    estimator = None if given else _continued(log)
+    estimator = estimator or _new(log, given)
     keeper = _Keeper(estimator)
     year = log.year or FIELD_YEAR
     for sample in samples_of(log):
@@ -75,8 +77,8 @@ def _continued(log: Recording) -> Estimator | None:
     return restored(start) if isinstance(start, bytes) else None
 
 
-def _new(log: Recording) -> Estimator:
-    params, limits, declination_rad = params_of(log)
+def _new(log: Recording, given: Mapping[str, float]) -> Estimator:
+    params, limits, declination_rad = params_of(log, given)
     estimator = Estimator(params, limits)
     if math.isfinite(declination_rad):
         estimator.set_declination(declination_rad)

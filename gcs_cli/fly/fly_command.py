@@ -16,8 +16,8 @@ from gcs_cli.fly.fly_options import checked_plan
 from gcs_cli.fly.fly_run import fly, write_results
 from gcs_cli.report.conditions import conditions
 from gcs_cli.report.flight_outcome import Code
-from gcs_cli.report.run_directory import REPORT_NAME
 from gcs_cli.report.summary import max_overshoot_m
+from gcs_cli.run_directory import REPORT_NAME
 
 
 def run_fly(options: FlyOptions, run: RunOptions, out: Path | None) -> None:

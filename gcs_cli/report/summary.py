@@ -54,6 +54,8 @@ class RunInfo:
     torque_gust: float | None = None
     force: str | None = None
     torque: str | None = None
+    slope: float | None = None
+    boat: str | None = None
     battery_start: float | None = None
     battery_capacity: float | None = None
     battery_drain: float | None = None
@@ -126,6 +128,8 @@ def _conditions(run: RunInfo, flight: Flight) -> dict[str, Any]:
         "torque_gust_n_m": run.torque_gust,
         "force_n": _numbers(run.force),
         "torque_n_m": _numbers(run.torque),
+        "slope_deg": run.slope,
+        "boat_m_s": _numbers(run.boat),
         "battery_start_percent": run.battery_start,
         "battery_capacity_mah": run.battery_capacity,
         "battery_drain": run.battery_drain,

@@ -22,7 +22,7 @@ from gcs_cli.fly.processes import Children, Interruption
 from gcs_cli.link import calls
 from gcs_cli.link.session import Session
 from gcs_cli.output import Output
-from gcs_cli.report.run_directory import SIMULATOR, STACK
+from gcs_cli.run_directory import SIMULATOR, STACK
 from gcs_cli.sim.sim_flags import SimOptions
 from gcs_cli.sim.sim_vehicles import (
     NONE,

@@ -18,14 +18,16 @@ from gcs_cli.link.connection import Connection
 from gcs_cli.link.session import Session
 from gcs_cli.link.subscription import ROTORS_AND_TIMING
 from gcs_cli.tui.fly.history import History
+from gcs_cli.tui.map.traffic import MESSAGES as TRAFFIC_MESSAGES
 from gcs_cli.tui.map.traffic import Traffic
 from gcs_cli.tui.messages.message_log import MessageLog
 from gcs_cli.vehicle.view_types import VehicleView
 
 Value = TypeVar("Value")
 
-GATHER_S = 0.02
-"""Messages are received in batches of this time, except during a job: one wake-up costs as much as one message."""
+GATHER_S = 0.05
+"""Messages are received in batches of this time: a wake-up costs several messages. Not during a job, nor while the
+answer that measures the round trip is awaited."""
 _STEP_S = 0.05
 
 
@@ -165,11 +167,20 @@ class Feed:
     def _observe(self, message: Message) -> None:
         now_s = self.now_s
         self.history.record(message, now_s)
-        self.traffic.record(message, now_s)
+        if message.get_msgId() in TRAFFIC_MESSAGES:
+            self._observe_traffic(message, now_s)
+
+    def _observe_traffic(self, message: Message, now_s: float) -> None:
+        view = self.view
+        self.traffic.record(message, now_s, casts_parameters=view.autopilot.casts_parameters)
+        if view.identity is not None and view.identity.system_id == message.get_srcSystem():
+            request = self.traffic.own_address_request(message, now_s)
+            if request is not None and not self._connection.is_recording:
+                self._connection.send(request)
 
     def _run(self) -> None:
         try:
-            while not self._stopping.wait(GATHER_S):
+            while not self._stopping.wait(self._pause_s()):
                 while self._jobs and not self.is_stopping:
                     self._execute(self._jobs.popleft())
                 self._connection.step(self.now_s + _STEP_S)
@@ -178,6 +189,9 @@ class Feed:
         finally:
             while self._jobs:
                 self._jobs.popleft().future.cancel()
+
+    def _pause_s(self) -> float:
+        return 0.0 if self._connection.session.awaits_round_trip(self.now_s) else GATHER_S
 
     def _serve(self) -> None:
         """Begin the actions, and follow the messages and the effects; after every step of the link, in jobs too.
@@ -244,8 +258,6 @@ def result_text(action: Action, result: Result) -> str:
     """Return how an action ended, and when its effect was seen."""
     if result.outcome is Outcome.DONE:
         return f"{result.sentence} after {result.elapsed_s:.1f} s"
-    if result.outcome is Outcome.ACKNOWLEDGED:
-        return f"accepted: {action.doing}"
     return result.sentence
 
 

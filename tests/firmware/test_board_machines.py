@@ -21,7 +21,8 @@ from gcs_cli.pil.conformance.link_checks import all_bytes, burst, cut_frame, siz
 from gcs_cli.pil.conformance.loop_checks import expected_outputs, stepped, vectors
 from gcs_cli.pil.conformance.run import conformance
 from tests.firmware.board_builds import image
-from tests.firmware.board_machines import BoardMachine, Nucleo, Pico2, RegisterMisuseError
+from tests.firmware.board_machines import BoardMachine, Nucleo, RegisterMisuseError
+from tests.firmware.pico2_machine import Pico2
 from tests.firmware.step_machines import tool
 from tests.support.tools import NIGHTLY
 

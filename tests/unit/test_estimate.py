@@ -6,12 +6,14 @@ import json
 import lzma
 import math
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from flightstack.core.earth_field import earth_field_ned_gauss
 from flightstack.core.geodesy import GeoPoint
+from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.sensor_samples import GnssSample
 from gcs_cli.__main__ import main
 from gcs_cli.errors import USAGE
@@ -136,3 +138,21 @@ def test_estimate_is_closer_to_truth_than_that_of_px4(name: str, capsys: pytest.
     for key in ours:
         if "_rms_" in key:
             assert ours[key] < px4[key], key
+
+
+def test_parameters_of_the_filter_have_their_range(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["estimate", str(log), "--json", "--param", "EKF2_GPS_V_NOISE=3"]) == 0
+    rough = json.loads(capsys.readouterr().out)["to_truth"]["velocity_horizontal_rms_m_s"]
+    assert main(["estimate", str(log), "--json"]) == 0
+    assert rough > 1.5 * json.loads(capsys.readouterr().out)["to_truth"]["velocity_horizontal_rms_m_s"]
+    assert main(["estimate", str(log), "--param", "EKF2_GPS_V_NOISE=30"]) == USAGE
+    assert "outside 0.01 to 5 m/s" in capsys.readouterr().err
+
+
+def test_noises_of_a_log_of_px4_are_not_those_of_this_filter(log: Path) -> None:
+    foreign = replace(read_log(log), parameters={"EKF2_GPS_V_NOISE": 0.5, "EKF2_GPS_DELAY": 200.0})
+    params, _, _ = params_of(foreign)
+    assert params.gnss_velocity_noise_m_s == EstimatorParams().gnss_velocity_noise_m_s
+    assert params.gnss_delay_s == pytest.approx(0.2)
+    own = replace(foreign, info={"sys_name": "flightstack"})
+    assert params_of(own)[0].gnss_velocity_noise_m_s == pytest.approx(0.5)

@@ -10,6 +10,7 @@ import pytest
 
 from flightstack.core.errors import ConfigError
 from flightstack.mavlink.dialect import mavlink
+from flightstack.params.vehicle import GRAVITY_M_S2
 from flightstack.testing import Setup, World, load_scenario, run_scenario
 from flightstack.testing.link import PERFECT
 from flightstack.testing.properties import Signals, Window, always
@@ -42,6 +43,18 @@ def test_fault_that_begins_later_is_an_event_then() -> None:
         assert not world.events
         world.run_for(0.6)
         assert [(round(event.time_s, 1), event.name) for event in world.events] == [(0.5, "fault")]
+
+
+def test_fault_of_a_sensor_is_refused_on_the_true_state() -> None:
+    with World(state="truth") as world, pytest.raises(ConfigError, match="flies on the true state"):
+        world.fault("sensor:mag:off")
+
+
+def test_gravity_of_the_filter_is_that_of_the_simulator() -> None:
+    with World(state="estimated") as world:
+        estimation = world.engine.stack.estimation
+        assert estimation is not None
+        assert estimation.estimator.params.gravity_m_s2 == GRAVITY_M_S2
 
 
 def test_setup_and_conditions_are_not_mixed() -> None:

@@ -28,7 +28,7 @@ from gcs_cli.tui.params.model import (
     param_row,
     parse_param,
 )
-from gcs_cli.tui.widgets.drawing import watch_app
+from gcs_cli.tui.widgets.drawing import LineWidget, watch_app
 from gcs_cli.tui.widgets.entry_form import Entry, EntryForm
 from gcs_cli.tui.widgets.job_screen import JobScreen, some_of
 from gcs_cli.tui.widgets.row_list import RowList, title_text
@@ -70,10 +70,10 @@ class ParamScreen(JobScreen):
 
     def compose_body(self) -> ComposeResult:
         """Yield the line of state, the table, the details and the search field."""
-        yield Static(id="param-state")
+        yield LineWidget(id="param-state")
         with Container(id="param-body"):
             with Vertical(id="param-table"):
-                yield Static(id="param-titles")
+                yield LineWidget(id="param-titles")
                 yield RowList(id="param-rows")
             with VerticalScroll(id="param-side", can_focus=False):
                 yield Static(id="param-details")
@@ -158,7 +158,8 @@ class ParamScreen(JobScreen):
 
     def _show_titles(self) -> None:
         columns = param_columns(self.rows.size.width, self._compared())
-        self.query_one("#param-titles", Static).update(title_text(columns, watch_app(self).palette.muted))
+        titles = title_text(columns, watch_app(self).palette.muted)
+        self.query_one("#param-titles", LineWidget).show_line(titles)
 
     def _show_details(self) -> None:
         parameter, details = self.selected, Text()

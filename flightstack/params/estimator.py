@@ -1,0 +1,104 @@
+"""Parameters of the estimator, with PX4's names, units and meanings; defaults are those of this filter."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from flightstack.params.spec import ParamSpec
+
+GROUP = "EKF2"
+_MS, _US = 1e-3, 1e-6
+_STEP = math.sqrt(0.008)
+"""From PX4's noise of a step of 8 ms to a density."""
+
+
+class EstimatorParam(NamedTuple):
+    """A parameter, and the field of the filter's parameters or GNSS limits that has its value times ``factor``."""
+
+    spec: ParamSpec
+    field: str
+    factor: float = 1.0
+
+
+def _param(
+    name: str, default: float, low: float, high: float, unit: str, text: str, field: str, factor: float = 1.0,
+    decimals: int = 3, integer: bool = False,
+) -> EstimatorParam:  # fmt: skip
+    spec = ParamSpec(name, default, low, high, unit, text, integer, GROUP, 0 if integer else decimals)
+    return EstimatorParam(spec, field, factor)
+
+
+ESTIMATOR_PARAMS = (
+    _param("EKF2_PREDICT_US", 8000, 1000, 20000, "us", "Least time between two predictions", "period_s", _US,
+           integer=True),
+    _param("EKF2_TAU_VEL", 0.0, 0.0, 1.0, "s", "Time constant with which the output follows the filter; 0 at once",
+           "output_s"),
+    # process
+    _param("EKF2_GYR_NOISE", 0.009, 1e-4, 0.1, "rad/s", "Gyro noise for the prediction", "gyro_noise", _STEP, 4),
+    _param("EKF2_ACC_NOISE", 0.135, 0.01, 1.0, "m/s^2", "Accelerometer noise for the prediction", "accel_noise", _STEP),
+    _param("EKF2_GYR_B_NOISE", 0.0034, 0.0, 0.01, "rad/s^2", "Process noise of the gyro bias", "gyro_bias_walk", _STEP,
+           4),
+    _param("EKF2_ACC_B_NOISE", 0.011, 0.0, 0.1, "m/s^3", "Process noise of the accelerometer bias", "accel_bias_walk",
+           _STEP),
+    _param("EKF2_MAG_E_NOISE", 0.0011, 0.0, 0.1, "gauss/s", "Process noise of the Earth's magnetic field",
+           "earth_field_walk", _STEP, 4),
+    _param("EKF2_MAG_B_NOISE", 0.022, 0.0, 0.1, "gauss/s", "Process noise of the body's magnetic field",
+           "body_field_walk", _STEP),
+    _param("EKF2_WIND_NSD", 0.05, 0.0, 1.0, "m/s^2/sqrt(Hz)", "Process noise density of the wind", "wind_walk"),
+    # initial uncertainty
+    _param("EKF2_ANGERR_INIT", 0.05, 0.0, 0.5, "rad", "Initial uncertainty of tilt", "tilt_rad"),
+    _param("EKF2_GBIAS_INIT", 0.02, 0.0, 0.2, "rad/s", "Initial uncertainty of the gyro bias", "gyro_bias_rad_s"),
+    _param("EKF2_ABIAS_INIT", 0.1, 0.0, 0.5, "m/s^2", "Initial uncertainty of the accelerometer bias",
+           "accel_bias_m_s2"),
+    # GNSS
+    _param("EKF2_GPS_DELAY", 110.0, 0.0, 300.0, "ms", "Delay of GNSS measurements", "gnss_delay_s", _MS, 1),
+    _param("EKF2_GPS_V_NOISE", 0.05, 0.01, 5.0, "m/s", "Least noise of GNSS velocity", "gnss_velocity_noise_m_s"),
+    _param("EKF2_GPS_P_NOISE", 0.1, 0.01, 10.0, "m", "Least noise of GNSS position", "gnss_position_noise_m"),
+    _param("EKF2_GPS_V_GATE", 5.0, 1.0, 100.0, "SD", "Gate of GNSS velocity", "gnss_velocity_gate", 1.0, 1),
+    _param("EKF2_GPS_P_GATE", 5.0, 1.0, 100.0, "SD", "Gate of GNSS position", "gnss_position_gate", 1.0, 1),
+    # height
+    _param("EKF2_BARO_DELAY", 0.0, 0.0, 300.0, "ms", "Delay of the barometer", "baro_delay_s", _MS, 1),
+    _param("EKF2_BARO_NOISE", 0.1, 0.01, 15.0, "m", "Least noise of the barometer", "baro_noise_m"),
+    _param("EKF2_BARO_GATE", 5.0, 1.0, 100.0, "SD", "Gate of the barometer", "baro_gate", 1.0, 1),
+    _param("EKF2_RNG_DELAY", 5.0, 0.0, 300.0, "ms", "Delay of the rangefinder", "range_delay_s", _MS, 1),
+    _param("EKF2_RNG_NOISE", 0.1, 0.01, 10.0, "m", "Least noise of the rangefinder", "range_noise_m"),
+    _param("EKF2_RNG_GATE", 5.0, 1.0, 100.0, "SD", "Gate of the rangefinder", "range_gate", 1.0, 1),
+    # magnetometer
+    _param("EKF2_MAG_DELAY", 0.0, 0.0, 300.0, "ms", "Delay of the magnetometer", "mag_delay_s", _MS, 1),
+    _param("EKF2_MAG_NOISE", 0.005, 0.001, 1.0, "gauss", "Least noise of the magnetometer", "mag_noise_gauss"),
+    _param("EKF2_MAG_GATE", 3.0, 1.0, 100.0, "SD", "Gate of the magnetometer", "mag_gate", 1.0, 1),
+    # first fix
+    _param("EKF2_REQ_EPH", 3.0, 2.0, 100.0, "m", "Horizontal accuracy that the first fix needs", "eph_m", 1.0, 1),
+    _param("EKF2_REQ_EPV", 5.0, 2.0, 100.0, "m", "Vertical accuracy that the first fix needs", "epv_m", 1.0, 1),
+    _param("EKF2_REQ_SACC", 0.5, 0.1, 5.0, "m/s", "Accuracy of speed that the first fix needs", "speed_accuracy_m_s",
+           1.0, 2),
+    _param("EKF2_REQ_NSATS", 6, 4, 12, "", "Satellites that the first fix needs", "satellites", integer=True),
+)  # fmt: skip
+
+ESTIMATOR_SPECS: Mapping[str, ParamSpec] = {param.spec.name: param.spec for param in ESTIMATOR_PARAMS}
+"""Declarations by name."""
+
+_DEFAULTS = {param.field: param.spec.default * param.factor for param in ESTIMATOR_PARAMS}
+_HORIZON_MARGIN_S = 0.012
+"""Time by which the filter runs behind the latest measurement, more than one of its steps."""
+
+
+def estimator_default(field: str) -> float:
+    """Return the default of a field."""
+    return _DEFAULTS[field]
+
+
+def fields_of(values: Mapping[str, float]) -> dict[str, float]:
+    """Return fields by name from parameters by name; other parameters are ignored."""
+    return {
+        param.field: values[param.spec.name] * param.factor
+        for param in ESTIMATOR_PARAMS
+        if param.spec.name in values
+    }
+
+
+def horizon_s(*delays_s: float) -> float:
+    """Return the delay of the filter for the delays of its sensors."""
+    return max(delays_s) + _HORIZON_MARGIN_S
