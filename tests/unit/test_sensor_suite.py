@@ -14,6 +14,7 @@ from flightstack.simulator_link.hot_frames import ARMED_FLAG, ActuatorsFrame
 from flightstack.simulator_link.sensor_frames import ACCEL, BARO, GYRO, MAG
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.plant.fault_schedule import parse_fault
+from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.sensors.faults import channels_of
 from sim_bridge.server.failure_command import inject_failure
 from sim_bridge.simulator import Simulator
@@ -116,7 +117,7 @@ def test_optical_flow_message_has_the_angles_over_its_interval() -> None:
 def test_same_seed_gives_the_same_bytes() -> None:
     def sent(seed: int) -> bytes:
         vehicle = with_sensors("consumer")
-        simulator = Simulator(vehicle, options=Simulator(vehicle)._flight.options._replace(seed=seed))
+        simulator = Simulator(vehicle, options=PlantOptions(seed=seed))
         simulator.start_sensors(HOME)
         data = b""
         for _ in range(300):
