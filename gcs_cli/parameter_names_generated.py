@@ -28,6 +28,7 @@ NAMES = (
     "COM_POSCTL_NAVL",
     "COM_POS_FS_EPH",
     "COM_RC_LOSS_T",
+    "COM_VEL_FS_EVH",
     "EKF2_ABIAS_INIT",
     "EKF2_ACC_B_NOISE",
     "EKF2_ACC_NOISE",

@@ -94,7 +94,11 @@ def _server_options(given: options.SimulatorOptions) -> ServerOptions:
     )
     disturbance = _disturbance(given.wind, given.gust, given.force, given.torque, given.torque_gust)
     check_wind(vehicle, plant, disturbance)
-    plant_options = PlantOptions(disturbance, given.seed, battery=battery)
+    boat = arguments.parse_boat(given.boat)
+    slope_rad = arguments.check_slope(given.slope, plant, boat)
+    plant_options = PlantOptions(
+        disturbance, given.seed, battery=battery, slope_rad=slope_rad, boat_ned_m_s=boat
+    )
     default_port = simulator_port(given.instance)
     return ServerOptions(
         vehicle=vehicle,

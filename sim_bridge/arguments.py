@@ -111,6 +111,29 @@ def parse_home(text: str) -> GeoPoint:
     return GeoPoint(latitude, longitude, altitude)
 
 
+def parse_boat(text: str) -> Vector3:
+    """Parse the velocity north and east [m/s] of the ground."""
+    north, east = parse_numbers("--boat", text, (2,))
+    return check_boat(Vector3(north, east, 0.0))
+
+
+def check_boat(velocity: Vector3, flag: str = "--boat") -> Vector3:
+    """Return the velocity of the ground if it is in range."""
+    for value in velocity:
+        check_range(flag, value, -20.0, 20.0)
+    return velocity
+
+
+def check_slope(slope_deg: float, plant: str, boat: Vector3, flag: str = "--slope") -> float:
+    """Return the slope of the ground [rad] if this plant can have it."""
+    check_range(flag, slope_deg, -30.0, 30.0)
+    if slope_deg and plant != "rigid":
+        raise UsageProblemError(f"{flag}: the ground of the {plant} plant is level; use the plant rigid")
+    if slope_deg and any(boat):
+        raise UsageProblemError(f"{flag}: the deck of a boat is level; leave out one of them")
+    return math.radians(slope_deg)
+
+
 def parse_rotor_speeds(text: str, vehicle: Vehicle) -> tuple[float, ...]:
     """Parse one speed [rad/s] for each rotor of the vehicle."""
     speeds = parse_numbers("--rotors", text, (len(vehicle.rotors),))

@@ -32,6 +32,8 @@ Port = Annotated[
 Instance = Annotated[int, typer.Option(metavar="N", help="Number of the vehicle, from 0.", **shared.IN_LINKS)]
 IdealRotors = Annotated[bool, shared.IDEAL_ROTORS]
 PhysicsHz = Annotated[float, shared.PHYSICS_HZ]
+Slope = Annotated[float, shared.SLOPE]
+Boat = Annotated[str, shared.BOAT]
 BatteryStart = Annotated[float | None, shared.BATTERY_START]
 BatteryCapacity = Annotated[float | None, shared.BATTERY_CAPACITY]
 BatteryDrain = Annotated[float | None, shared.BATTERY_DRAIN]
@@ -71,6 +73,8 @@ class SimulatorOptions:
     torque_gust: TorqueGust = 0.0
     ideal_rotors: IdealRotors = False
     physics_hz: PhysicsHz = 1000.0
+    slope: Slope = 0.0
+    boat: Boat = "0,0"
     battery_start: BatteryStart = None
     battery_capacity: BatteryCapacity = None
     battery_drain: BatteryDrain = None

@@ -103,8 +103,8 @@ class Simulator:
         """Measure with the sensors of the vehicle from now on; return False if it has none. ``home`` is the origin."""
         if self.sensors is None and self.vehicle.sensors.numbers:
             sender = Sender(self._system_id, SIMULATOR_COMPONENT)
-            seed = self._flight.options.seed
-            self.sensors = SensorSuite(self.vehicle, home, seed, self._frame, self.plant, sender)
+            options = self._flight.options
+            self.sensors = SensorSuite(self.vehicle, home, options, self._frame, self.plant, sender)
             self.sensors.set_interval_us(self._interval_us)
             self.sensors.prime(self.time_us)
             self.sensors.set_faults(self._schedule.active(self.time_us), self.time_us)

@@ -160,10 +160,10 @@ def section(
 def commands_of(app: typer.Typer) -> Iterator[tuple[str, CommandInfo]]:
     """Yield the commands of a group by name; import those that are loaded on use."""
     lazy = getattr(app.info.cls, "lazy", {})
-    for module in dict.fromkeys(command.module for command in lazy.values()):
-        loaded = dict(commands_of(import_module(module).app))
-        names = (name for name, command in lazy.items() if command.module == module and not command.hidden)
-        yield from ((name, loaded[name]) for name in names)
+    for source in dict.fromkeys((command.module, command.app) for command in lazy.values()):
+        loaded = dict(commands_of(getattr(import_module(source[0]), source[1])))
+        shown = {name: command for name, command in lazy.items() if not command.hidden}
+        yield from ((name, loaded[name]) for name, of in shown.items() if (of.module, of.app) == source)
     for command in app.registered_commands:
         if command.callback is not None and not command.hidden:
             yield command.name or command.callback.__name__.replace("_", "-"), command

@@ -66,8 +66,8 @@ def imports(name: str, tree: ast.Module, known: set[str]) -> Iterator[tuple[str,
                     yield ours, theirs
 
 
-def cycles(modules: dict[str, ast.Module]) -> int:
-    """Return how many packages reach themselves over their imports."""
+def cycles(modules: dict[str, ast.Module]) -> list[str]:
+    """Return the packages that reach themselves over their imports."""
     edges: dict[str, set[str]] = defaultdict(set)
     for name, tree in modules.items():
         for ours, theirs in imports(name, tree, set(modules)):
@@ -84,7 +84,7 @@ def cycles(modules: dict[str, ast.Module]) -> int:
                 waiting.extend(edges[package])
         return False
 
-    return sum(reaches(package) for package in list(edges))
+    return [package for package in list(edges) if reaches(package)]
 
 
 def main() -> None:
@@ -103,7 +103,7 @@ def main() -> None:
             sum(map(has_one_definition, modules.values())),
             sum(map(has_one_small_definition, modules.values())),
             sum(map(index_constants, modules.values())),
-            cycles(modules),
+            len(cycles(modules)),
         )
         print("|", " | ".join(map(str, row)), "|")
 

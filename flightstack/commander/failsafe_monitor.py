@@ -175,6 +175,11 @@ class FailsafeMonitor:
         """True unless the estimate of the position is lost."""
         return Failsafe.POSITION_LOST not in self._estimate
 
+    @property
+    def velocity_is_known(self) -> bool:
+        """True unless the estimate of the velocity is too uncertain to brake by."""
+        return self._health is None or self._health.velocity_m_s <= self._behaviour.velocity_accuracy_m_s
+
     # ------------------------------------------------------------------ inputs
 
     def take_health(self, health: EstimateHealth) -> None:

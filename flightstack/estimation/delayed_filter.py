@@ -28,6 +28,7 @@ from flightstack.estimation.imu_input import (
     take_step,
     write_step,
 )
+from flightstack.estimation.imu_track import IMU_SIZE
 from flightstack.estimation.kalman import Filter
 from flightstack.estimation.memory import (
     ALIGNED,
@@ -72,8 +73,6 @@ from flightstack.estimation.rings import (
 )
 from flightstack.estimation.yaw_sources import predict_yaw, take_earth_field, take_field, take_velocity
 
-IMU_SIZE = 8
-"""Array form of an IMU sample: time, step, rate (3), specific force (3)."""
 _LATE_S = 0.3
 """Measurements that are older than the horizon by this much are dropped."""
 _STEPS = 4

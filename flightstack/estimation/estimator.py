@@ -11,9 +11,10 @@ import numpy as np
 from flightstack.core.contract import FloatArray, Quaternion, RecordArray, Vector3, VehicleState
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.portable_math import atan2
-from flightstack.estimation.delayed_filter import IMU_SIZE, field_kernel, imu_kernel, push_kernel
+from flightstack.estimation.delayed_filter import field_kernel, imu_kernel, push_kernel
 from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits
 from flightstack.estimation.fusion import GNSS_SIZE
+from flightstack.estimation.imu_track import IMU_SIZE
 from flightstack.estimation.memory import ALIGNED, LANDED, MEMORY
 from flightstack.estimation.rings import BARO_RING, GNSS_RING, MAG_RING, RANGE_RING
 from flightstack.estimation.sensor_samples import (
@@ -76,6 +77,10 @@ class Estimator:
         time_s, dt_s, gyro, accel = sample
         _pack_imu(self._imu.data, 0, time_s, dt_s, *gyro, *accel)
         imu_kernel(self.memory, self._imu)
+
+    def imu_row(self, row: FloatArray) -> None:
+        """Take a sample of the IMU in its array form, shape (8,)."""
+        imu_kernel(self.memory, row)
 
     def mag(self, sample: MagSample) -> None:
         """Take a sample of the magnetometer."""

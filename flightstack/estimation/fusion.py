@@ -27,9 +27,11 @@ from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import (
     BARO,
     DRAG,
+    FUSED_S,
     GNSS_POSITION,
     GNSS_VELOCITY,
     HOLD_POSITION,
+    HOLDS_HORIZONTAL,
     INNOVATION,
     INNOVATION_VARIANCE,
     MAG,
@@ -48,6 +50,8 @@ _CONFIRMATION, _LEAST_SHARE = 0.02, 0.01
 _UNKNOWN_M, _UNKNOWN_VERTICAL_M, _UNKNOWN_M_S = 5.0, 8.0, 0.5
 """Accuracies of a GNSS receiver that states none."""
 _AIR_KG_M3, _DRAG_GATE = 1.225, 5.0
+_AIDED_S = 1.0
+"""Time after an accepted GNSS velocity in which the horizontal motion counts as measured."""
 LEAST_COS_TILT = 0.7
 """Cosine of the tilt below which the range finder is not used: 45 degrees."""
 
@@ -132,13 +136,18 @@ def fuse_gnss(
 
 @compiled
 def fuse_baro(f: Filter, altitude_m: float, age_s: float, params: EstimatorParams) -> None:
-    """Fuse a pressure altitude: minus the position down, plus the barometer's bias."""
+    """Fuse a pressure altitude: minus the position down, plus the barometer's bias.
+
+    It leaves horizontal position and velocity alone in dead reckoning: their errors are then so much larger than that
+    of the height that pressure in turns and gusts, which is not white noise, moves them by metres.
+    """
+    is_aided = f.clock[0] - f.observations[GNSS_VELOCITY, FUSED_S] < _AIDED_S
     clear(f.h)
     f.h[POSITION + 2] = -1.0
     f.h[BARO_BIAS] = 1.0
     predicted_m = -(f.nominal[9] - age_s * f.nominal[6]) + f.nominal[24]
     noise = Noise(params.baro_noise_m, 1.0, params.baro_largest_noise_m, params.baro_gate, 0.0)
-    fuse(f, BARO, altitude_m - predicted_m, noise, 0.0)
+    fuse(f, BARO, altitude_m - predicted_m, noise, 0.0 if is_aided else HOLDS_HORIZONTAL)
 
 
 @compiled

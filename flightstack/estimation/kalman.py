@@ -44,6 +44,8 @@ _ADAPTATION = 0.01
 
 _LARGEST_CORRELATION = 0.95
 
+HOLDS_HORIZONTAL = 2.0
+
 Observations: TypeAlias = Annotated[FloatArray, OBSERVATIONS, OBSERVATION_COLUMNS]
 
 
@@ -121,7 +123,7 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
     """Fuse a scalar measurement with the Jacobian ``f.h``; return True if it is within its gate.
 
     With ``holds`` above zero, tilt, velocity, position and accelerometer bias keep their values and their
-    uncertainty (a Schmidt-Kalman update).
+    uncertainty (a Schmidt-Kalman update); with ``HOLDS_HORIZONTAL``, horizontal velocity and position.
     """
     o = f.observations
     least, largest = noise.least * noise.least, noise.largest * noise.largest
@@ -144,7 +146,10 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
     o[row, NOISE] = min(max(r + _ADAPTATION * (estimate - r), least), largest)
     for i in range(ERROR_STATES):
         f.gain[i] = f.ph[i] / variance
-    if holds > 0.0:
+    if holds == HOLDS_HORIZONTAL:
+        for i in range(2):
+            f.gain[3 + i], f.gain[6 + i] = 0.0, 0.0
+    elif holds > 0.0:
         f.gain[0], f.gain[1] = 0.0, 0.0
         for i in range(3, 9):
             f.gain[i] = 0.0

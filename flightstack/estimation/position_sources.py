@@ -6,16 +6,25 @@ import math
 
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Record
-from flightstack.estimation.error_state import BARO_BIAS, GNSS_BIAS, POSITION, VELOCITY
+from flightstack.estimation.error_state import BARO_BIAS, GNSS_BIAS, POSITION, VELOCITY, read_vector
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.fusion import fuse_gnss, fuse_hold, horizontal_accuracy, vertical_accuracy
 from flightstack.estimation.height_sources import reset_height
-from flightstack.estimation.kalman import FUSED_S, GNSS_VELOCITY, Filter, deviation, reset_variance
+from flightstack.estimation.kalman import (
+    FUSED_S,
+    GNSS_POSITION,
+    GNSS_VELOCITY,
+    Filter,
+    deviation,
+    reset_variance,
+)
 from flightstack.estimation.memory import HAS_GNSS, HAS_YAW
-from flightstack.estimation.resets import reset_position, reset_velocity
+from flightstack.estimation.resets import count_correction, reset_position, reset_velocity
 
 _GNSS_LOST_S = 1.0
 _HOLD_PERIOD_S = 0.2
+_COUNTED_M = 0.5
+"""Correction by the first measurement after an outage that counts as a reset."""
 _LONGEST_INTERVAL_S = 2.5
 """Most time that one refused measurement counts."""
 _SPEED_SMOOTHING_S = 2.0
@@ -30,7 +39,12 @@ def take_gnss(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) ->
     elapsed_s = max(0.0, row[0] - m["last_gnss_s"][0])
     m["last_gnss_s"][0] = row[0]
     first = 0 if m["flags"][HAS_YAW] == 1 else 2
+    outage_s = f.clock[0] - f.observations[GNSS_POSITION, FUSED_S]
+    position, velocity = read_vector(f.nominal, 7), read_vector(f.nominal, 4)
     fuse_gnss(f, row, f.clock[0] - row[0], elapsed_s, first, params)
+    dx, dy = f.nominal[7] - position.x, f.nominal[8] - position.y
+    if outage_s > _GNSS_LOST_S and dx * dx + dy * dy > _COUNTED_M * _COUNTED_M:
+        count_correction(m, f, position, velocity)
     _count_refused(m, f, first, min(elapsed_s, _LONGEST_INTERVAL_S))
     share = min(elapsed_s / _SPEED_SMOOTHING_S, 1.0)
     for axis in range(2):

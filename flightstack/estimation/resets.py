@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray, Record
+from flightstack.core.contract import FloatArray, Record, Vector3
 from flightstack.estimation.error_state import GNSS_BIAS, POSITION, VELOCITY
 from flightstack.estimation.fusion import horizontal_accuracy, speed_accuracy, vertical_accuracy
 from flightstack.estimation.kalman import Filter, reset_variance
@@ -40,6 +40,17 @@ def reset_position(m: Record, f: Filter, row: FloatArray, first: int, count: int
         f.nominal[7 + axis], f.nominal[25 + axis], m["refused_s"][3 + axis] = now_m, 0.0, 0.0
     reset_variance(f.covariance, POSITION + first, count, accuracy_m * accuracy_m)
     reset_variance(f.covariance, GNSS_BIAS + first, count, 1e-4)
+
+
+@compiled
+def count_correction(m: Record, f: Filter, position_m: Vector3, velocity_m_s: Vector3) -> None:
+    """Count the horizontal change from an earlier position and velocity as resets of both."""
+    resets, x = m["resets"], f.nominal
+    resets[POSITION_RESET] += 1.0
+    resets[POSITION_RESET + 1], resets[POSITION_RESET + 2] = x[7] - position_m.x, x[8] - position_m.y
+    resets[VELOCITY_RESET] += 1.0
+    resets[VELOCITY_RESET + 1], resets[VELOCITY_RESET + 2] = x[4] - velocity_m_s.x, x[5] - velocity_m_s.y
+    resets[POSITION_RESET + 3], resets[VELOCITY_RESET + 3] = 0.0, 0.0
 
 
 @compiled

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Protocol
 
 from flightstack.core.contract import FloatArray, Vector3
 from flightstack.core.geodesy import LocalFrame
+from flightstack.estimation.imu_track import ImuTrack
 from flightstack.estimation.sensor_samples import (
     BaroSample,
     FlowSample,
@@ -18,7 +18,6 @@ from flightstack.estimation.sensor_samples import (
     MagSample,
     RangeSample,
 )
-from flightstack.estimation.vibration import WINDOW
 from flightstack.simulator_link.sensor_frames import (
     ACCEL,
     ACCEL_AT,
@@ -34,7 +33,7 @@ from flightstack.simulator_link.sensor_frames import (
 )
 from flightstack.simulator_link.sensor_inbox import FlowReport, HilReport, RangeReport, Report
 
-Sample = ImuSample | MagSample | BaroSample | GnssSample | RangeSample | FlowSample
+Sample = MagSample | BaroSample | GnssSample | RangeSample | FlowSample
 _IMU = ACCEL | GYRO
 
 
@@ -49,8 +48,8 @@ class StateEstimator(Protocol):
         """True if the attitude is known."""
         ...
 
-    def imu(self, sample: ImuSample) -> None:
-        """Take a sample of an inertial sensor."""
+    def imu_row(self, row: FloatArray) -> None:
+        """Take a sample of an inertial sensor in its array form, shape (8,)."""
         ...
 
     def mag(self, sample: MagSample) -> None:
@@ -74,30 +73,52 @@ class StateEstimator(Protocol):
         ...
 
 
+class SampleRecorder(Protocol):
+    """Records the samples that an estimator takes."""
+
+    def imu(self, row: FloatArray) -> None:
+        """Record a sample of the inertial sensor in its array form, shape (8,)."""
+        ...
+
+    def sample(self, sample: Sample) -> None:
+        """Record a sample of another sensor."""
+        ...
+
+
+class NoRecorder:
+    """Records nothing."""
+
+    def imu(self, row: FloatArray) -> None:
+        """Leave out a sample of the inertial sensor."""
+
+    def sample(self, sample: Sample) -> None:
+        """Leave out a sample of another sensor."""
+
+
+NO_RECORDER = NoRecorder()
+
+
 @dataclass(slots=True)
 class NewestSamples:
     """Newest sample of each sensor; None before the first one."""
 
-    imu: ImuSample | None = None
+    imu_track: ImuTrack = field(default_factory=ImuTrack)
+    """The last samples of the inertial sensor."""
     mag: MagSample | None = None
     baro: BaroSample | None = None
     gnss: GnssSample | None = None
     range: RangeSample | None = None
     flow: FlowSample | None = None
-    past_imu: deque[ImuSample] = field(default_factory=lambda: deque(maxlen=WINDOW))
-    """The last samples of the inertial sensor, of which the vibration is computed."""
-    imu_repeats: int = 0
-    """Number of samples of the inertial sensor whose rates or forces equal those before."""
+
+    @property
+    def imu(self) -> ImuSample | None:
+        """Newest sample of the inertial sensor."""
+        return self.imu_track.newest
 
 
-def hil_samples(time_s: float, report: HilReport) -> Iterator[ImuSample | MagSample | BaroSample]:
-    """Yield the samples in a HIL_SENSOR: those of which all bits are set, as PX4 takes them.
-
-    The first message has no step, and its inertial measurement no duration: it is left out.
-    """
+def slow_samples(time_s: float, report: HilReport) -> Iterator[MagSample | BaroSample]:
+    """Yield the samples in a HIL_SENSOR but the inertial one: those of which all bits are set, as PX4 takes them."""
     fields, values = report.fields, report.values
-    if fields & _IMU == _IMU and report.step_us > 0:
-        yield ImuSample(time_s, report.step_us * 1e-6, Vector3(*values[GYRO_AT]), Vector3(*values[ACCEL_AT]))
     if fields & MAG == MAG:
         yield MagSample(time_s, Vector3(*values[MAG_AT]))
     if fields & BARO == BARO:
@@ -120,61 +141,53 @@ def gnss_sample(time_s: float, gps: HilGps) -> GnssSample:
     )
 
 
-def samples_of(report: Report) -> Iterator[tuple[int, Sample]]:
-    """Yield the samples in a message, each with the number of the sensor."""
-    time_s, content = report.time_us * 1e-6, report.content
-    if isinstance(content, HilReport):
-        for sample in hil_samples(time_s, content):
-            yield content.number, sample
-    elif isinstance(content, HilGps):
-        yield content.number, gnss_sample(time_s, content)
-    elif isinstance(content, RangeReport):
-        yield 0, RangeSample(time_s, content.distance_m, content.quality)
-    elif isinstance(content, FlowReport):
-        yield (
-            0,
-            FlowSample(time_s, content.dt_s, *content.flow_rad, Vector3(*content.gyro_rad), content.quality),
-        )
+def sample_of(time_s: float, content: HilGps | RangeReport | FlowReport) -> Sample:
+    """Return the sample in a message of another sensor."""
+    if isinstance(content, HilGps):
+        return gnss_sample(time_s, content)
+    if isinstance(content, RangeReport):
+        return RangeSample(time_s, content.distance_m, content.quality)
+    return FlowSample(time_s, content.dt_s, *content.flow_rad, Vector3(*content.gyro_rad), content.quality)
 
 
 class SensorFeed:
     """Feeds an estimator with the first sensor of each kind, and writes its state."""
 
     def __init__(
-        self,
-        estimator: StateEstimator,
-        state: FloatArray,
-        record: Callable[[Sample], object] = lambda _: None,
+        self, estimator: StateEstimator, state: FloatArray, recorder: SampleRecorder = NO_RECORDER
     ) -> None:
-        """``state`` is the array form of ``VehicleState`` to write, in the estimator's local frame.
-
-        ``record`` is called with each sample that the estimator takes.
-        """
-        self._estimator, self._state, self._record = estimator, state, record
+        """``state`` is the array form of ``VehicleState`` to write, in the estimator's local frame."""
+        self._estimator, self._state, self._recorder = estimator, state, recorder
         self.newest = NewestSamples()
 
     def update(self, reports: list[Report]) -> bool:
         """Take the reports; return True if the state is known and was written."""
-        for report in reports:
-            for number, sample in samples_of(report):
-                if number == 0:
-                    self._take(sample)
-                    self._record(sample)
-        estimator, state = self._estimator, self._state
+        for time_us, content in reports:
+            if isinstance(content, HilReport):
+                if content.number == 0:
+                    self._take_hil(time_us * 1e-6, content)
+            elif not isinstance(content, HilGps) or content.number == 0:
+                self._take(sample_of(time_us * 1e-6, content))
+        estimator = self._estimator
         if not estimator.aligned:
             return False
-        estimator.write_state(state)
+        estimator.write_state(self._state)
         return estimator.frame is not None
+
+    def _take_hil(self, time_s: float, report: HilReport) -> None:
+        """Take a HIL_SENSOR. The first one has no step, and its inertial measurement no duration: it is left out."""
+        fields, values = report.fields, report.values
+        if fields & _IMU == _IMU and report.step_us > 0:
+            row = self.newest.imu_track.take(time_s, report.step_us * 1e-6, values[GYRO_AT], values[ACCEL_AT])
+            self._estimator.imu_row(row)
+            self._recorder.imu(row)
+        if fields & ~_IMU:
+            for sample in slow_samples(time_s, report):
+                self._take(sample)
 
     def _take(self, sample: Sample) -> None:
         estimator, newest = self._estimator, self.newest
-        if isinstance(sample, ImuSample):
-            before, newest.imu = newest.imu, sample
-            repeats = before is not None and (before[2] == sample[2] or before[3] == sample[3])
-            newest.imu_repeats = newest.imu_repeats + 1 if repeats else 0
-            newest.past_imu.append(sample)
-            estimator.imu(sample)
-        elif isinstance(sample, MagSample):
+        if isinstance(sample, MagSample):
             newest.mag = sample
             estimator.mag(sample)
         elif isinstance(sample, BaroSample):
@@ -188,3 +201,4 @@ class SensorFeed:
             estimator.range(sample)
         else:
             newest.flow = sample
+        self._recorder.sample(sample)

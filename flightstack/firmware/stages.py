@@ -8,7 +8,7 @@ reference. What remains is the rounding of one stage in one step. Only the integ
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -66,6 +66,8 @@ ROLL, PITCH, YAW, THRUST = (
 )  # fmt: skip
 RESOLUTION = 1e-9
 """Difference of demanded and achieved wrench [N, N m] above which the mixer is saturated, as in the loops."""
+
+_Flags: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
 # bound by ``specialise`` to the laws of the controller
 controller_step: Any = None
@@ -225,17 +227,21 @@ def _adopt(m: Record, attitude: Quaternion, out: FloatArray) -> None:
     store_wrenches(last, demanded, achieved)
 
 
+@compiled
+def _keep(memory: tuple[float, ...], size: int, kept: FloatArray) -> None:
+    """Store the memory of a law, which may have no fields."""
+    for index in range(size):
+        kept[index] = memory[index]
+
+
 def stages_kernel(
-    inputs: FloatArray, flags: np.ndarray[Any, np.dtype[np.int64]], outputs: FloatArray, memory: RecordArray,
-    expected: FloatArray,
-) -> None:  # fmt: skip
+    inputs: FloatArray, flags: _Flags, outputs: FloatArray, memory: RecordArray, expected: FloatArray
+) -> None:
     """Write ``expected`` (n, 32) for ``inputs`` (n, 29), ``flags`` (n,) and the reported ``outputs`` (n, 32).
 
-    A step with a status that is not finite repeats an earlier output, and is taken as it is. ``specialise`` binds the
-    controller to this template.
+    A step whose status is not finite repeats an earlier output. ``specialise`` binds the controller to this template.
     """
-    m = memory[0]
-    mixer = _mixer(m)
+    m, mixer = memory[0], _mixer(memory[0])
     for step in range(len(flags)):
         given, out, wanted = inputs[step], outputs[step], expected[step]
         _aim(m, given, flags[step])
@@ -254,25 +260,18 @@ def stages_kernel(
         advanced, torque = controller_step(
             ControllerMemory(*as_tuple(m["attitude"], CONTROLLER_MEMORY_SIZE)),
             _law_inputs(vehicle, _reported_reference(out), m["last"], mixer.spin),
-            ControllerParams(*as_tuple(m["attitude_params"], CONTROLLER_PARAMS_SIZE)),
-            m["dt_s"],
-        )
-        for index in range(CONTROLLER_MEMORY_SIZE):
-            m["attitude"][index] = advanced[index]
+            ControllerParams(*as_tuple(m["attitude_params"], CONTROLLER_PARAMS_SIZE)), m["dt_s"],
+        )  # fmt: skip
+        _keep(advanced, CONTROLLER_MEMORY_SIZE, m["attitude"])
         wanted[THRUST_AT] = m["target"][4]
         store(wanted[THRUST_AT + 1 :], torque)
         demanded = _reported_wrench(out)
         mixed, achieved = mixer_step(
-            MixerMemory(*as_tuple(m["mixer"], MIXER_MEMORY_SIZE)),
-            demanded,
-            mixer,
-            MixerParams(*as_tuple(m["mixer_params"], MIXER_PARAMS_SIZE)),
-            m["dt_s"],
-            wanted[COMMAND_AT:STATUS_AT],
-            m["work"],
-        )
-        for index in range(MIXER_MEMORY_SIZE):
-            m["mixer"][index] = mixed[index]
+            MixerMemory(*as_tuple(m["mixer"], MIXER_MEMORY_SIZE)), demanded, mixer,
+            MixerParams(*as_tuple(m["mixer_params"], MIXER_PARAMS_SIZE)), m["dt_s"],
+            wanted[COMMAND_AT:STATUS_AT], m["work"],
+        )  # fmt: skip
+        _keep(mixed, MIXER_MEMORY_SIZE, m["mixer"])
         _store_mixed(demanded, achieved, mixer.spin.size, wanted)
         _adopt(m, vehicle.attitude, out)
 

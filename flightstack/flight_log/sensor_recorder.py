@@ -9,7 +9,7 @@ from flightstack.core.contract import FloatArray, Vector3
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import Sample
-from flightstack.estimation.sensor_samples import BaroSample, GnssSample, ImuSample, MagSample, RangeSample
+from flightstack.estimation.sensor_samples import BaroSample, GnssSample, MagSample, RangeSample
 from flightstack.estimation.snapshot import ESTIMATOR_START
 from flightstack.flight_log.estimator_topics import ESTIMATOR, WIND_GROUP, fill_estimator, fill_wind
 from flightstack.flight_log.flight_log import FlightLog
@@ -37,7 +37,6 @@ SENSOR_GROUPS = (
 TRUTH_INTERVAL_US, GLOBAL_INTERVAL_US, ESTIMATOR_INTERVAL_US = 10_000, 100_000, 500_000
 """Intervals of PX4's logger."""
 _FILLS: dict[type, tuple[Group, Callable[[FloatArray, Any], None]]] = {
-    ImuSample: (IMU_GROUP, fill_imu),
     MagSample: (MAG_GROUP, fill_mag),
     BaroSample: (BARO_GROUP, fill_baro),
     GnssSample: (GNSS_GROUP, fill_gnss),
@@ -66,15 +65,21 @@ class SensorRecorder:
                 self._truth_us = self._global_us = self._estimator_us = 0
                 log.information(ESTIMATOR_START, estimator())
 
+    def imu(self, row: FloatArray) -> None:
+        """Record a sample of the inertial sensor that the estimator takes, in its array form."""
+        log = self._log
+        if log is not None:
+            fill_imu(log.sampled[IMU_GROUP.name].append(round(row[0] * 1e6)), row)
+
     def sample(self, sample: Sample) -> None:
-        """Record a sample that the estimator takes."""
+        """Record a sample of another sensor that the estimator takes."""
         log = self._log
         if log is not None and (known := _FILLS.get(type(sample))) is not None:
             group, fill = known
             fill(log.sampled[group.name].append(round(sample.time_s * 1e6)), sample)
 
-    def state(self, time_us: int, truth: FloatArray, sensed: Sensed) -> None:
-        """Record the true state, shape (13,), and what the vehicle knows, if they are due."""
+    def state(self, time_us: int, truth: FloatArray, sense: Callable[[], Sensed]) -> None:
+        """Record the true state, shape (13,), and what ``sense`` returns, if they are due."""
         log = self._log
         if log is None or time_us < self._truth_us:
             return
@@ -88,6 +93,7 @@ class SensorRecorder:
             log.sampled[TRUTH_GLOBAL_GROUP.name].append(time_us)[:] = place
         if time_us >= self._estimator_us:
             self._estimator_us = time_us + ESTIMATOR_INTERVAL_US
+            sensed = sense()
             fill_estimator(log.sampled[ESTIMATOR.name].append(time_us), sensed)
             if sensed.report.wind_is_observed:
                 fill_wind(log.sampled[WIND_GROUP.name].append(time_us), sensed)

@@ -9,7 +9,7 @@ import math
 
 from flightstack.core.contract import STATE_SIZE, FloatArray
 from flightstack.core.portable_math import atan2, distance
-from flightstack.estimation.sensor_samples import BaroSample, GnssSample, ImuSample, MagSample, RangeSample
+from flightstack.estimation.sensor_samples import BaroSample, GnssSample, MagSample, RangeSample
 from flightstack.flight_log.topics import Field, Group, Topic, outer_heading
 from flightstack.mavlink.dialect import mavlink
 
@@ -130,10 +130,10 @@ RANGE_GROUP = Group(
 )
 
 
-def fill_imu(row: FloatArray, sample: ImuSample) -> None:
-    """Fill a row of ``IMU_GROUP``."""
-    row[0] = round(sample.dt_s * 1e6)
-    row[1:4], row[4:7] = sample.gyro_frd_rad_s, sample.accel_frd_m_s2
+def fill_imu(row: FloatArray, sample: FloatArray) -> None:
+    """Fill a row of ``IMU_GROUP`` from the array form of a sample."""
+    row[0] = round(sample[1] * 1e6)
+    row[1:] = sample[2:]
 
 
 def fill_mag(row: FloatArray, sample: MagSample) -> None:

@@ -27,20 +27,22 @@ from flightstack.core.contract import (
 from flightstack.core.enums import Mode
 from flightstack.core.geometry import blend, euler_from_quaternion, rotate
 from flightstack.core.portable_math import sin_cos
+from flightstack.guidance.follow import follow_horizontally
 from flightstack.guidance.land_detector import DESCENT_M_S, LandMemory, land_detector_step, lift_share
 from flightstack.guidance.manual import manual_step
 from flightstack.guidance.mission import mission_goal, mission_step, with_landing_descent
 from flightstack.guidance.mode_target import LAND, RETURN, advance_return, target_goal
 from flightstack.guidance.offboard import attitude_step, point_step
 from flightstack.guidance.params import GuidanceParams
-from flightstack.guidance.setpoints import ATTITUDE
+from flightstack.guidance.setpoints import ATTITUDE, NOT_GIVEN
 from flightstack.guidance.trajectory import Trajectory, TrajectoryLimits, setpoint_of, trajectory_step
 from flightstack.params.vehicle import GRAVITY_M_S2
 
-DESCEND = 64
-"""Number of the mode LAND without a position: the vehicle stays level, and drifts with the wind."""
+DESCEND, DESCEND_LEVEL = 64, 65
+"""Numbers of the mode LAND without a position: the vehicle brakes, or without a velocity stays level and drifts."""
 MISSION, OFFBOARD, POSITION = int(Mode.MISSION), int(Mode.OFFBOARD), int(Mode.POSITION)
 
+_STOP = Vector3(0.0, 0.0, 0.0)
 TRAJECTORY_SIZE = 11
 GUIDANCE_PARAMS_SIZE = len(GuidanceParams._fields)
 LAND_MEMORY_SIZE = 4
@@ -67,10 +69,20 @@ def _limit_sink_lead(last: Trajectory, reference: Trajectory, state: VehicleStat
 
 
 @compiled
-def _level(reference: Trajectory, state: VehicleState) -> Trajectory:
-    """Return the reference with the vehicle's horizontal position and velocity, so that it demands no tilt."""
+def _without_position(
+    last: Trajectory,
+    reference: Trajectory,
+    state: VehicleState,
+    brakes: bool,
+    limits: TrajectoryLimits,
+    dt_s: float,
+) -> Trajectory:
+    """Return the reference at the vehicle's horizontal position; it ``brakes``, or demands no tilt."""
     t, p, v = reference, state.position_ned_m, state.velocity_ned_m_s
-    return Trajectory(p.x, p.y, t.z, v.x, v.y, t.vz, 0.0, 0.0, t.az, t.yaw_rad, t.yaw_rate_rad_s)
+    vx, vy, ax, ay = v.x, v.y, 0.0, 0.0
+    if brakes:
+        _, _, vx, vy, ax, ay = follow_horizontally(last, NOT_GIVEN, _STOP, NOT_GIVEN, 0.0, limits, dt_s)
+    return Trajectory(p.x, p.y, t.z, vx, vy, t.vz, ax, ay, t.az, t.yaw_rad, t.yaw_rate_rad_s)
 
 
 @compiled
@@ -191,11 +203,11 @@ def goal_kernel(
     else:
         if mode == RETURN:
             advance_return(a, state, params)
-        goal = target_goal(LAND if mode == DESCEND else mode, a, params)
+        goal = target_goal(LAND if mode >= DESCEND else mode, a, params)
     goal = with_landing_descent(goal, state.position_ned_m.z, params)
     reference = _limit_sink_lead(last, trajectory_step(last, goal, _limits(params), dt_s), state)
-    if mode == DESCEND:
-        reference = _level(reference, state)
+    if mode >= DESCEND:
+        reference = _without_position(last, reference, state, mode == DESCEND, _limits(params), dt_s)
     loop_target = attitude_target(last_target)
     _finish(last, reference, state, trajectory, land, loop_target, params, reference.vz, dt_s, setpoint)
 

@@ -22,6 +22,7 @@ from flightstack.core.enums import STREAM_MODES, Mode
 from flightstack.core.portable_math import atan2, distance
 from flightstack.guidance.kernels import (
     DESCEND,
+    DESCEND_LEVEL,
     TRAJECTORY_SIZE,
     goal_kernel,
     levelling_kernel,
@@ -59,8 +60,8 @@ ARRIVED_M = 0.5
 _OFFBOARD = Mode.OFFBOARD
 _NUMBER = {mode: int(mode) for mode in Mode}
 _YAW_AT = 9  # of trajectory and setpoint
-_BLIND_NUMBER = _NUMBER | {Mode.LAND: DESCEND, Mode.POSITION: int(Mode.ALTITUDE)}
-"""Modes without a position: LAND descends, POSITION holds the altitude alone."""
+_NUMBER_WITHOUT_POSITION = _NUMBER | {Mode.LAND: DESCEND, Mode.POSITION: int(Mode.ALTITUDE)}
+_NUMBER_WITHOUT_VELOCITY = _NUMBER_WITHOUT_POSITION | {Mode.LAND: DESCEND_LEVEL}
 _STREAM_NUMBERS = frozenset(int(mode) for mode in STREAM_MODES)
 
 
@@ -71,6 +72,15 @@ class MissionProgress(NamedTuple):
     reached: int
     finished: bool
     wants_return: bool
+
+
+class GuidanceMemory(NamedTuple):
+    """State of guidance: reference, mission, goal of the other modes, land detector."""
+
+    trajectory: FloatArray
+    mission: RecordArray
+    mode_target: RecordArray
+    land: FloatArray
 
 
 class Navigator:
@@ -162,6 +172,11 @@ class Navigator:
     # ------------------------------------------------------------------ state
 
     @property
+    def memory(self) -> GuidanceMemory:
+        """The arrays in which guidance keeps its state."""
+        return GuidanceMemory(self._trajectory, self._mission, self._mode_target, self._land)
+
+    @property
     def landed(self) -> bool:
         """True if the vehicle is landed."""
         return self._land_view[0] > 0.0
@@ -246,12 +261,18 @@ class Navigator:
         self._trajectory[:6] = state[:6]
         self._trajectory[6:9] = 0.0
 
-    def set_position_known(self, is_known: bool) -> None:
-        """Fly with or without a horizontal position. A landing goes on where the position is known again."""
-        numbers = _NUMBER if is_known else _BLIND_NUMBER
-        if numbers is not self._numbers:
-            self._numbers = numbers
-            self._mode_target["x"], self._mode_target["y"] = self._trajectory[:2]
+    def set_known(self, position: bool, velocity: bool) -> bool:
+        """Fly with or without horizontal position and velocity; return True if that is a change.
+
+        Without a position, LAND descends where the vehicle is, and POSITION holds the altitude alone. A landing goes on
+        where the position is known again.
+        """
+        numbers = _NUMBER if position else _NUMBER_WITHOUT_POSITION if velocity else _NUMBER_WITHOUT_VELOCITY
+        if numbers is self._numbers:
+            return False
+        self._numbers = numbers
+        self._mode_target["x"], self._mode_target["y"] = self._trajectory[:2]
+        return True
 
     def shift(self, position_m: Vector3, velocity_m_s: Vector3, yaw_rad: float) -> None:
         """Shift the reference by a reset of the estimate, so that the vehicle does not move; goals keep their place."""

@@ -208,6 +208,14 @@ class Behaviour:
     position_accuracy_m: float = _param(
         "COM_POS_FS_EPH", 5, -1, 400, "m", "Standard deviation at which the position is lost; -1 off"
     )
+    velocity_accuracy_m_s: float = _param(
+        "COM_VEL_FS_EVH",
+        1,
+        0,
+        20,
+        "m/s",
+        "Standard deviation above which a descent without position does not brake",
+    )
     position_loss_action: int = _param(
         "COM_POSCTL_NAVL", 0, 0, 1, "", "Position loss action; without manual control the vehicle lands",
         choices=((0, "Altitude mode"), (1, "Land")),

@@ -247,6 +247,10 @@ IDEAL_ROTORS = typer.Option(
     "--ideal-rotors", help="Rotors without limits, lag and spin-up torque.", **IN_VEHICLE
 )
 PHYSICS_HZ = typer.Option(metavar="HZ", help="Lowest integration rate.", **IN_SIMULATION)
+SLOPE = typer.Option(
+    metavar="DEG", help="The ground rises by this to the north; rigid plant.", **IN_SIMULATION
+)
+BOAT = typer.Option(metavar="N,E", help="Velocity of the ground, as of a boat, m/s.", **IN_SIMULATION)
 BATTERY_START = typer.Option(metavar="PERCENT", help="Initial charge.  [default: 100]", **IN_VEHICLE)
 BATTERY_CAPACITY = typer.Option(
     metavar="MAH", help="Battery capacity.  [default: the vehicle's]", **IN_VEHICLE

@@ -18,8 +18,8 @@ from flightstack.testing.setup import Setup
 from flightstack.testing.world import World
 from gcs_cli.link.tlog import encode_record
 from gcs_cli.report.page import write_report
-from gcs_cli.report.run_directory import LOG_NAME, REPORT_NAME, TLOG_NAME
 from gcs_cli.report.summary import RunInfo, summarise
+from gcs_cli.run_directory import LOG_NAME, REPORT_NAME, TLOG_NAME
 
 _TEXTS = 5
 """Number of status texts that are shown."""
@@ -144,6 +144,8 @@ def run_info(flight: Flight, name: str, reason: str, log: Path) -> RunInfo:
         torque_gust=setup.torque_gust or None,
         force=numbers(setup.force),
         torque=numbers(setup.torque),
+        slope=setup.slope_deg or None,
+        boat=numbers(setup.boat),
         battery_start=setup.battery_percent,
         battery_capacity=setup.battery_capacity_mah,
         battery_drain=setup.battery_drain,

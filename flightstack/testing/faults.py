@@ -75,6 +75,10 @@ def _simulator_fault(world: World, text: str, for_s: float | None) -> None:
     fault = _parsed(text, len(world.engine.stack.vehicle.rotors))
     if fault.kind is Kind.STATE_DROP:
         raise ConfigError("fault", text, "is impossible in lockstep: both sides would wait for each other")
+    if fault.sensor and simulator.sensors is None:
+        raise ConfigError(
+            "fault", text, 'cannot act: the vehicle flies on the true state; set state to "estimated"'
+        )
     begin_us = simulator.time_us + fault.begin_us
     end_us = None if fault.end_us is None else simulator.time_us + fault.end_us
     if for_s is not None:

@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 
 from gcs_cli.fly.processes import Child, Children
-from gcs_cli.report.run_directory import SIMULATOR, STACK
+from gcs_cli.run_directory import SIMULATOR, STACK
 
 _LISTENS = {SIMULATOR: b", speed ", STACK: b"; simulator "}
 """Part of the line that each process prints when it has its ports."""

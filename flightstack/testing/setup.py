@@ -30,7 +30,7 @@ from flightstack.process.assembly import vehicle_of
 from flightstack.process.clock import nearest_outer_hz, rates
 from flightstack.vehicle.parameters import load_parameters, read_parameters
 from gcs_cli.transfers.plan_files import example_plans
-from sim_bridge.arguments import check_battery, check_plant, check_range
+from sim_bridge.arguments import check_battery, check_boat, check_plant, check_range, check_slope
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.plant.disturbance import Disturbance, check_wind
 from sim_bridge.plant.plant import PlantOptions
@@ -70,6 +70,10 @@ class Setup:
     """Constant torque FRD [N m]."""
     torque_gust: float = 0.0
     """Standard deviation of the gusty torque about roll and pitch [N m]."""
+    slope_deg: float = 0.0
+    """Slope of the ground, which rises to the north; rigid plant."""
+    boat: Sequence[float] = (0.0, 0.0)
+    """Velocity of the ground north and east, as of a boat [m/s]."""
     battery_percent: float | None = None
     """Charge at the start; None: full."""
     battery_capacity_mah: float | None = None
@@ -155,11 +159,16 @@ class Setup:
             battery = check_battery(
                 vehicle, self.battery_percent, self.battery_capacity_mah, self.battery_drain
             )
+            boat = check_boat(_vector("boat", (*self.boat, 0.0)), "boat")
+            slope_rad = check_slope(self.slope_deg, self.plant, boat, "slope_deg")
         except UsageProblemError as error:
             name, _, problem = str(error).partition(": ")
             name = name.removeprefix("--").replace("-", "_")
             raise ConfigError(name, "", problem.replace("add --drag", "set drag")) from None
-        return vehicle, PlantOptions(disturbance=disturbance, seed=self.seed, battery=battery)
+        options = PlantOptions(
+            disturbance, self.seed, battery=battery, slope_rad=slope_rad, boat_ned_m_s=boat
+        )
+        return vehicle, options
 
     def simulator(self, vehicle: Vehicle) -> Simulator:
         """Return the simulator of ``vehicle``; raise ConfigError for conditions that it cannot simulate."""

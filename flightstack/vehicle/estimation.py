@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from flightstack.commander.estimate_checks import estimate_refusals
@@ -13,8 +14,8 @@ from flightstack.core.earth_field import earth_field_ned_gauss
 from flightstack.core.enums import Severity
 from flightstack.core.portable_math import distance
 from flightstack.estimation.estimator import Estimator
-from flightstack.estimation.estimator_params import tuning_of
-from flightstack.estimation.health import NO_HEALTH, estimate_health
+from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits, tuning_of
+from flightstack.estimation.health import NO_HEALTH, HealthMonitor
 from flightstack.estimation.memory import POSITION_RESET, VELOCITY_RESET, YAW_RESET
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed
@@ -24,6 +25,7 @@ from flightstack.flight_log.sensor_recorder import SensorRecorder
 from flightstack.guidance.navigator import Navigator
 from flightstack.params.estimator import ESTIMATOR_SPECS
 from flightstack.params.store import ParamStore
+from flightstack.params.vehicle import GRAVITY_M_S2
 from flightstack.simulator_link.sensor_inbox import SensorInbox
 from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.autopilot import Autopilot
@@ -33,6 +35,12 @@ from flightstack.vehicle.journal import Journal
 HEALTH_US = 50_000
 """Interval of the health, in the time of the sensors."""
 _NO_CHANGE = Vector3(0.0, 0.0, 0.0)
+
+
+def _tuning(values: Mapping[str, float]) -> tuple[EstimatorParams, GnssLimits]:
+    """Return the filter's parameters, with the gravity of the vehicle's model, which the simulator flies."""
+    params, limits = tuning_of(values)
+    return params._replace(gravity_m_s2=GRAVITY_M_S2), limits
 
 
 class Users(NamedTuple):
@@ -65,7 +73,7 @@ class Estimation:
 
         ``params`` has the parameters of the estimator (EKF2_…).
         """
-        self.estimator = Estimator(*tuning_of(params.values()))
+        self.estimator = Estimator(*_tuning(params.values()))
         self._params = params
         params.subscribe(self._on_parameter)
         self.health = NO_HEALTH
@@ -74,7 +82,8 @@ class Estimation:
         self._now = now
         self._users = users
         self._recorder, self._truth = recorder, truth
-        self._feed = SensorFeed(self.estimator, now.state, recorder.sample)
+        self._feed = SensorFeed(self.estimator, now.state, recorder)
+        self._monitor = HealthMonitor(self.estimator.memory)
         self._landed = False
         self._health_due_us = 0
         # as memory: a number of an array takes four times as long to read
@@ -88,11 +97,11 @@ class Estimation:
 
     def sensed(self) -> Sensed:
         """Return what the estimator and its sensors know now; valid until the next update."""
-        return Sensed(self.estimator.memory[0], self._feed.newest)
+        return Sensed(self.estimator.memory[0], self._feed.newest, self._now.has_state)
 
     def _on_parameter(self, name: str, value: float) -> None:
         if name in ESTIMATOR_SPECS:
-            self.estimator.set_params(*tuning_of({**self._params.values(), name: value}))
+            self.estimator.set_params(*_tuning({**self._params.values(), name: value}))
 
     def warm_up(self) -> None:
         """Compile the kernels of the estimator, or load them from the cache."""
@@ -120,7 +129,7 @@ class Estimation:
         is_known = self._feed.update(reports)
         if is_known and not now.has_state:
             self._find_origin()
-        self._recorder.state(time_us, self._truth, self.sensed())
+        self._recorder.state(time_us, self._truth, self.sensed)
         if (resets[POSITION_RESET], resets[VELOCITY_RESET], resets[YAW_RESET]) != self._seen:
             self._follow_resets()
         if reports and reports[-1].time_us >= self._health_due_us:
@@ -145,18 +154,24 @@ class Estimation:
         yaw_rad = x[YAW_RESET + 1] if turned else 0.0
         users.navigator.shift(position_m, velocity_m_s, yaw_rad)
         if turned:  # the reference attitude of the loops has the old yaw
-            users.backend.reset(self._now.state)
-            self._now.loops_reset = True
+            self._reset_loops()
         step = f"{distance(*position_m):.1f} m, {distance(*velocity_m_s):.1f} m/s, {math.degrees(yaw_rad):.0f} degrees"
         users.journal.say(Severity.NOTICE, f"Estimate reset by {step}")
+
+    def _reset_loops(self) -> None:
+        self._users.backend.reset(self._now.state)
+        self._now.loops_reset = True
 
     def _update_health(self, time_us: int) -> None:
         now, users = self._now, self._users
         self._health_due_us = time_us + HEALTH_US
-        record = self.estimator.memory[0]
-        self.health = estimate_health(self.health, record, self._feed.newest, now.has_state, time_us * 1e-6)
+        self.health = self._monitor.update(self._feed.newest, now.has_state, time_us * 1e-6)
         users.failsafes.take_health(self.health)
-        users.navigator.set_position_known(users.failsafes.position_is_known)
+        failsafes = users.failsafes
+        changed = users.navigator.set_known(failsafes.position_is_known, failsafes.velocity_is_known)
+        if changed and now.flying:  # reference and integrators hold what followed from the position
+            users.navigator.reset_reference(now.state)
+            self._reset_loops()
 
 
 class SensorAutopilot:

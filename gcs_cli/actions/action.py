@@ -55,6 +55,8 @@ class Action(NamedTuple):
     """State that ``plan`` needs, for example a position."""
     needs_text: str = ""
     """Says what is missing if that state does not come."""
+    unseen: str = ""
+    """Says why an accepted action ends without its effect: "the vehicle does not report its speed limit"."""
 
 
 class ActionError(Exception):

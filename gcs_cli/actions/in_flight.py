@@ -266,8 +266,9 @@ def speed(speed_m_s: float | None) -> Action:
             raise ActionError(f"{view.autopilot.title} has no command for its default speed: give a speed")
         return (Step("speed", common_commands.speed(wanted), None),)
 
-    text = "speed set to the default" if speed_m_s is None else f"speed set to {speed_m_s:g} m/s"
-    return Action("speed", plan, text, text, {"speed_m_s": speed_m_s})
+    text = "default speed" if speed_m_s is None else f"speed {speed_m_s:g} m/s"
+    facts = {"speed_m_s": speed_m_s}
+    return Action("speed", plan, text, text, facts, unseen="the vehicle does not report its speed setting")
 
 
 def start_mission() -> Action:

@@ -130,7 +130,8 @@ def inject_failure(unit: str, failure: str, instance: int = 0) -> Action:
 
     which = f"{unit} {instance}" if instance else unit
     facts = {"unit": unit, "failure": failure, "instance": instance}
-    return Action("inject", plan, f"{which}: {failure} injected", f"{which}: {failure} injected", facts)
+    text = f"failure of {which}: {failure}"
+    return Action("inject", plan, text, text, facts, unseen="the vehicle does not report its effect")
 
 
 def failure_units() -> dict[str, int]:

@@ -186,11 +186,17 @@ class ActionRun:
             if self._steps:
                 self._next_step(view, now_s)
             else:
-                self._end(Outcome.ACKNOWLEDGED, self.action.doing)
+                self._end(Outcome.ACKNOWLEDGED, self._accepted_text())
         else:
             self.acknowledged = not self._steps
             self._timer = EffectTimer(view, now_s)
             self._await_effect(view, now_s)
+
+    def _accepted_text(self) -> str:
+        action = self.action
+        if not self._waits:
+            return action.doing
+        return f"accepted: {action.doing}" + (f"; {action.unseen}" if action.unseen else "")
 
     def _send_instead(self, message: Message, view: VehicleView, now_s: float) -> None:
         """Send a message without an answer: a change of the current item shows that the vehicle received it."""

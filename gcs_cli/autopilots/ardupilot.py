@@ -86,7 +86,12 @@ ARDUPILOT = Autopilot(
     },
     reports_estimator=True,
     lacks_messages=frozenset(
-        {FS_LOOP_TIMING_ID, int(EscStatus.id), mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED}
+        {
+            FS_LOOP_TIMING_ID,
+            int(EscStatus.id),
+            mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED,
+            mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
+        }
     ),
     sends_modes_as_stream=True,
     refusal_prefixes=("Arm: ", "PreArm: "),

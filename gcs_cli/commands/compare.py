@@ -28,7 +28,7 @@ from gcs_cli.report.compare import (
     render_comparison,
 )
 from gcs_cli.report.poses import find_run
-from gcs_cli.report.run_directory import COMPARISON_NAME as PAGE_NAME
+from gcs_cli.run_directory import COMPARISON_NAME as PAGE_NAME
 from gcs_cli.settings import JsonOption, OverwriteOption
 
 app = make_app(add_completion=False)

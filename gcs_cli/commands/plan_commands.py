@@ -37,7 +37,7 @@ _COLUMNS, _ROWS = 79, 20
 _ASKS = "If the vehicle is armed, asks first on a terminal; elsewhere it needs --yes."
 
 
-def make_part_app(kind: MissionType) -> typer.Typer:
+def _part_app(kind: MissionType) -> typer.Typer:
     """Return the commands for one part of the plan."""
     app = make_app(add_completion=False)
     name = PLAN_NAMES[kind]
@@ -173,3 +173,7 @@ def _only(plan: Plan, kind: MissionType) -> Plan:
         rally=plan.rally if kind == MissionType.RALLY else (),
         document={},
     )
+
+
+fence_app = _part_app(MissionType.FENCE)
+rally_app = _part_app(MissionType.RALLY)

@@ -7,7 +7,7 @@ from typing import Any
 import typer
 
 from flightstack.process.command_line import HELP_FLAGS, make_app
-from gcs_cli.lazy_group import LazyCommand, LazyGroup
+from gcs_cli.commands.lazy_group import LazyCommand, LazyGroup
 from gcs_cli.output import can_draw
 
 _ACTIONS = "gcs_cli.commands.actions"
@@ -100,28 +100,30 @@ class MissionGroup(LazyGroup):
     }
 
 
-def _part_commands(module: str, name: str) -> dict[str, LazyCommand]:
+def _part_commands(app: str, name: str) -> dict[str, LazyCommand]:
+    summaries = {
+        "upload": f"Replace the vehicle's {name} by that of a file; its mission stays.",
+        "download": f"Download the vehicle's {name}.",
+        "show": f"Show the {name} of a file or of the vehicle.",
+        "verify": f"Compare the vehicle's {name} with that of a file; exit with 1 if they differ.",
+        "clear": f"Remove the vehicle's {name}.",
+    }
     return {
-        "upload": LazyCommand(module, f"Replace the vehicle's {name} by that of a file; its mission stays."),
-        "download": LazyCommand(module, f"Download the vehicle's {name}."),
-        "show": LazyCommand(module, f"Show the {name} of a file or of the vehicle."),
-        "verify": LazyCommand(
-            module, f"Compare the vehicle's {name} with that of a file; exit with 1 if they differ."
-        ),
-        "clear": LazyCommand(module, f"Remove the vehicle's {name}."),
+        command: LazyCommand("gcs_cli.commands.plan_commands", summary, app=app)
+        for command, summary in summaries.items()
     }
 
 
 class FenceGroup(LazyGroup):
     """``gcs fence``."""
 
-    lazy = _part_commands("gcs_cli.commands.fence", "geofence")
+    lazy = _part_commands("fence_app", "geofence")
 
 
 class RallyGroup(LazyGroup):
     """``gcs rally``."""
 
-    lazy = _part_commands("gcs_cli.commands.rally", "list of rally points")
+    lazy = _part_commands("rally_app", "list of rally points")
 
 
 class ParamGroup(LazyGroup):

@@ -15,9 +15,9 @@ from gcs_cli.errors import USAGE, CliError
 from gcs_cli.report.compare import read_runs
 from gcs_cli.report.page import render_report
 from gcs_cli.report.poses import find_run
-from gcs_cli.report.run_directory import LOG_NAME, REPORT_NAME, TLOG_NAME
 from gcs_cli.report.summary import file_sha256
 from gcs_cli.report.telemetry import read_loop_timing
+from gcs_cli.run_directory import LOG_NAME, REPORT_NAME, TLOG_NAME
 from gcs_cli.settings import JsonOption, OpenOption, OverwriteOption, output_of
 
 app = make_app(add_completion=False)

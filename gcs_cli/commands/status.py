@@ -13,7 +13,7 @@ from gcs_cli.link.quality import LinkQuality
 from gcs_cli.link.snapshot import Snapshot
 from gcs_cli.settings import LinkOptions, output_of
 from gcs_cli.vehicle.numbers import UNKNOWN, number
-from gcs_cli.vehicle.view_types import VehicleView
+from gcs_cli.vehicle.view_types import Estimator, Gnss, VehicleView
 from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
@@ -82,10 +82,30 @@ def status_facts(view: VehicleView) -> dict[str, Any]:
         "mission_complete": None if view.mission.is_end_unknown else view.mission.complete,
         "battery_remaining": None if battery is None else battery.remaining,
         "rotor_rpm": list(view.rotor_rpm),
+        **_health_facts(view),
         "inner_hz": None if timing is None else timing.inner_hz,
         "overruns": None if timing is None else timing.overruns,
         "texts": [entry.text for entry in view.texts],
     }
+
+
+_GNSS_KEYS = ("gnss_fix", "gnss_satellites", "gnss_horizontal_accuracy_m")
+_ESTIMATOR_KEYS = (
+    "estimator_healthy", "estimator_worst_ratio", "estimator_horizontal_accuracy_m", "estimator_vertical_accuracy_m",
+)  # fmt: skip
+
+
+def _health_facts(view: VehicleView) -> dict[str, Any]:
+    """Return the health of receiver and estimator."""
+    facts: dict[str, Any] = dict.fromkeys((*_GNSS_KEYS, *_ESTIMATOR_KEYS))
+    if (gnss := view.gnss) is not None:
+        values = (gnss.fix_name, gnss.satellites, gnss.horizontal_accuracy_m)
+        facts.update(zip(_GNSS_KEYS, values, strict=True))
+    if (estimator := view.estimator) is not None:
+        figures = (estimator.worst_ratio, estimator.horizontal_m, estimator.vertical_m)
+        rounded = [None if value is None else round(value, 4) for value in figures]
+        facts.update(zip(_ESTIMATOR_KEYS, (estimator.healthy, *rounded), strict=True))
+    return facts
 
 
 def _rounded(values: tuple[float, ...] | None) -> list[float] | None:
@@ -113,6 +133,8 @@ def status_lines(view: VehicleView, quality: LinkQuality) -> list[tuple[str, str
         "position": _parts(view.position_ned_m, ("north", "east", "down"), 2, " m"),
         "velocity": _parts(view.velocity_ned_m_s, ("north", "east", "down"), 2, " m/s"),
         "place": place,
+        "gnss": _gnss_text(view.gnss),
+        "estimator": _estimator_text(view.estimator),
         "mission": _mission_text(view),
         "battery": None if remaining is None else f"{100.0 * remaining:.0f} %",
         "rotors": ", ".join(number(rpm, 0) for rpm in view.rotor_rpm) + " rpm" if view.rotor_rpm else None,
@@ -129,6 +151,24 @@ def _parts(values: tuple[float, ...] | None, names: tuple[str, ...], digits: int
     return ", ".join(
         f"{name} {number(value, digits, unit)}" for name, value in zip(names, values, strict=True)
     )
+
+
+def _gnss_text(gnss: Gnss | None) -> str | None:
+    if gnss is None:
+        return None
+    satellites = None if gnss.satellites is None else f"{gnss.satellites} satellites"
+    accuracy = gnss.horizontal_accuracy_m
+    accurate = None if accuracy is None else f"±{accuracy:.1f} m"
+    return ", ".join(part for part in (gnss.fix_name, satellites, accurate) if part)
+
+
+def _estimator_text(estimator: Estimator | None) -> str | None:
+    if estimator is None:
+        return None
+    ratio, accuracy = estimator.worst_ratio, estimator.horizontal_m
+    largest = None if ratio is None else f"largest innovation {100.0 * ratio:.0f} % of its gate"
+    accurate = None if accuracy is None else f"±{accuracy:.1f} m"
+    return ", ".join(part for part in ("good" if estimator.healthy else "bad", largest, accurate) if part)
 
 
 def _mission_text(view: VehicleView) -> str | None:

@@ -16,8 +16,8 @@ from gcs_cli.fly.fly_options import checked_plan
 from gcs_cli.fly.fly_run import fly, write_results
 from gcs_cli.report.conditions import conditions
 from gcs_cli.report.flight_outcome import Code
-from gcs_cli.report.run_directory import REPORT_NAME
 from gcs_cli.report.summary import max_overshoot_m
+from gcs_cli.run_directory import REPORT_NAME
 
 
 def run_fly(options: FlyOptions, run: RunOptions, out: Path | None) -> None:
@@ -45,6 +45,7 @@ def print_summary(console: Console, summary: dict[str, Any], folder: Path) -> No
     """Print the main figures of a flight; the reason of a failure is left to the error of the command."""
     outcome = summary["outcome"]
     files = " ".join(sorted(path.name for path in folder.iterdir() if path.suffix != ".log"))
+    errors = summary["estimate_error"]
     lines = (
         ("outcome", f"{outcome}: {summary['outcome_text']}" if outcome == Code.COMPLETED else outcome),
         ("flown in", ", ".join(conditions(summary))),
@@ -52,6 +53,7 @@ def print_summary(console: Console, summary: dict[str, Any], folder: Path) -> No
         ("mission", _mission(summary)),
         ("tracking", _tracking(summary)),
         ("effort", _effort(summary)),
+        *(() if errors is None else (("estimate", _estimate(errors)),)),
         ("files", f"{folder}/  {files}"),
     )
     for name, value in lines:
@@ -83,6 +85,14 @@ def _tracking(summary: dict[str, Any]) -> str:
     words = f"rms error {_shown(rms, '.3f')} m, largest {_shown(largest, '.3f')} m"
     rms, largest = summary["rms_attitude_error_deg"], summary["max_attitude_error_deg"]
     return f"{words}; attitude rms {_shown(rms, '.2f')}°, largest {_shown(largest, '.1f')}°"
+
+
+def _estimate(errors: dict[str, float]) -> str:
+    return (
+        f"rms error of tilt {errors['rms_tilt_deg']:.2f}°, yaw {errors['rms_yaw_deg']:.2f}°, "
+        f"velocity {errors['rms_velocity_m_s']:.2f} m/s, position {errors['rms_horizontal_m']:.2f} m, "
+        f"height {errors['rms_height_m']:.2f} m"
+    )
 
 
 def _effort(summary: dict[str, Any]) -> str:

@@ -85,6 +85,8 @@ class FlyOptions:
     force: Annotated[str | None, world.FORCE] = None
     torque: Annotated[str | None, world.TORQUE] = None
     physics_hz: Annotated[float | None, world.PHYSICS_HZ] = None
+    slope: Annotated[float | None, world.SLOPE] = None
+    boat: Annotated[str | None, world.BOAT] = None
     home: Annotated[
         str | None,
         typer.Option(
@@ -116,7 +118,8 @@ class FlyOptions:
 
 TO_SIMULATOR = (
     "vehicle", "plant", "speed", "instance", "seed", "wind", "gust", "drag", "force", "torque", "torque_gust",
-    "physics_hz", "battery_start", "battery_capacity", "battery_drain", "faults", "ideal_rotors", "view",
+    "physics_hz", "slope", "boat", "battery_start", "battery_capacity", "battery_drain", "faults",
+    "ideal_rotors", "view",
 )  # fmt: skip
 TO_STACK = (
     "vehicle",

@@ -23,7 +23,7 @@ from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly.flight_limit import flight_limit_s
 from gcs_cli.fly.fly_flags import TO_SIMULATOR, TO_STACK, FlyOptions, passed
 from gcs_cli.link.endpoint import LOOPBACK
-from gcs_cli.report.run_directory import LOG_NAME
+from gcs_cli.run_directory import LOG_NAME
 from gcs_cli.transfers.plan_parts import plan_problem
 from gcs_cli.vehicle.param_info import load_parameters
 from sim_bridge.__main__ import check_arguments as check_simulator

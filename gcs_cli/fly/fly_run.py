@@ -35,7 +35,8 @@ from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.flight_data import Flight as FlightData
 from gcs_cli.report.flight_outcome import Code, Outcome, with_log
 from gcs_cli.report.page import write_report
-from gcs_cli.report.run_directory import (
+from gcs_cli.report.summary import RunInfo, summarise, write_summary
+from gcs_cli.run_directory import (
     LOG_NAME,
     REPORT_NAME,
     SIMULATOR,
@@ -44,7 +45,6 @@ from gcs_cli.report.run_directory import (
     TLOG_NAME,
     make_run_directory,
 )
-from gcs_cli.report.summary import RunInfo, summarise, write_summary
 from gcs_cli.vehicle_link import open_signing
 
 _STEP_S = 0.1
@@ -193,6 +193,8 @@ def _run_info(options: FlyOptions, flown: Flown, outcome: Outcome) -> RunInfo:
         torque_gust=options.torque_gust,
         force=options.force,
         torque=options.torque,
+        slope=options.slope,
+        boat=options.boat,
         battery_start=options.battery_start,
         battery_capacity=options.battery_capacity,
         battery_drain=options.battery_drain,

@@ -5,6 +5,7 @@ https://mavlink.io/en/services/timesync.html
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple
@@ -14,6 +15,8 @@ from flightstack.mavlink.link import Message
 from gcs_cli.vehicle.view_types import LinkCounts
 
 PERIOD_S = 1.0
+PROMPT_S = 0.1
+"""Time after a request in which its answer is to be read without delay, so that the round trip is exact."""
 _WINDOW = 10
 """Periods over which loss is counted, and requests whose answer is still accepted."""
 
@@ -38,6 +41,7 @@ class LinkMonitor:
         self._sent_s: deque[tuple[int, float]] = deque(maxlen=_WINDOW)
         self._past: deque[LinkCounts] = deque(maxlen=_WINDOW + 1)
         self._round_trip_s: float | None = None
+        self._prompt_until_s = -math.inf
 
     @property
     def quality(self) -> LinkQuality:
@@ -55,12 +59,18 @@ class LinkMonitor:
         for stamp, sent_s in self._sent_s:
             if stamp == message.ts1:
                 self._round_trip_s = now_s - sent_s
+                self._prompt_until_s = -math.inf
+
+    def is_waiting(self, now_s: float) -> bool:
+        """Return True if the answer to a request is to be read without delay."""
+        return now_s < self._prompt_until_s
 
     def poll(self, now_s: float) -> list[Message]:
         """Return the request to send now, if any."""
         if self._due_s is not None and now_s < self._due_s:
             return []
         self._due_s = now_s + PERIOD_S
+        self._prompt_until_s = now_s + PROMPT_S
         self._past.append(self._counts())
         stamp = max(1, round(now_s * 1e9))
         self._sent_s.append((stamp, now_s))

@@ -88,6 +88,10 @@ class Session:
         """Rate, loss and round trip of the link."""
         return self._monitor.quality
 
+    def awaits_round_trip(self, now_s: float) -> bool:
+        """Return True if received data is to be read without delay, so that the round trip is exact."""
+        return self._monitor.is_waiting(now_s)
+
     @property
     def bad(self) -> int:
         """Received bytes and frames that are no valid messages."""

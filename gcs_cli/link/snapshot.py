@@ -22,6 +22,8 @@ _KNOWN: Mapping[int, Callable[[VehicleView], bool]] = {
     mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: lambda view: view.mission.current is not None,
     mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED: lambda view: view.mission.reached is not None,
     mavlink.MAVLINK_MSG_ID_SYS_STATUS: lambda view: view.healthy is not None,  # and battery
+    mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: lambda view: view.gnss is not None,
+    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: lambda view: view.estimator is not None,
     EscStatus.id: lambda view: bool(view.rotor_rpm),
     FS_LOOP_TIMING_ID: lambda view: view.timing is not None,
 }

@@ -10,7 +10,7 @@ from gcs_cli.errors import USAGE, CliError
 from gcs_cli.logs.recording import Recording
 from gcs_cli.logs.tlog_reader import read_tlog
 from gcs_cli.logs.ulog_reader import read_ulog
-from gcs_cli.report.run_directory import LOG_NAME
+from gcs_cli.run_directory import LOG_NAME
 
 _ULOG_MAGIC = b"ULog"
 _XZ_MAGIC = b"\xfd7zXZ\x00"

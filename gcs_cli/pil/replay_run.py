@@ -54,7 +54,7 @@ from gcs_cli.pil.verdict import (
     difference_checks,
     same_bits_limits,
 )
-from gcs_cli.report.run_directory import LOG_NAME
+from gcs_cli.run_directory import LOG_NAME
 from gcs_cli.tui.widgets.transfer_bar import step_bar
 
 LOG = "log"

@@ -26,7 +26,7 @@ from gcs_cli.pil.result import COMPLETED, Flown, Outcome, closed_loop
 from gcs_cli.pil.target_record import TargetRecord, read_record
 from gcs_cli.pil.targets import check_there, checked_target, has_same_bits, meaning
 from gcs_cli.pil.verdict import DEFAULT_LIMITS, MIL, PIL, SIL, Limits
-from gcs_cli.report.run_directory import LOG_NAME, RUNS, fresh_directory
+from gcs_cli.run_directory import LOG_NAME, RUNS, fresh_directory
 
 JSON_NAME, HTML_NAME = "pil.json", "pil.html"
 

@@ -12,8 +12,8 @@ from flightstack.core.contract import FloatArray
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.plan import Plan, Rejection
 from flightstack.plan.fence_areas import fence_areas
+from gcs_cli.charts.canvas import DASHED, DOTS_X, DOTS_Y, Canvas, circle_vertices
 from gcs_cli.plans.itinerary import Itinerary
-from gcs_cli.tui.widgets.canvas import DASHED, DOTS_X, DOTS_Y, Canvas, circle_vertices
 
 ROUTE, ITEM, HOME, RALLY, INSIDE, OUTSIDE = "cyan", "bold", "bold green", "magenta", "green", "red"
 _MARGIN = 0.06

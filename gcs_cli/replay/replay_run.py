@@ -22,7 +22,7 @@ from gcs_cli.replay.logged_plans import LoggedPlans
 from gcs_cli.replay.playback import Playback, TlogPlayback
 from gcs_cli.replay.replay_vehicle import ReplayVehicle
 from gcs_cli.replay.ulog_playback import UlogPlayback
-from gcs_cli.report.run_directory import TLOG_NAME
+from gcs_cli.run_directory import TLOG_NAME
 
 _STEP_S = 0.02
 _STATUS_S = 0.2

@@ -33,6 +33,9 @@ _TOPICS = [
     "vehicle_local_position",
     "trajectory_setpoint",
     "vehicle_attitude",
+    "vehicle_attitude_groundtruth",
+    "vehicle_local_position_groundtruth",
+    "estimator_states",
     "vehicle_attitude_setpoint",
     "rotor_speeds",
     "wrench",
@@ -99,6 +102,10 @@ class _Reader:
             rotor_command=self._series("rotor_speeds", _elements("command_rad_s", rotors)),
             torque=self._series("wrench", _elements("torque_n_m", 3)),
             battery=self._series("battery_status", ["remaining", "voltage_v"]),
+            true_position=self._truth("x", "y", "z"),
+            true_velocity=self._truth("vx", "vy", "vz"),
+            true_attitude=self._euler("vehicle_attitude_groundtruth", "q"),
+            deviations=self._deviations(),
             statuses=tuple(
                 Status(time_s, int(state), arming == _ARMED, bool(failsafe))
                 for time_s, state, arming, failsafe in self._rows(
@@ -145,6 +152,18 @@ class _Reader:
     def _euler(self, topic: str, quaternion: str) -> Series:
         time_s, q = self._series(topic, _elements(quaternion, 4))
         return series(time_s.copy(), euler_from_quaternions(q))
+
+    def _truth(self, *fields: str) -> Series:
+        """Return true values if the log has true attitudes at the same times."""
+        times_s = self._series("vehicle_attitude_groundtruth", _elements("q", 4)).time_s
+        found = self._series("vehicle_local_position_groundtruth", list(fields))
+        return found if np.array_equal(found.time_s, times_s) else empty_series(len(fields))
+
+    def _deviations(self) -> Series:
+        """Return the deviations of a log of this flight stack: PX4 has four variances of the attitude up to 1.14."""
+        is_own = self._log.msg_info_dict.get("sys_name") == "flightstack"
+        time_s, variances = self._series("estimator_states", _elements("covariances", 9))
+        return series(time_s.copy(), np.sqrt(np.maximum(variances, 0.0))) if is_own else empty_series(9)
 
     def _rows(self, topic: str, *fields: str) -> list[tuple[float, ...]]:
         data = self._data.get(topic)

@@ -15,8 +15,8 @@ from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.compare_charts import overlaid_figures
 from gcs_cli.report.flight_data import Flight
 from gcs_cli.report.poses import Run
-from gcs_cli.report.run_directory import LOG_NAME, SUMMARY_NAME
 from gcs_cli.report.summary import RunInfo, max_overshoot_m, summarise
+from gcs_cli.run_directory import LOG_NAME, SUMMARY_NAME
 
 TEMPLATES = Path(__file__).parent / "templates"
 Summary = Mapping[str, Any]
@@ -76,6 +76,8 @@ _CONDITIONS = (
     ("torque_gust_n_m", "gusty torque [N m]"),
     ("force_n", "force N, E, D [N]"),
     ("torque_n_m", "torque x, y, z [N m]"),
+    ("slope_deg", "slope of the ground [°]"),
+    ("boat_m_s", "velocity of the ground N, E [m/s]"),
     ("battery_start_percent", "battery at the start [%]"),
     ("battery_capacity_mah", "battery capacity [mAh]"),
     ("battery_drain", "battery drain, times"),

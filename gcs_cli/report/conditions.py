@@ -33,6 +33,8 @@ def conditions(summary: Mapping[str, Any]) -> list[str]:
         _amount("gusty torque", summary.get("torque_gust_n_m"), " N m"),
         _vector("force", summary.get("force_n"), "N", ("north", "east", "down")),
         _vector("torque", summary.get("torque_n_m"), "N m", ("roll", "pitch", "yaw")),
+        _amount("slope of", summary.get("slope_deg"), "°"),
+        _vector("boat at", summary.get("boat_m_s"), "m/s", ("north", "east")),
         _amount("battery from", summary.get("battery_start_percent"), " %"),
         _amount("battery of", summary.get("battery_capacity_mah"), " mAh"),
         _amount("battery drained", summary.get("battery_drain"), " times as fast"),

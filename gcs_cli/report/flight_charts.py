@@ -14,6 +14,7 @@ from gcs_cli.charts.colours import nth_colour
 from gcs_cli.charts.decimate import BUCKETS, is_decimated
 from gcs_cli.charts.figure import Axis, Band, Figure, Level, Panel, Shape
 from gcs_cli.charts.figure import Series as Curve
+from gcs_cli.report.estimate_error import SIGMAS, sigma_curve
 from gcs_cli.report.flight_data import Flight, LoopTiming, Series
 from gcs_cli.report.flight_figures import attitude_error, attitude_errors_rad
 
@@ -124,7 +125,23 @@ def _position(flight: Flight, span: tuple[float, float]) -> Figure:
         for index, name in enumerate(("north", "east", "altitude"))
     ]
     caption = "Position and its setpoint in metres north, east and up from the origin of the local frame."
+    true = _within(flight.true_position, span)
+    if len(true.time_s):
+        panels = [_with_truth(panel, index, flight, true) for index, panel in enumerate(panels)]
+        caption += " Dashed: the truth. Dotted: three standard deviations that the estimator states."
     return Figure("position", "Position", panels, caption, linked=True, height=140)
+
+
+def _with_truth(panel: Panel, axis: int, flight: Flight, true: Series) -> Panel:
+    """Return a panel of the position with the truth, and the band of the estimate."""
+    sign = -1.0 if axis == 2 else 1.0
+    curves = [*panel.series, Curve("truth", true.time_s, sign * true.values[:, axis], "s5", "dash")]
+    time_s, sigma = flight.deviations
+    if len(time_s):
+        middle = sign * np.interp(time_s, flight.position.time_s, flight.position.values[:, axis])
+        band = SIGMAS * sigma[:, 6 + axis]
+        curves += [sigma_curve(time_s, middle + band), sigma_curve(time_s, middle - band)]
+    return replace(panel, series=curves)
 
 
 def _velocity(flight: Flight, span: tuple[float, float]) -> Figure:

@@ -112,6 +112,12 @@ class Flight:
     """Torque that the controller asks for, body FRD [N m]."""
     battery: Series = field(default_factory=lambda: empty_series(2))
     """Remaining charge, 0 to 1, and voltage [V]; NaN where unknown."""
+    true_position: Series = field(default_factory=lambda: empty_series(3))
+    """True state of a vehicle that flew on its sensors, as the next two; else empty."""
+    true_velocity: Series = field(default_factory=lambda: empty_series(3))
+    true_attitude: Series = field(default_factory=lambda: empty_series(3))
+    deviations: Series = field(default_factory=lambda: empty_series(9))
+    """Standard deviations that the estimator states: attitude [rad], velocity, position, NED."""
     statuses: tuple[Status, ...] = ()
     landed: tuple[tuple[float, bool], ...] = ()
     mission: tuple[MissionProgress, ...] = ()

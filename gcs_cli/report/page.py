@@ -12,6 +12,7 @@ from flightstack.plan import Plan, command_name
 from gcs_cli.charts.figure import AnyFigure
 from gcs_cli.charts.pages import render_page, shown
 from gcs_cli.report.conditions import conditions, flown
+from gcs_cli.report.estimate_error import estimate_error_figures
 from gcs_cli.report.flight_charts import in_modes, shown_span, time_figures, timing_figures
 from gcs_cli.report.flight_data import Flight, LoopTiming
 from gcs_cli.report.path_charts import map_figure, space_figure
@@ -64,6 +65,8 @@ def _figures(flight: Flight, plan: Plan, timing: Sequence[LoopTiming]) -> Iterat
     yield map_figure(flight, plan, span)
     for figure in time_figures(flight):
         yield in_modes(figure, flight)
+    for figure in estimate_error_figures(flight):
+        yield in_modes(figure, flight)
     yield from timing_figures(timing or flight.loop_timing)
 
 
@@ -79,6 +82,19 @@ def tiles(summary: dict[str, Any]) -> list[tuple[str, str]]:
         ("attitude error, rms", shown(summary["rms_attitude_error_deg"], ".2f", "°")),
         ("attitude error, largest", shown(summary["max_attitude_error_deg"], ".1f", "°")),
         ("times real time", shown(summary["real_time_factor"], ".3g", "×")),
+        *_estimate_tiles(summary["estimate_error"]),
+    ]
+
+
+def _estimate_tiles(errors: dict[str, float] | None) -> list[tuple[str, str]]:
+    if errors is None:
+        return []
+    return [
+        ("estimate, tilt error, rms", shown(errors["rms_tilt_deg"], ".2f", "°")),
+        ("estimate, yaw error, rms", shown(errors["rms_yaw_deg"], ".2f", "°")),
+        ("estimate, velocity error, rms", shown(errors["rms_velocity_m_s"], ".2f", " m/s")),
+        ("estimate, position error, rms", shown(errors["rms_horizontal_m"], ".2f", " m")),
+        ("estimate, height error, rms", shown(errors["rms_height_m"], ".2f", " m")),
     ]
 
 

@@ -11,6 +11,7 @@ from flightstack.core.contract import FloatArray
 from flightstack.plan import Plan
 from gcs_cli.charts.decimate import spaced
 from gcs_cli.charts.figure import Axis, Figure, Panel, Playback, Series, SpaceFigure, SpacePath
+from gcs_cli.report.estimate_error import TRUE_PATH, true_path
 from gcs_cli.report.flight_data import Flight
 from gcs_cli.report.places import (
     Area,
@@ -31,7 +32,8 @@ def space_figure(flight: Flight, plan: Plan, span: tuple[float, float]) -> Space
     """Return the flight in space, with the poses of the time slider."""
     flown, playback = flown_path(flight, span), _playback(flight, span)
     paths = [
-        SpacePath("flown", flown),
+        SpacePath(_flown_name(flight), flown),
+        SpacePath(TRUE_PATH, true_path(flight, span), "s5", "dash"),
         SpacePath("setpoint", _setpoints(flight, span), "s3", "dot", 2.0),
         *plan_paths(flight, plan),
         _places("rally points", rally_markers(flight, plan), "s4"),
@@ -55,6 +57,10 @@ def plan_paths(flight: Flight, plan: Plan) -> list[SpacePath]:
         SpacePath("planned, items numbered", route_ned_m(flight, plan), "s2", "dash"),
         _places("items", merged(plan_markers(flight, plan), 3), "s2"),
     ]
+
+
+def _flown_name(flight: Flight) -> str:
+    return "estimated path" if len(flight.true_position.time_s) else "flown"
 
 
 def flown_path(flight: Flight, span: tuple[float, float]) -> FloatArray:
@@ -121,13 +127,15 @@ def map_figure(flight: Flight, plan: Plan, span: tuple[float, float]) -> Figure:
 def map_curves(flight: Flight, plan: Plan, span: tuple[float, float]) -> list[Series]:
     """Return the plan, and the path flown in a stretch of time; x is east and y is north."""
     flown = flown_path(flight, span)
-    flown = flown[spaced(len(flown), _MAP_POINTS)]
+    flown, true = flown[spaced(len(flown), _MAP_POINTS)], true_path(flight, span)
+    true = true[spaced(len(true), _MAP_POINTS)]
     route, markers = route_ned_m(flight, plan), plan_markers(flight, plan)
     series = [
         *_outlines(list(fence(flight, plan))),
         *_acceptance(markers),
         Series("planned, items numbered", route[:, 1], route[:, 0], "s2", "dash"),
-        Series("flown", flown[:, 1], flown[:, 0], "s1", width=2.0),
+        Series(_flown_name(flight), flown[:, 1], flown[:, 0], "s1", width=2.0),
+        Series(TRUE_PATH, true[:, 1], true[:, 0], "s5", "dash"),
         *_labelled("items", merged(markers, 2), "s2"),
         *_labelled("rally points", rally_markers(flight, plan), "s4"),
     ]

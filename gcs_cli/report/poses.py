@@ -17,8 +17,8 @@ from flightstack.params.vehicle import load_vehicle
 from flightstack.plan import NAV_COMMANDS, load_plan
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.report.flight_data import Flight, Series
-from gcs_cli.report.run_directory import LOG_NAME, SUMMARY_NAME
 from gcs_cli.report.summary import item_ned_m
+from gcs_cli.run_directory import LOG_NAME, SUMMARY_NAME
 
 _FILM = "replay.mp4"
 

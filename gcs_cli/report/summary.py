@@ -16,6 +16,7 @@ from flightstack.core.atomic_file import write_text_atomically
 from flightstack.core.contract import FloatArray
 from flightstack.core.geodesy import LocalFrame
 from flightstack.plan import NAV_COMMANDS, Command, MissionItem, Plan
+from gcs_cli.report.estimate_error import estimate_figures
 from gcs_cli.report.flight_data import Flight
 from gcs_cli.report.flight_figures import (
     attitude_error,
@@ -53,6 +54,8 @@ class RunInfo:
     torque_gust: float | None = None
     force: str | None = None
     torque: str | None = None
+    slope: float | None = None
+    boat: str | None = None
     battery_start: float | None = None
     battery_capacity: float | None = None
     battery_drain: float | None = None
@@ -88,6 +91,7 @@ def summarise(flight: Flight, plan: Plan, run: RunInfo) -> dict[str, Any]:
         "real_time_factor": _rounded(factor),
         "waypoints": waypoint_rows(flight, plan),
         **_control(flight),
+        "estimate_error": estimate_figures(flight),
         "overruns": run.overruns if run.overruns is not None else flight.overruns,
         "log_sha256": file_sha256(run.log_path) if run.log_path and run.log_path.exists() else None,
     }
@@ -124,6 +128,8 @@ def _conditions(run: RunInfo, flight: Flight) -> dict[str, Any]:
         "torque_gust_n_m": run.torque_gust,
         "force_n": _numbers(run.force),
         "torque_n_m": _numbers(run.torque),
+        "slope_deg": run.slope,
+        "boat_m_s": _numbers(run.boat),
         "battery_start_percent": run.battery_start,
         "battery_capacity_mah": run.battery_capacity,
         "battery_drain": run.battery_drain,

@@ -15,7 +15,7 @@ from flightstack.core.atomic_file import write_bytes_atomically, write_text_atom
 from flightstack.core.errors import ConfigError
 from flightstack.testing.scenario import forget_controllers
 from gcs_cli.errors import DONE, FAILED, INTERRUPTED, CliError
-from gcs_cli.report.run_directory import LOG_NAME, REPORT_NAME, RUNS, fresh_directory
+from gcs_cli.run_directory import LOG_NAME, REPORT_NAME, RUNS, fresh_directory
 from gcs_cli.scenarios.display import Display, make_display, print_failures, print_summary
 from gcs_cli.scenarios.junit import junit_xml
 from gcs_cli.scenarios.options import TestOptions

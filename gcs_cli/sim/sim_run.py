@@ -22,7 +22,7 @@ from gcs_cli.fly.processes import Children, Interruption
 from gcs_cli.link import calls
 from gcs_cli.link.session import Session
 from gcs_cli.output import Output
-from gcs_cli.report.run_directory import SIMULATOR, STACK
+from gcs_cli.run_directory import SIMULATOR, STACK
 from gcs_cli.sim.sim_flags import SimOptions
 from gcs_cli.sim.sim_vehicles import (
     NONE,
@@ -183,7 +183,7 @@ def simulate(options: SimOptions, out: Output, watch: bool) -> None:
         if not interruption.reason:
             out.say("ready", _ready_sentence(len(vehicles)), vehicles=len(vehicles))
             try:
-                with _view(first, watch) as view:
+                with opened_view(first, watch) as view:
                     while not interruption.reason and (view is None or view.poll() is None):
                         fleet.step(out, due_s, shows=view is None)
             finally:
@@ -197,7 +197,7 @@ def _ready_sentence(count: int) -> str:
 
 
 @contextlib.contextmanager
-def _view(vehicle: SimOptions, wanted: bool) -> Iterator[subprocess.Popen[bytes] | None]:
+def opened_view(vehicle: SimOptions, wanted: bool) -> Iterator[subprocess.Popen[bytes] | None]:
     """Run ``gcs watch`` on this terminal; at the end terminate it, so that it restores the terminal.
 
     It ends with this process, also if that is killed.

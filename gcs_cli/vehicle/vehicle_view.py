@@ -62,7 +62,7 @@ def update(view: VehicleView, message: Any, now_s: float) -> VehicleView:
     elif (message.get_srcSystem(), message.get_srcComponent()) != view.identity[:2]:
         return view
     view = without_stale_piece(view, now_s)._replace(link=_counted(view.link, message.get_seq(), now_s))
-    fold = _FOLDS.get(message.get_type())
+    fold = FOLDS.get(message.get_type())
     return view if fold is None else _restarted(view.time_s, fold(view, message, now_s))
 
 
@@ -172,7 +172,12 @@ def _gnss(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
 
 def _estimator_status(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     ratios = (message.vel_ratio, message.pos_horiz_ratio, message.pos_vert_ratio, message.mag_ratio)
-    return view._replace(estimator=_estimator(message.flags, ratios))
+    horizontal_m, vertical_m = (
+        accuracy if accuracy > 0.0 else None  # the true state has none
+        for accuracy in (message.pos_horiz_accuracy, message.pos_vert_accuracy)
+    )
+    health = _estimator(message.flags, ratios)._replace(horizontal_m=horizontal_m, vertical_m=vertical_m)
+    return view._replace(estimator=health)
 
 
 def _ekf_status(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
@@ -206,7 +211,8 @@ def _wind(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
 
 
 def _wind_cov(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    return view._replace(wind_ned_m_s=_vector(message.wind_x, message.wind_y, message.wind_z))
+    vertical_m_s = message.wind_z if math.isfinite(message.wind_z) else 0.0  # NaN: unknown
+    return view._replace(wind_ned_m_s=_vector(message.wind_x, message.wind_y, vertical_m_s))
 
 
 def _attitude(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
@@ -308,7 +314,7 @@ def _system_time(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     return view._replace(time_s=message.time_boot_ms / 1e3)
 
 
-_FOLDS: dict[str, Callable[[VehicleView, Any, float], VehicleView]] = {
+FOLDS: dict[str, Callable[[VehicleView, Any, float], VehicleView]] = {
     "HEARTBEAT": _heartbeat,
     "AUTOPILOT_VERSION": _version,
     "AVAILABLE_MODES": _available_mode,

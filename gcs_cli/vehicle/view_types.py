@@ -180,6 +180,9 @@ class Estimator(NamedTuple):
     has_altitude: bool
     worst_ratio: float | None = None
     """Largest innovation test ratio; from 1 on the estimator rejects that measurement."""
+    horizontal_m: float | None = None
+    """Accuracy of the position [1σ]; None if it is not reported."""
+    vertical_m: float | None = None
 
     @property
     def healthy(self) -> bool:

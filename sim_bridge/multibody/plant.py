@@ -62,7 +62,7 @@ class MultibodyPlant(RecordPlant):
         self._contact_force[:] = 0.0  # the contact of the default pose is not that of the vehicle
         self._frame_load: FrameLoad | None = None
         self.memory[0]["ground_z"], self.memory[0]["reach"] = foot_z_m(vehicle), self._reach_m()
-        self._set_state(options.initial)
+        self._set_state(options.start)
         self.set_step(DEFAULT_STEP_S)
 
     def _bind_arrays(self) -> None:
@@ -139,7 +139,7 @@ class MultibodyPlant(RecordPlant):
             proximity = self._step()
             if proximity == LOST:
                 break
-        return self.show()
+        return self._show()
 
     def _step(self) -> int:
         """Advance by one step; return FLYING, NEAR or LOST."""
@@ -177,6 +177,11 @@ class MultibodyPlant(RecordPlant):
 
     def show(self) -> int:
         """Write the present state to ``output``; return the bits of ``advance``."""
+        result = self._show()
+        self._add_boat()
+        return result
+
+    def _show(self) -> int:
         proximity = rotor_drive.show_pose(self.memory, self._drive, self._qpos, self._qvel)
         touches = 0
         if proximity == NEAR:

@@ -26,7 +26,7 @@ class CompiledPlant(RecordPlant):
         self._bound: FloatArray | None = None
         self._slope = slope_kernel(name)
         self.set_step(DEFAULT_STEP_S)
-        self._set_state(options.initial)
+        self._set_state(options.start)
 
     def _set_state(self, initial: InitialState) -> None:
         body = self.memory[0]["body"]
@@ -40,7 +40,9 @@ class CompiledPlant(RecordPlant):
         attitude = quaternion_from_euler(*initial.euler_rad)
         for index in range(int(m["point_count"])):
             arm = rotate(attitude, Vector3(*m["point"][index].tolist()))
-            m["anchor"][index] = (body[0] + arm.x, body[1] + arm.y, initial.euler_rad.z)
+            sine, cosine = m["ground_slope"].tolist()
+            along = cosine * (body[0] + arm.x) - sine * (body[2] + arm.z)
+            m["anchor"][index] = (along, body[1] + arm.y, initial.euler_rad.z)
 
     def _set_contact(self, contact: ContactModel) -> None:
         m = self.memory[0]
@@ -74,7 +76,9 @@ class CompiledPlant(RecordPlant):
 
     def show(self) -> int:
         """Write the present state to ``output``; return the bits of ``advance``."""
-        return self._kernel(self.memory, self.memory[0]["command"], 0, 0, self.output)
+        result = self._kernel(self.memory, self.memory[0]["command"], 0, 0, self.output)
+        self._add_boat()
+        return result
 
     def acceleration_ned_m_s2(self) -> Vector3:
         """Return the acceleration at the present state."""
@@ -91,8 +95,10 @@ class CompiledPlant(RecordPlant):
         """Return the depth [m] of the lowest contact point below its rest depth; negative above it."""
         m, state = self.memory[0], self.output[0]["state"].tolist()
         points = m["point"][: int(m["point_count"])].tolist()
-        lowest = max(rotate(Quaternion(*state[6:10]), Vector3(*point)).z for point in points)
-        return float(state[2] + lowest - m["ground_z"] - m["ramp"])
+        arms = [rotate(Quaternion(*state[6:10]), Vector3(*point)) for point in points]
+        sine, cosine = m["ground_slope"].tolist()
+        lowest = max(cosine * (state[2] + arm.z) + sine * (state[0] + arm.x) for arm in arms)
+        return float(lowest - m["ground_z"] - m["ramp"])
 
     def euler_rad(self) -> Vector3 | None:
         """Return roll, pitch, yaw if they are states of the plant, else None."""

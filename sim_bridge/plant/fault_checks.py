@@ -42,6 +42,8 @@ def _drag(flight: Flight) -> str | None:
 
 
 def _mean_wind(flight: Flight) -> str | None:
+    if flight.options.boat_ned_m_s != _STILL:
+        return "the wind on a boat does not change with the height"
     has_step = any(fault.kind is Kind.WIND_STEP for fault in flight.faults)
     if has_step or flight.options.disturbance.wind_ned_m_s != _STILL:
         return None

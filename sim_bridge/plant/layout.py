@@ -42,7 +42,7 @@ MEMORY = np.dtype(
             "anchor",
             "f8",
             (MAX_POINTS, 3),
-        ),  # of the friction spring of each contact point: x, y m, heading rad
+        ),  # of the friction spring of each contact point: x, y m on the ground, heading rad
         ("gust", "f8", 3),  # m/s NED
         ("torque_gust", "f8", 3),  # N m FRD
         ("torque", "f8", 3),  # external, steady and gusty, N m FRD
@@ -77,7 +77,8 @@ MEMORY = np.dtype(
         ("torque_gust_decay", "f8"),  # over one step
         ("torque_gust_scale", "f8", 3),  # N m, zero without a gusty torque
         ("ground", "i8"),  # 1 with a ground
-        ("ground_z", "f8"),  # m, at which the contact springs are relaxed
+        ("ground_z", "f8"),  # m along the normal of the ground, at which the contact springs are relaxed
+        ("ground_slope", "f8", 2),  # sine and cosine; the ground rises to the north
         ("reach", "f8"),  # m, farthest contact point from the body origin
         ("point_count", "i8"),
         ("point", "f8", (MAX_POINTS, 3)),  # contact points FRD, m

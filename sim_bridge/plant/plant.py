@@ -31,6 +31,15 @@ class PlantOptions(NamedTuple):
     ground: bool = True
     limits: bool = True  # on the rotor speeds
     battery: BatteryOptions | None = FULL  # None: fly without a battery
+    slope_rad: float = 0.0  # of the ground, which rises to the north; rigid plant
+    boat_ned_m_s: Vector3 = Vector3(0.0, 0.0, 0.0)  # velocity of the ground, level
+
+    @property
+    def start(self) -> InitialState:
+        """State at time zero; a vehicle at rest stands on the slope. Its velocity is that against the ground."""
+        if self.initial != AT_REST:
+            return self.initial
+        return AT_REST._replace(euler_rad=Vector3(0.0, self.slope_rad, 0.0))
 
 
 class Plant(Protocol):

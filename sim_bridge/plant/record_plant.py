@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from flightstack.core.contract import FloatArray, RecordArray, Vector3
-from flightstack.core.portable_math import exp
+from flightstack.core.portable_math import exp, sin_cos
 from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
 from sim_bridge.plant.battery import BatteryState, battery_state, set_battery, set_pack
 from sim_bridge.plant.dead_time import DeadTime
@@ -34,12 +34,15 @@ class RecordPlant(ABC):
         self._current: FloatArray = self.memory["current"]
         m = self.memory[0]
         disturbance = options.disturbance
-        m["wind"], m["force"] = disturbance.wind_ned_m_s, disturbance.force_ned_n
+        self._boat = np.array(options.boat_ned_m_s)
+        self._is_on_boat, self._boat_m = bool(self._boat.any()), np.zeros(3)
+        m["ground_slope"] = sin_cos(options.slope_rad)
+        m["wind"], m["force"] = disturbance.wind_ned_m_s - self._boat, disturbance.force_ned_n
         m["steady_torque"] = m["torque"] = disturbance.torque_frd_n_m
         self._disturbance = disturbance
         self._turbulence = Turbulence(m, disturbance, options.seed)
         self._dead_time = DeadTime()
-        self._is_plain = not self._turbulence.active  # no work between two steps
+        self._is_plain = not (self._turbulence.active or self._is_on_boat)  # no work between two steps
         self._loading = AS_BUILT
         m["ground"] = options.ground
         m["mass"], m["weight"] = vehicle.mass_kg, vehicle.weight_n
@@ -83,7 +86,7 @@ class RecordPlant(ABC):
         if self._has_battery:
             assert self._vehicle.battery is not None
             set_pack(self.memory[0], self._vehicle.battery, faults.extra_resistance_ohm, faults.dead_cells)
-        self._is_plain = not (self._turbulence.active or self._dead_time.is_active)
+        self._is_plain = not (self._turbulence.active or self._dead_time.is_active or self._is_on_boat)
 
     def _set_rotor_fault(self, rotor: int, fault: RotorFault) -> None:
         """Scale thrust and torque of a rotor, fix its commanded speed, and delay its commands."""
@@ -111,7 +114,7 @@ class RecordPlant(ABC):
     def _set_air(self, faults: PlantFaults) -> None:
         """Set mean wind, gusts, wind shear and ground effect."""
         m, vehicle, options = self.memory[0], self._vehicle, self._disturbance
-        m["wind"] = np.array(options.wind_ned_m_s) + np.array(faults.wind_step_ned_m_s)
+        m["wind"] = np.array(options.wind_ned_m_s) + np.array(faults.wind_step_ned_m_s) - self._boat
         self._turbulence.set_gust(options.gust_m_s if faults.gust_m_s is None else faults.gust_m_s)
         m["alters_air"] = faults.wind_shear != 0.0 or faults.ground_effect
         m["shear"], m["surface_z"] = faults.wind_shear, foot_z_m(vehicle)
@@ -172,7 +175,16 @@ class RecordPlant(ABC):
                 count, acting = 1, self._dead_time.delayed(command_rad_s)
             result = self._advance(acting, flags, count)
             steps -= count
+            self._boat_m += self._boat * (count * float(self.memory[0]["step_s"]))
+        self._add_boat()
         return result
+
+    def _add_boat(self) -> None:
+        """Add the motion of the boat to ``output``: the equations are those of a frame that moves with it."""
+        if self._is_on_boat:
+            state = self.output[0]["state"]
+            state[0:3] += self._boat_m
+            state[3:6] += self._boat
 
     def airspeed_m_s(self) -> float:
         """Return the airspeed."""

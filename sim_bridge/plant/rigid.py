@@ -7,7 +7,8 @@ State vector: the array form of ``VehicleState`` (position NED, velocity NED, qu
     I ω' = −ω × (I ω + h e_z) + rotor torques − Σ s J_r Ω̇ e_z + external torque + contact
 
 with h = Σ s·J_r·Ω (errata.md's a1…a5, written without the small-angle kinematics). ``loading.py`` has the equations for
-a payload or a moved centre of gravity, ``near_ground.py`` wind shear and ground effect.
+a payload or a moved centre of gravity, ``near_ground.py`` wind shear and ground effect. The ground is a plane that may
+rise to the north.
 """
 
 from __future__ import annotations
@@ -70,8 +71,23 @@ def _add(a: Vector3, b: Vector3) -> Vector3:
 
 
 @compiled
+def _on_slope(v: Vector3, m: Record) -> Vector3:
+    """Return a vector NED along the ground (up the slope, east, and down along its normal)."""
+    sine, cosine = m["ground_slope"][0], m["ground_slope"][1]
+    return Vector3(cosine * v.x - sine * v.z, v.y, cosine * v.z + sine * v.x)
+
+
+@compiled
+def _off_slope(v: Vector3, m: Record) -> Vector3:
+    """Return a vector along the ground in NED: the inverse of ``_on_slope``."""
+    sine, cosine = m["ground_slope"][0], m["ground_slope"][1]
+    return Vector3(cosine * v.x + sine * v.z, v.y, cosine * v.z - sine * v.x)
+
+
+@compiled
 def _near_ground(x: FloatArray, m: Record) -> bool:
-    near: bool = m["ground"] != 0 and x[2] + m["reach"] > m["ground_z"]
+    down = m["ground_slope"][1] * x[2] + m["ground_slope"][0] * x[0]
+    near: bool = m["ground"] != 0 and down + m["reach"] > m["ground_z"]
     return near
 
 
@@ -83,14 +99,14 @@ def _contact(x: FloatArray, r: Rotation, rates: Vector3, m: Record) -> tuple[Vec
     for i in range(m["point_count"]):
         p = Vector3(points[i, 0], points[i, 1], points[i, 2])
         arm = _to_world(r, p)
-        depth = x[2] + arm.z - m["ground_z"]
+        at = _on_slope(Vector3(x[0] + arm.x, x[1] + arm.y, x[2] + arm.z), m)
+        depth = at.z - m["ground_z"]
         if depth > 0.0:
             spin = _to_world(r, cross(rates, p))
-            velocity = Vector3(x[3] + spin.x, x[4] + spin.y, x[5] + spin.z)
+            velocity = _on_slope(Vector3(x[3] + spin.x, x[4] + spin.y, x[5] + spin.z), m)
             stiffness, damping = m["stiffness"] * shares[i], m["damping"] * shares[i]
             normal = normal_force(depth, velocity.z, stiffness, damping, m["ramp"])
-            position = Vector3(x[0] + arm.x, x[1] + arm.y, 0.0)
-            f = contact_force(position, velocity, anchors[i], normal, stiffness, damping)
+            f = _off_slope(contact_force(at, velocity, anchors[i], normal, stiffness, damping), m)
             force = _add(force, f)
             torque = _add(torque, cross(p, _to_body(r, f)))
     return force, torque
@@ -150,11 +166,12 @@ def before_step(x: FloatArray, m: Record) -> None:
     points, shares, anchors = m["point"], m["point_share"], m["anchor"]
     for i in range(m["point_count"]):
         p = Vector3(points[i, 0], points[i, 1], points[i, 2])
-        arm = _to_world(r, p)
-        sink = x[5] + _to_world(r, cross(rates, p)).z
+        arm, spin = _to_world(r, p), _to_world(r, cross(rates, p))
+        at = _on_slope(Vector3(x[0] + arm.x, x[1] + arm.y, x[2] + arm.z), m)
+        sink = _on_slope(Vector3(x[3] + spin.x, x[4] + spin.y, x[5] + spin.z), m).z
         stiffness, damping = m["stiffness"] * shares[i], m["damping"] * shares[i]
-        normal = normal_force(x[2] + arm.z - m["ground_z"], sink, stiffness, damping, m["ramp"])
-        move_anchor(anchors[i], x[0] + arm.x, x[1] + arm.y, normal, stiffness)
+        normal = normal_force(at.z - m["ground_z"], sink, stiffness, damping, m["ramp"])
+        move_anchor(anchors[i], at.x, at.y, normal, stiffness)
 
 
 @compiled
@@ -174,6 +191,7 @@ def show(m: Record, state: FloatArray) -> int:
         r = rotation(x)
         points = m["point"]
         for i in range(m["point_count"]):
-            if x[2] + _to_world(r, Vector3(points[i, 0], points[i, 1], points[i, 2])).z > m["ground_z"]:
+            arm = _to_world(r, Vector3(points[i, 0], points[i, 1], points[i, 2]))
+            if _on_slope(Vector3(x[0] + arm.x, x[1] + arm.y, x[2] + arm.z), m).z > m["ground_z"]:
                 return CONTACT
     return 0

@@ -111,6 +111,8 @@ class Channel:
         self._scale, self._latency_us = scale, latency_us
         self._fault = HEALTHY
         self._waiting: deque[tuple[int, Any]] = deque()
+        self.next_due_us = NEVER_US
+        """Time of the next message that waits."""
         self._losses = UniformStream(seed, name, number)
 
     @property
@@ -138,23 +140,23 @@ class Channel:
         rate: FloatArray = np.multiply(self._fault.drift_s, self._scale)
         return rate
 
-    @property
-    def next_due_us(self) -> int:
-        """Time of the next message that waits."""
-        return min((due_us for due_us, _ in self._waiting), default=NEVER_US)
-
     def pass_on(self, time_us: int, out: T) -> T | None:
         """Take the measurement ``out``, which is kept, and return the one that is sent at ``time_us``, or None."""
-        if self._fault.loss == 0.0 or self._losses.next() >= self._fault.loss:
-            self._waiting.append((time_us + self._latency_us + self._fault.late_us, out))
+        fault = self._fault
+        if fault.loss == 0.0 or self._losses.next() >= fault.loss:
+            due_us = time_us + self._latency_us + fault.late_us
+            self._waiting.append((due_us, out))
+            self.next_due_us = min(self.next_due_us, due_us)
         sent: T | None = self.due(time_us)
         return sent
 
     def due(self, time_us: int) -> Any:
         """Return the newest measurement that is due, once, or None; older ones are dropped."""
-        waiting = self._waiting
-        newest = max((i for i, (due_us, _) in enumerate(waiting) if due_us <= time_us), default=-1)
-        out = None
+        if time_us < self.next_due_us:
+            return None
+        waiting, out = self._waiting, None
+        newest = max(i for i, (due_us, _) in enumerate(waiting) if due_us <= time_us)
         for _ in range(newest + 1):
             out = waiting.popleft()[1]
+        self.next_due_us = min((due_us for due_us, _ in waiting), default=NEVER_US)
         return None if self._fault.is_off else out

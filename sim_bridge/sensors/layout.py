@@ -11,7 +11,11 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from flightstack.core.contract import MAX_ROTORS, Record
+from flightstack.core.portable_math import sin_cos
 from flightstack.params.sensors import TABLES, Numbers
+from flightstack.params.vehicle import Vehicle
+from sim_bridge.plant.dimensions import foot_z_m
+from sim_bridge.plant.plant import PlantOptions
 
 SingleArray: TypeAlias = "np.ndarray[Any, np.dtype[np.float32]]"
 
@@ -125,19 +129,32 @@ GNSS = _dtype(
     ("out", "f8", 6),  # position m NED, velocity m/s NED
 )
 
+_GROUND = (
+    ("surface_z", "f8"),  # m along the normal of the ground
+    ("slope", "f8", 2),  # sine and cosine; the ground rises to the north
+    ("ground_velocity", "f8", 3),  # m/s NED
+)
+
 RANGE = _dtype(
     "range",
-    ("surface_z", "f8"),
+    *_GROUND,
     ("fault_bias", "f8", 1),
     ("out", "f8", 2),  # distance m, quality 0 to 1
 )
 
 FLOW = _dtype(
     "flow",
-    ("surface_z", "f8"),
+    *_GROUND,
     ("fault_bias", "f8", 2),
     ("out", "f8", 3),  # flow about x and y rad/s, quality 0 to 1
 )
+
+
+def write_ground(record: Record, vehicle: Vehicle, options: PlantOptions) -> None:
+    """Write the ground under a vehicle to the record of a sensor that looks down."""
+    record["surface_z"], record["slope"] = foot_z_m(vehicle), sin_cos(options.slope_rad)
+    record["ground_velocity"] = options.boat_ned_m_s
+
 
 SENSORS = {"imu": IMU, "mag": MAG, "baro": BARO, "gnss": GNSS, "range": RANGE, "flow": FLOW}
 """The record type of each sensor, by its name in ``TABLES``."""

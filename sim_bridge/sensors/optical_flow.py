@@ -1,6 +1,6 @@
-"""Optical flow: the angular rate at which level ground passes below the lens, about the body's x and y axes.
+"""Optical flow: the angular rate at which the ground passes below the lens, about the body's x and y axes.
 
-Over level ground at the distance d along +z, with the velocity (u, v) along x and y of the body:
+With the ground at the distance d along +z, and the velocity (u, v) against it along x and y of the body:
 
     flow_x = p − v / d            flow_y = q + u / d
 
@@ -15,10 +15,12 @@ from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Quaternion, RecordArray, Vector3
 from flightstack.core.geometry import conjugate, rotate
 from flightstack.params.vehicle import Vehicle
-from sim_bridge.plant.dimensions import foot_z_m
-from sim_bridge.sensors.layout import FLOW, write_numbers
+from sim_bridge.plant.plant import PlantOptions
+from sim_bridge.sensors.layout import FLOW, write_ground, write_numbers
 from sim_bridge.sensors.noise import NormalStream, limited, with_fault
 from sim_bridge.sensors.rangefinder import ground_distance_m
+
+_LEVEL = PlantOptions()
 
 
 @compiled
@@ -27,9 +29,10 @@ def measure_flow(sensors: RecordArray, state: FloatArray, origin: FloatArray, no
     sensor = sensors[0]
     if sensor["is_frozen"] != 0:
         return
-    distance = ground_distance_m(state, origin, sensor["surface_z"])
+    distance = ground_distance_m(state, origin, sensor)
     q = Quaternion(state[6], state[7], state[8], state[9])
-    velocity = rotate(conjugate(q), Vector3(state[3], state[4], state[5]))
+    ground = sensor["ground_velocity"]
+    velocity = rotate(conjugate(q), Vector3(state[3] - ground[0], state[4] - ground[1], state[5] - ground[2]))
     out, bias, most = sensor["out"], sensor["fault_bias"], sensor["max_rate_rad_s"]
     if distance < max(sensor["min_height_m"], 1e-3):
         out[0], out[1], out[2] = 0.0, 0.0, 0.0
@@ -43,14 +46,14 @@ def measure_flow(sensors: RecordArray, state: FloatArray, origin: FloatArray, no
 class OpticalFlow:
     """The flow sensor of a vehicle."""
 
-    def __init__(self, vehicle: Vehicle, seed: int) -> None:
+    def __init__(self, vehicle: Vehicle, options: PlantOptions = _LEVEL) -> None:
         self.records: RecordArray = np.zeros(1, FLOW)
         self.out: FloatArray = self.records["out"][0]
         """The last measurement."""
-        self._noise = NormalStream(seed, "flow", width=2)
+        self._noise = NormalStream(options.seed, "flow", width=2)
         self._origin: FloatArray = np.zeros(3)
         write_numbers(self.records[0], vehicle.sensors.numbers["flow"])
-        self.records[0]["surface_z"] = foot_z_m(vehicle)
+        write_ground(self.records[0], vehicle, options)
 
     def measure(self, state: FloatArray) -> FloatArray:
         """Measure at a state."""

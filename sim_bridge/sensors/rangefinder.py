@@ -1,6 +1,6 @@
-"""Rangefinder: the distance along the sensor's axis, +z of the body, to level ground.
+"""Rangefinder: the distance along the sensor's axis, +z of the body, to the ground.
 
-Out of its range, or tilted beyond 60°, the sensor has no echo: quality 0 and the longest distance.
+Out of its range, or tilted beyond 60° against the ground, the sensor has no echo: quality 0 and the longest distance.
 """
 
 from __future__ import annotations
@@ -8,25 +8,29 @@ from __future__ import annotations
 import numpy as np
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray, Quaternion, RecordArray, Vector3
+from flightstack.core.contract import FloatArray, Quaternion, Record, RecordArray, Vector3
 from flightstack.core.geometry import rotate
 from flightstack.params.vehicle import Vehicle
-from sim_bridge.plant.dimensions import foot_z_m
-from sim_bridge.sensors.layout import RANGE, write_numbers
+from sim_bridge.plant.plant import PlantOptions
+from sim_bridge.sensors.layout import RANGE, write_ground, write_numbers
 from sim_bridge.sensors.noise import NormalStream, quantised, with_fault
 
 _LEAST_COSINE = 0.5
+_LEVEL = PlantOptions()
 
 
 @compiled
-def ground_distance_m(state: FloatArray, mounting: FloatArray, surface_z: float) -> float:
+def ground_distance_m(state: FloatArray, mounting: FloatArray, sensor: Record) -> float:
     """Return the distance to the ground along +z of the body, or −1 if the axis does not point down."""
     q = Quaternion(state[6], state[7], state[8], state[9])
-    down = rotate(q, Vector3(0.0, 0.0, 1.0)).z
+    sine, cosine = sensor["slope"][0], sensor["slope"][1]
+    axis = rotate(q, Vector3(0.0, 0.0, 1.0))
+    down = cosine * axis.z + sine * axis.x
     if down < _LEAST_COSINE:
         return -1.0
     at = rotate(q, Vector3(mounting[0], mounting[1], mounting[2]))
-    distance: float = (surface_z - state[2] - at.z) / down
+    height = sensor["surface_z"] - cosine * state[2] - sine * state[0] - cosine * at.z - sine * at.x
+    distance: float = height / down
     return distance
 
 
@@ -36,7 +40,7 @@ def measure_range(sensors: RecordArray, state: FloatArray, noise: FloatArray) ->
     sensor = sensors[0]
     if sensor["is_frozen"] != 0:
         return
-    true = ground_distance_m(state, sensor["position_frd_m"], sensor["surface_z"])
+    true = ground_distance_m(state, sensor["position_frd_m"], sensor)
     error = with_fault(sensor["noise_m"], sensor["fault_noise"]) * noise[0]
     error += sensor["noise_share"] * true * noise[1]
     value = quantised(true + error + sensor["fault_bias"][0], sensor["resolution_m"])
@@ -47,13 +51,13 @@ def measure_range(sensors: RecordArray, state: FloatArray, noise: FloatArray) ->
 class Rangefinder:
     """The rangefinder of a vehicle."""
 
-    def __init__(self, vehicle: Vehicle, seed: int) -> None:
+    def __init__(self, vehicle: Vehicle, options: PlantOptions = _LEVEL) -> None:
         self.records: RecordArray = np.zeros(1, RANGE)
         self.out: FloatArray = self.records["out"][0]
         """The last measurement."""
-        self._noise = NormalStream(seed, "range", width=2)
+        self._noise = NormalStream(options.seed, "range", width=2)
         write_numbers(self.records[0], vehicle.sensors.numbers["range"])
-        self.records[0]["surface_z"] = foot_z_m(vehicle)
+        write_ground(self.records[0], vehicle, options)
 
     def measure(self, state: FloatArray) -> FloatArray:
         """Measure at a state."""

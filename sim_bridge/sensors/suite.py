@@ -43,7 +43,7 @@ from flightstack.simulator_link.sensor_frames import (
     encode_gps,
 )
 from sim_bridge.plant.fault_table import Fault, Kind
-from sim_bridge.plant.plant import Plant
+from sim_bridge.plant.plant import Plant, PlantOptions
 from sim_bridge.sensors.barometer import Barometer
 from sim_bridge.sensors.faults import HEALTHY, NEVER_US, Channel, channel_faults
 from sim_bridge.sensors.gnss import Fix, GnssReceiver
@@ -81,12 +81,13 @@ class SensorSuite:
         self,
         vehicle: Vehicle,
         home: GeoPoint,
-        seed: int,
+        options: PlantOptions,
         truth: PlantStateFrame,
         plant: Plant,
         sender: Sender,
     ) -> None:
-        self._truth, self._plant, self._sender, self._seed = truth, plant, sender, seed
+        self._truth, self._plant, self._sender, self._seed = truth, plant, sender, options.seed
+        seed = options.seed
         self._link = Link(*sender)
         self._frame = LocalFrame(home)
         numbers = vehicle.sensors.numbers
@@ -119,10 +120,10 @@ class SensorSuite:
             self.gnss = GnssReceiver(vehicle, seed)
             self._add("gnss", self.gnss.records, self._measure_gnss, self._send_fix, self.gnss.latency_us)
         if "range" in numbers:
-            self.range = Rangefinder(vehicle, seed)
+            self.range = Rangefinder(vehicle, options)
             self._add("range", self.range.records, self._measure_range, self._send_range)
         if "flow" in numbers:
-            self.flow = OpticalFlow(vehicle, seed)
+            self.flow = OpticalFlow(vehicle, options)
             self._add("flow", self.flow.records, self._measure_flow, self._send_flow)
         self._due_us = [0] * len(self._sensors)
         self._next_us = 0

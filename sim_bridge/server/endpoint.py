@@ -165,7 +165,8 @@ class FlightStackEndpoint:
         sensor = next((fault.sensor for fault in faults if fault.sensor), None)
         if sensor is not None and not self._sends_sensors:
             self.error = (
-                f"the fault of the sensor {sensor} cannot act: the flight stack flies on the true state"
+                f"the fault of the sensor {sensor} cannot act: the flight stack flies on the true state; start it "
+                "with --state estimated"
             )
 
     def _handle(self, message: Message) -> None:

@@ -12,7 +12,7 @@ import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -175,6 +175,24 @@ def same_bits(one: np.ndarray, other: np.ndarray) -> bool:
     """Tell whether two arrays of float64 are equal to the last bit, signs of zeros too; a NaN equals any NaN."""
     equal = np.ascontiguousarray(one).view(np.int64) == np.ascontiguousarray(other).view(np.int64)
     return bool((equal | (np.isnan(one) & np.isnan(other))).all())
+
+
+class Compared(NamedTuple):
+    """A quantity from both sides, shape (samples, width)."""
+
+    c: np.ndarray
+    python: np.ndarray
+
+    def has_same_bits(self) -> bool:
+        """Tell whether every number is the same to the last bit."""
+        return same_bits(self.c, self.python)
+
+    def full_scale_ulps(self) -> np.ndarray:
+        """Difference of each sample in float32's ulps of the largest value."""
+        return ulps(self._distance(), np.abs(self.python).max(), np.dtype(np.float32))
+
+    def _distance(self) -> np.ndarray:
+        return np.linalg.norm(self.c - self.python, axis=1)
 
 
 def run_tool(command: Sequence[str | Path], **options: Any) -> str:

@@ -1,9 +1,10 @@
-"""The F28377S port on a simulated chip: built with the fake driverlib, driven octet by octet."""
+"""The F28377S port on a simulated chip: TI's driverlib or the tests' own over its registers, driven octet by octet."""
 
 from __future__ import annotations
 
 import ctypes
 import functools
+import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Sequence
@@ -15,7 +16,8 @@ from tests.firmware.codec_support import ROOT, WARNINGS, compile_c
 
 FIRMWARE = ROOT / "firmware"
 PORT = FIRMWARE / "ports" / "f28377s"
-FAKE = Path(__file__).parent / "c" / "fake_driverlib"
+FAKE = Path(__file__).parent / "c" / "f28377s_chip"
+OWN_DRIVERLIB = FAKE / "own"
 PORTABLE = [file for part in ("core", "mavlink", "app") for file in sorted((FIRMWARE / part).glob("*.c"))]
 RING = FIRMWARE / "ports" / "bare" / "fs_ring.c"
 INCLUDE = [
@@ -48,20 +50,50 @@ def portable() -> Path:
     return compile_c(Path(workshop().name) / "portable.o", PORTABLE, "-r", *FLAGS)
 
 
+def ti_folders(family: str = "f2837xs") -> list[Path] | None:
+    """Return where TI's driverlib and its headers are; None without C2000Ware."""
+    root = os.environ.get("C2000WARE_ROOT", "")
+    if not root:
+        return None
+    return [
+        Path(root, "driverlib", family, "driverlib"),
+        Path(root, "device_support", family, "common/include"),
+    ]
+
+
+def ti_flags(family: str = "f2837xs", launchpad: str = "F28377S") -> list[str]:
+    """Return the options for TI's headers; they say what cl2000 would have known."""
+    system = [word for folder in ti_folders(family) or () for word in ("-isystem", str(folder))]
+    return ["-include", str(FAKE / "ti_shim.h"), f"-D_LAUNCHXL_{launchpad}", "-DCPU1", *system]
+
+
 @functools.cache
-def driverlib() -> Path:
-    """Compile the fake in place of driverlib into one object, once per run of the tests."""
-    return compile_c(
-        Path(workshop().name) / "driverlib.o", [FAKE / "fake_driverlib.c"], "-r", *FLAGS, f"-I{FAKE}"
-    )
+def chip_flags() -> list[str]:
+    """Return the options for driverlib over the simulated chip: TI's where there is C2000Ware, else the tests' own."""
+    return [f"-I{FAKE}", *(["-DTI_REGISTERS", *ti_flags()] if ti_folders() else [f"-I{OWN_DRIVERLIB}"])]
+
+
+@functools.cache
+def chip() -> Path:
+    """Compile the simulated chip and driverlib into one object, once per run of the tests."""
+    folders = ti_folders()
+    names = ("sci.c", "interrupt.c", "gpio.c")
+    library = [OWN_DRIVERLIB / "vectors.c"] if folders is None else [folders[0] / name for name in names]
+    objects = [
+        compile_c(Path(workshop().name) / f"{path.stem}.o", [path], "-c", "-fPIC", "-O2", "-w", *chip_flags())
+        for path in library
+    ]
+    model = [*sorted(FAKE.glob("fake_*.c")), *objects]
+    flags = [*FLAGS, "-fno-strict-aliasing", *chip_flags()]
+    return compile_c(Path(workshop().name) / "chip.o", model, "-r", *flags)
 
 
 @functools.cache
 def built(*options: str) -> Path:
-    """Link the port with the fake in place of driverlib into a library, once per set of options; main is left out."""
+    """Link the port with driverlib and the simulated chip into a library, once per set of options; main is left out."""
     folder = Path(tempfile.mkdtemp(dir=workshop().name))
-    sources = [portable(), driverlib(), *PORT_SOURCES, FAKE / "bench.c"]
-    here = [f"-I{FAKE}", '-DF28_BOARD="simulated chip"', *options]
+    sources = [portable(), chip(), *PORT_SOURCES, FAKE / "bench.c"]
+    here = [*chip_flags(), '-DF28_BOARD="simulated chip"', *options]
     return compile_c(folder / "port.so", sources, "-shared", *FLAGS, *here)
 
 

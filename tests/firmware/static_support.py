@@ -16,7 +16,7 @@ from tests.support.tools import missing
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
 CPPCHECK = Path(__file__).parent / "cppcheck"
-FAKE_DRIVERLIB = Path(__file__).parent / "c" / "fake_driverlib"
+OWN_DRIVERLIB = Path(__file__).parent / "c" / "f28377s_chip" / "own"
 PORTABLE = ("core", "mavlink", "app")
 """Folders of what runs on every target, a C28x among them."""
 INCLUDES = [f"-I{FIRMWARE / folder}" for folder in PORTABLE]

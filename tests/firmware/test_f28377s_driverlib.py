@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import subprocess
 from pathlib import Path
@@ -10,28 +9,17 @@ from pathlib import Path
 import pytest
 
 from tests.firmware.codec_support import compiler
-from tests.firmware.f28377s_support import FAKE, INCLUDE, PORT
+from tests.firmware.f28377s_support import INCLUDE, OWN_DRIVERLIB, PORT, ti_flags, ti_folders
 
 CONSTANT = re.compile(r"^#define ([A-Z]\w+) (\d\w*|GPIO_\w+)$", re.MULTILINE)
 MEMBER = re.compile(r"\b((?:SCI|SYSCTL|GPIO)_\w+) = (\w+)")
 
 
-def folders(family: str = "f2837xs") -> list[Path]:
-    """Return where the headers of TI are; skips the test without them."""
-    root = os.environ.get("C2000WARE_ROOT", "")
-    if not root:
-        pytest.skip("C2000WARE_ROOT is not set: the port is not checked against TI's headers here")
-    return [
-        Path(root, "driverlib", family, "driverlib"),
-        Path(root, "device_support", family, "common/include"),
-    ]
-
-
 def said_of(source: Path, launchpad: str = "F28377S") -> str:
     """Return what the compiler says of a file read with TI's headers; "" is content."""
-    family = f"f2837x{launchpad[-1].lower()}"
-    system = [word for folder in folders(family) for word in ("-isystem", str(folder))]
-    shim = ["-include", str(FAKE / "c28x_shim.h"), f"-D_LAUNCHXL_{launchpad}", "-DCPU1"]
+    if ti_folders() is None:
+        pytest.skip("C2000WARE_ROOT is not set: the port is not checked against TI's headers here")
+    ti = ti_flags(f"f2837x{launchpad[-1].lower()}", launchpad)
     strict = [
         "-std=gnu99",
         "-fsyntax-only",
@@ -41,7 +29,7 @@ def said_of(source: Path, launchpad: str = "F28377S") -> str:
         "-Wstrict-prototypes",
         "-Werror",
     ]
-    command = [*compiler(), *strict, *shim, *system, *INCLUDE, str(source)]
+    command = [*compiler(), *strict, *ti, *INCLUDE, str(source)]
     return subprocess.run(command, check=False, capture_output=True, text=True).stderr
 
 
@@ -54,7 +42,7 @@ def test_the_port_compiles_with_the_headers_of_ti(source: Path, launchpad: str) 
 
 def test_the_fake_has_the_constants_of_ti(tmp_path: Path) -> None:
     """Each number that the fake defines is the one in TI's headers: checked by TI's headers, at compile time."""
-    text = "".join((FAKE / name).read_text() for name in ("driverlib.h", "device.h"))
+    text = "".join(path.read_text() for path in sorted(OWN_DRIVERLIB.glob("*.h")))
     numbers = dict(CONSTANT.findall(text)) | dict(MEMBER.findall(text))
     assert len(numbers) > 40
     source = tmp_path / "constants.c"

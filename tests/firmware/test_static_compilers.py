@@ -9,10 +9,10 @@ import pytest
 
 from tests.firmware.static_support import (
     CPPCHECK,
-    FAKE_DRIVERLIB,
     FIRMWARE,
     INCLUDES,
     LANGUAGE,
+    OWN_DRIVERLIB,
     TARGETS,
     WARNINGS,
     ZIG,
@@ -47,7 +47,7 @@ def test_the_boards_port_compiles_on_a_host_without_a_word(name: str, tmp_path: 
     ports = FIRMWARE / "ports"
     sources = [ports / "bare" / "fs_ring.c", *sorted((ports / "f28377s").glob("*.c"))]
     target = available(TARGETS[name])
-    folders = [*INCLUDES, f"-I{ports / 'bare'}", f"-I{ports / 'f28377s'}", "-isystem", FAKE_DRIVERLIB]
+    folders = [*INCLUDES, f"-I{ports / 'bare'}", f"-I{ports / 'f28377s'}", "-isystem", OWN_DRIVERLIB]
     done = run([*target.command, *LANGUAGE, *WARNINGS, *target.flags, *folders, "-c", *sources], cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
 

@@ -14,8 +14,8 @@ import pytest
 from flightstack.firmware.generator.unit import Program, write
 from tests.firmware.static_support import (
     CPPCHECK,
-    FAKE_DRIVERLIB,
     FIRMWARE,
+    OWN_DRIVERLIB,
     PORTABLE,
     code_lines,
     run,
@@ -91,8 +91,8 @@ def findings(tmp_path_factory: pytest.TempPathFactory) -> list[Finding]:
     folders = [root / name for name in CHECKED]
     assert [folder.name for folder in folders if not list(folder.glob("*.c"))] == []
     includes = [f"-I{folder}" for folder in folders]
-    not_ours = [f"--suppress=*:{folder}/*" for folder in (FAKE_DRIVERLIB, CPPCHECK / "include")]
-    return cppcheck(root, "--addon=misra", *includes, f"-I{FAKE_DRIVERLIB}", *not_ours, *folders)
+    not_ours = [f"--suppress=*:{folder}/*" for folder in (OWN_DRIVERLIB, CPPCHECK / "include")]
+    return cppcheck(root, "--addon=misra", *includes, f"-I{OWN_DRIVERLIB}", *not_ours, *folders)
 
 
 @pytest.fixture(scope="module")

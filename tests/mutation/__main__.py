@@ -1,4 +1,6 @@
-"""Mutation run over core and codec: ``python -m tests.mutation [--mutants N] [--seed S] [--jobs J] [--only PART]``.
+"""Mutation run over core, codec and application.
+
+``python -m tests.mutation [--mutants N] [--seed S] [--jobs J] [--only PART]``
 
 Prints the score, and every survivor: a fault that the fast tests do not see, or no fault at all.
 """

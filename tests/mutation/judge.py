@@ -1,4 +1,4 @@
-"""Run the fast tests of core and codec against a mutant, in a forked child of a process that has all things warm."""
+"""Run the fast tests of core, codec and application against a mutant, in a forked child of a process that is warm."""
 
 from __future__ import annotations
 
@@ -36,7 +36,13 @@ TESTS = {
         *("tests/firmware/test_core_builds.py", "tests/parity/test_c_mission.py"),
     ],
     "mavlink": ["tests/firmware/test_codec_messages.py", "tests/firmware/test_codec_parser.py"],
+    "app": [
+        f"tests/firmware/test_app_{what}.py"
+        for what in ("pil", "params", "windows", "baud", "free", "services")
+    ],
 }
+HOST = Path("ports/host")
+"""What the application's tests need beside the mutated parts."""
 SLOW = "not compiler and not compiles and not sanitizers and not fresh and not own_no_memory"
 """Without these, of which each compiles everything again."""
 KEPT = {"flight"}
@@ -55,7 +61,7 @@ class Verdict(NamedTuple):
 
 
 def warm_up(parts: set[str], sources: Path, objects: Path) -> None:
-    """Load the tests of core or mavlink, or both, and run them against the true sources; SystemExit if one fails."""
+    """Load the tests of these parts and run them against the true sources; SystemExit if one fails."""
     hypothesis_settings.register_profile(
         "mutation", database=None, deadline=None, derandomize=True, phases=[Phase.explicit, Phase.generate]
     )
@@ -68,10 +74,14 @@ def warm_up(parts: set[str], sources: Path, objects: Path) -> None:
             sys.exit(f"the tests of {part} fail without any mutant: see pytest {' '.join(TESTS[part])}")
 
 
-def _helpers() -> tuple[ModuleType, ModuleType]:
-    from tests.firmware import codec_support, core_support  # noqa: PLC0415  the profile must be loaded before
+def _helpers() -> tuple[ModuleType, ModuleType, ModuleType]:
+    from tests.firmware import (  # noqa: PLC0415  the profile must be loaded before
+        app_support,
+        codec_support,
+        core_support,
+    )
 
-    return core_support, codec_support
+    return core_support, codec_support, app_support
 
 
 def _shrink_samples() -> None:
@@ -106,6 +116,7 @@ def snapshot(folder: Path) -> None:
     """Copy the sources, so that all mutants are of the same state."""
     for part in TESTS:
         shutil.copytree(FIRMWARE / part, folder / part)
+    shutil.copytree(FIRMWARE / HOST, folder / HOST)
 
 
 def part_of(mutant: Mutant) -> str:
@@ -114,8 +125,9 @@ def part_of(mutant: Mutant) -> str:
 
 
 def _use(sources: Path) -> None:
-    """Let the tests compile core and codec of this folder."""
-    core_support, codec_support = _helpers()
+    """Let the tests compile core, codec and application of this folder."""
+    core_support, codec_support, app_support = _helpers()
+    app_support.FIRMWARE = sources
     core_support.CORE = sources / "core"
     codec_support.CODEC = sources / "mavlink"
     codec_support.SOURCES = sorted(codec_support.CODEC.glob("*.c"))
@@ -145,12 +157,14 @@ def _try(mutant: Mutant, work: Path, sources: Path, objects: Path) -> int:
 
 
 def _build(part: str, work: Path) -> None:
-    core_support, codec_support = _helpers()
+    core_support, codec_support, app_support = _helpers()
     if part == "core":
         for real in ("double", "float"):
             core_support.library_path(real)
-    else:
+    elif part == "mavlink":
         codec_support.load(work)
+    else:
+        app_support.library()
 
 
 def start(mutant: Mutant, work: Path, sources: Path, objects: Path) -> int:

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from gcs_cli.__main__ import main
+from gcs_cli.commands.lazy_group import LazyGroup
 from gcs_cli.commands.registry import (
     FenceGroup,
     GcsGroup,
@@ -19,7 +20,6 @@ from gcs_cli.commands.registry import (
     PilGroup,
     RallyGroup,
 )
-from gcs_cli.lazy_group import LazyGroup
 from gcs_cli.program import run
 from tests.support.sample_logs import small_tlog
 

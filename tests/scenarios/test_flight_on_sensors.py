@@ -69,3 +69,24 @@ def test_vehicle_on_sensors_refuses_to_arm_before_its_position_is_known() -> Non
 def test_source_of_the_state_is_checked(conditions: dict, text: str) -> None:
     with pytest.raises(ConfigError, match=text):
         World(**conditions)
+
+
+def test_vehicle_does_not_tilt_for_a_reset_of_its_position() -> None:
+    with World(vehicle="x_quad", state="estimated") as world:
+        world.wait_until_ready()
+        world.takeoff(5.0)
+        world.run_until("mode == 'HOLD'")
+        world.fault("sensor:gnss:bias=15,-10,0")
+        world.run_until(lambda _: any("Estimate reset by" in text for text in world.texts), 30.0)
+        tilts = []
+        for _ in range(20):
+            tilts.append(max(abs(world.state.roll_deg), abs(world.state.pitch_deg)))
+            world.step()
+        assert max(tilts) < 15.0  # 12.0, on the way back to the goal; 45 without the shift
+        error_m = world.engine.stack.now.setpoint[:2] - world.engine.stack.now.state[:2]
+        assert max(abs(error_m)) < 0.5
+
+
+def test_square_on_sensors_is_flown_by_the_loops_in_c() -> None:
+    with World(vehicle="x_quad", state="estimated", loops="c") as world:
+        assert world.fly("square").completed

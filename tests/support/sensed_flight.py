@@ -24,8 +24,7 @@ def sensed_after(seconds: float, faults: Faults = NO_FAULTS) -> tuple[Sensed, Es
     for sample in flown.samples(seconds, faults):
         flown.feed(estimator, sample)
         if isinstance(sample, ImuSample):
-            samples.imu = sample
-            samples.past_imu.append(sample)
+            samples.imu_track.take(*sample)
         elif isinstance(sample, MagSample):
             samples.mag = sample
         elif isinstance(sample, BaroSample):

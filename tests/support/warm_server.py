@@ -18,7 +18,7 @@ import socket
 import sys
 from typing import Any
 
-from flightstack.params.config import DEFAULT_HOME, StackConfig
+from flightstack.params.config import StackConfig
 from flightstack.params.vehicle import load_vehicle
 from flightstack.process.assembly import build
 from sim_bridge.simulator import Simulator
@@ -41,8 +41,7 @@ def load() -> None:
     for program in PROGRAMS:
         importlib.import_module(f"{program}.__main__")
         del sys.modules[f"{program}.__main__"]  # executed again in each program
-    config = StackConfig("paper_quad", "pid", "tuned", "python", 500.0, 100.0, False, True, DEFAULT_HOME, 1)
-    build(config, lambda: None)
+    build(StackConfig(vehicle="paper_quad", gains="tuned"), lambda: None)
     Simulator(load_vehicle("paper_quad"))
 
 

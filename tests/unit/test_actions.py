@@ -92,7 +92,10 @@ def test_yaw_ends_at_the_heading(flying: World) -> None:
 
 
 def test_speed_ends_with_the_acknowledgement(flying: World) -> None:
-    assert perform(flying, in_flight.speed(2.0))[:2] == (Outcome.ACKNOWLEDGED, "speed set to 2 m/s")
+    assert perform(flying, in_flight.speed(2.0))[:2] == (
+        Outcome.ACKNOWLEDGED,
+        "accepted: speed 2 m/s; the vehicle does not report its speed setting",
+    )
     assert perform(flying, in_flight.speed(None)).ok
 
 

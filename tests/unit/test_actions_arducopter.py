@@ -292,6 +292,9 @@ def test_jump_is_a_message_to_a_vehicle_without_the_command(rig: Rig) -> None:
     rig.vehicle.unsupported.add(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT)
     assert rig.perform(in_mission.jump(2))[:2] == (Outcome.DONE, "item 2 is the current one")
     assert rig.vehicle.current_item == 3
+    assert rig.perform(in_mission.jump(0))[:2] == (Outcome.DONE, "item 0 is the current one")
+    assert rig.vehicle.current_item == 1
+    assert rig.perform(in_mission.jump(2)).ok
     result = rig.perform(in_mission.jump(9))
     assert result[:2] == (Outcome.REFUSED, "mission jump refused: item is not in the list")
     assert rig.vehicle.current_item == 3

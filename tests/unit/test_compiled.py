@@ -252,8 +252,8 @@ def test_a_vehicle_starts_without_scipy_linalg() -> None:
     program = """
 import sys
 from flightstack.process.assembly import build
-from flightstack.params.config import DEFAULT_HOME, StackConfig
-build(StackConfig("paper_quad", "pid", "tuned", "python", 500.0, 100.0, False, True, DEFAULT_HOME, 1), lambda: None)
+from flightstack.params.config import StackConfig
+build(StackConfig(vehicle="paper_quad", gains="tuned"), lambda: None)
 print("scipy.linalg" in sys.modules)
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)

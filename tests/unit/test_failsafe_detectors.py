@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from flightstack.commander.arming_checks import ArmingFacts, arming_refusals
 from flightstack.commander.failsafe import Failsafe
 from flightstack.commander.fault_detector import (
     BATTERY_HYSTERESIS,
@@ -28,9 +27,7 @@ from flightstack.commander.fault_detector import (
     follow_rotors,
     rotor_lags,
 )
-from flightstack.commander.transitions import TERMINATED, Need
 from flightstack.core.contract import LoopRow, LoopStatus
-from flightstack.core.enums import Mode
 from flightstack.params.behaviour import Behaviour, with_assignments
 from flightstack.params.vehicle import load_vehicle
 from flightstack.services.streams.link_loss import SilenceTimer
@@ -366,55 +363,3 @@ def test_link_that_was_never_heard_is_silent_but_not_lost() -> None:
     watch = SilenceTimer()
     assert watch.silent(10**15, 10.0)
     assert not watch.lost(10**15, 10.0)
-
-
-# ---------------------------------------------------------------------- arming
-
-READY = ArmingFacts(
-    mode=Mode.HOLD, state_is_valid=True, state_is_fresh=True, upright=True, gcs_lost=False, gcs_heard=True,
-    manual_fresh=False, offboard_fresh=False, fence_breach="", battery_level=0, battery_remaining=math.nan,
-)  # fmt: skip
-
-
-def test_a_vehicle_that_is_ready_arms() -> None:
-    assert arming_refusals(READY, Behaviour()) == ()
-
-
-@pytest.mark.parametrize(
-    ("change", "params", "reason"),
-    [
-        ({"state_is_valid": False, "upright": False}, [], Need.STATE.value),
-        ({"state_is_fresh": False}, [], "the state is frozen or missing"),
-        ({"upright": False}, [], Need.UPRIGHT.value),
-        ({"battery_level": 1, "battery_remaining": 0.12}, [], "the battery is low: 12% left"),
-        ({}, ["BAT_LOW_THR=0.12", "BAT_CRIT_THR=0.2"], "BAT_EMERGEN_THR, BAT_CRIT_THR and BAT_LOW_THR"),
-        ({"fence_breach": "is outside the geofence"}, [], "the vehicle is outside the geofence"),
-        ({"gcs_lost": True}, ["NAV_DLL_ACT=1"], "the ground station is lost"),
-        ({"gcs_heard": False}, ["NAV_DLL_ACT=1"], "no ground station was heard"),
-        (
-            {"mode": Mode.ALTITUDE, "manual_fresh": True, "throttle": 0.21},
-            [],
-            "the throttle is above the centre",
-        ),
-        ({"mode": Mode.POSITION}, [], Need.MANUAL_STREAM.value),
-        ({"mode": Mode.ALTITUDE}, [], Need.MANUAL_STREAM.value),
-        ({"mode": Mode.OFFBOARD}, [], Need.OFFBOARD_STREAM.value),
-        ({"mode_fault": Need.MISSION.value}, [], Need.MISSION.value),
-        ({"mode": Mode.TERMINATION}, [], TERMINATED),
-    ],
-)
-def test_each_reason_has_its_sentence(change: dict[str, object], params: list[str], reason: str) -> None:
-    facts = READY._replace(**change)
-    (sentence,) = arming_refusals(facts, with_assignments(Behaviour(), params))
-    assert sentence.startswith(reason)
-
-
-def test_all_reasons_are_given_at_once() -> None:
-    facts = READY._replace(upright=False, battery_level=2, battery_remaining=0.06, gcs_lost=True)
-    assert len(arming_refusals(facts, Behaviour().updated("NAV_DLL_ACT", 2))) == 3
-
-
-def test_what_is_switched_off_does_not_keep_the_vehicle_on_the_ground() -> None:
-    facts = READY._replace(gcs_lost=True, fence_breach="is outside the geofence")
-    off = with_assignments(Behaviour(), ["NAV_DLL_ACT=0", "GF_ACTION=0"])
-    assert arming_refusals(facts, off) == ()

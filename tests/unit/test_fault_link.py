@@ -50,8 +50,9 @@ def test_fault_of_a_sensor_is_rejected_on_the_true_state() -> None:
     for flags in (ARMED_FLAG, ARMED_FLAG | LOCKSTEP_FLAG):
         link = linked("sensor:gyro:off@100")
         link.receive(memoryview(bytes(command(flags=flags).frame)))
-        assert (
-            link.error == "the fault of the sensor gyro cannot act: the flight stack flies on the true state"
+        assert link.error == (
+            "the fault of the sensor gyro cannot act: the flight stack flies on the true state; start it with "
+            "--state estimated"
         )
     link = linked("sensor:gyro:off@100")
     send(link, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAVLINK_MSG_ID_HIL_SENSOR, 2000)

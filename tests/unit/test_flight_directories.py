@@ -17,7 +17,7 @@ from gcs_cli.fly.flight import Phase
 from gcs_cli.fly.fly_display import LineDisplay, make_display, phase_words, progress
 from gcs_cli.report.flight_outcome import Code, Outcome
 from gcs_cli.report.poses import Run
-from gcs_cli.report.run_directory import LOG_NAME, make_run_directory
+from gcs_cli.run_directory import LOG_NAME, make_run_directory
 from tests.support.fake_vehicle import SHUT_DOWN, FakeVehicle
 from tests.support.flight_story import Story
 
@@ -52,7 +52,7 @@ def test_what_a_flight_that_never_began_has_left_does_not_stay_beside_the_next_o
 
 
 def test_a_directory_without_permission_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gcs_cli.report.run_directory.os.access", lambda *_: False)  # root may write anywhere
+    monkeypatch.setattr("gcs_cli.run_directory.os.access", lambda *_: False)  # root may write anywhere
     with pytest.raises(CliError, match="nothing can be written there: permission denied") as error:
         make_run_directory(HOP, tmp_path)
     assert error.value.exit_code == USAGE

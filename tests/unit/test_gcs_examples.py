@@ -11,7 +11,7 @@ from typer.main import get_command
 
 from gcs_cli.__main__ import main
 from gcs_cli.commands.examples import EXAMPLES
-from gcs_cli.lazy_group import LazyGroup
+from gcs_cli.commands.lazy_group import LazyGroup
 from gcs_cli.program import app
 
 

@@ -12,6 +12,7 @@ from flightstack.transports.udp import Address
 from gcs_cli.actions.in_flight import land
 from gcs_cli.actions.run import ActionRun, Outcome
 from gcs_cli.link.fleet import Fleet
+from gcs_cli.link.quality import PROMPT_S
 from tests.support.fake_vehicle import FakeVehicle
 
 HERE, THERE = ("10.0.0.1", 18570), ("10.0.0.2", 18570)
@@ -150,11 +151,14 @@ def test_round_trip_and_loss_are_measured() -> None:
         if message.get_type() == "TIMESYNC"
     )
     assert fleet.selected.quality.round_trip_s is None
+    assert fleet.selected.awaits_round_trip(0.02)
+    assert not fleet.selected.awaits_round_trip(PROMPT_S)
     for number in range(4):
         answer = vehicle.encode(mavlink.MAVLink_timesync_message(5, request.ts1))
         if number != 1:
             fleet.receive(answer, HERE, 0.03)
     quality = fleet.selected.quality
+    assert not fleet.selected.awaits_round_trip(0.04)
     assert quality.round_trip_s == pytest.approx(0.03)
     received, lost = fleet.selected.view.link.received, fleet.selected.view.link.lost
     assert lost > 0

@@ -7,7 +7,16 @@ import pytest
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
 from flightstack.mavlink.link import Address, Link, Message
 from gcs_cli.link.snapshot import Snapshot
-from gcs_cli.vehicle.view_types import Euler, GeoPosition, Identity, LoopTiming, Mission, VehicleView
+from gcs_cli.vehicle.view_types import (
+    Estimator,
+    Euler,
+    GeoPosition,
+    Gnss,
+    Identity,
+    LoopTiming,
+    Mission,
+    VehicleView,
+)
 
 OURS = VehicleView(identity=Identity(7, 1, mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4))
 TIMING = LoopTiming(0.0, 0, 0, 0, *[None] * 9, lockstep=True)
@@ -44,14 +53,15 @@ def test_snapshot_requests_all_missing_messages_once() -> None:
     )
     snapshot = snapshot_of(view)
     battery, geo = mavlink.MAVLINK_MSG_ID_SYS_STATUS, mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
-    assert sorted(requested(snapshot)) == sorted([battery, geo, EscStatus.id, FS_LOOP_TIMING_ID])
+    health = [mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS]
+    assert sorted(requested(snapshot)) == sorted([battery, geo, EscStatus.id, FS_LOOP_TIMING_ID, *health])
     assert requested(snapshot) == []
 
 
-@pytest.mark.parametrize(("refusals", "complete"), [(7, False), (8, True)])
+@pytest.mark.parametrize(("refusals", "complete"), [(9, False), (10, True)])
 def test_snapshot_does_not_wait_for_refused_messages(refusals: int, complete: bool) -> None:
     snapshot = snapshot_of(OURS._replace(healthy=True))
-    assert len(requested(snapshot)) == 8
+    assert len(requested(snapshot)) == 10
     for _ in range(refusals):
         snapshot.receive(refusal(), 0.0)
     assert snapshot.complete is complete
@@ -62,6 +72,7 @@ def test_refusal_of_the_reached_item_stands_for_no_other_message() -> None:
     view = OURS._replace(
         attitude=Euler(0.0, 0.0, 0.0), position_ned_m=(0.0, 0.0, 0.0), landed_state=1, healthy=True,
         geo=GeoPosition(0.0, 0.0, 0.0, 0.0), rotor_rpm=(1.0,), timing=TIMING,
+        gnss=Gnss(3), estimator=Estimator(True, True, True, True),
     )  # fmt: skip
     snapshot = snapshot_of(view)
     current, reached = mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from flightstack.core.contract import Vector3
 from flightstack.mavlink.dialect import mavlink
 from flightstack.plan import Command, FenceCommand, Plan
+from gcs_cli.charts.canvas import rows_of_text
 from gcs_cli.tui.fly.history import History
 from gcs_cli.tui.map.drawing import distance_text, draw_map, place_text
 from gcs_cli.tui.map.model import MapModel
@@ -28,7 +29,6 @@ from gcs_cli.tui.map.scene import (
 )
 from gcs_cli.tui.map.viewport import LARGEST_M_PER_DOT, SMALLEST_M_PER_DOT, Viewport, round_step
 from gcs_cli.tui.palette import DARK
-from gcs_cli.tui.widgets.canvas import rows_of_text
 from gcs_cli.vehicle.view_types import GeoPosition, Identity, Setpoint, Vector
 from tests.support.map_views import FRAME, VIEW, item
 from tests.support.telemetry_frames import received
@@ -39,7 +39,7 @@ metres = st.floats(-20_000.0, 20_000.0)
 
 
 def drawn(scene: MapScene, view: Viewport) -> list[str]:
-    return rows_of_text(draw_map(scene, view, DARK).segments()).splitlines()
+    return rows_of_text(draw_map(scene, view, DARK).rows()).splitlines()
 
 
 @given(metres, metres, st.floats(0.01, 100.0), st.floats(0.0, 160.0), st.floats(0.0, 96.0))
@@ -218,7 +218,7 @@ def test_any_places_are_drawn(places, heading):
     )
     scene = MapScene(crafts[0], crafts[0].place, crafts[0].place, 0, plan, np.array(places), crafts)
     view = Viewport(width=30, height=10).fitted(scene.extent())
-    assert len(draw_map(scene, view, DARK, grid=True, cursor=(3, 3)).segments()) == 10
+    assert len(draw_map(scene, view, DARK, grid=True, cursor=(3, 3)).rows()) == 10
 
 
 def position(north_m: float, system: int = 1, hdg: int = 65535):

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from flightstack.core.contract import Vector3
 from flightstack.core.enums import Mode
 from tests.support.perfect_vehicle import PerfectVehicle
 
@@ -36,7 +37,7 @@ def test_hold_stops_ahead_and_never_goes_back_far(north: float, east: float, sin
     """The hold's point is where the reference comes to rest."""
     vehicle = in_air(down=-50.0)
     vehicle.state[3:6] = north, east, sink
-    vehicle.navigator._trajectory[3:6] = north, east, sink
+    vehicle.navigator.memory.trajectory[3:6] = north, east, sink
     vehicle.enter(Mode.HOLD)
     vehicle.run(15.0)
     path = np.array(vehicle.path)
@@ -107,7 +108,7 @@ def test_nothing_moves_while_the_state_is_not_finite(mode: Mode, bad: float) -> 
     vehicle.enter(mode, 8.0)
     vehicle.run(1.0)
     n = vehicle.navigator
-    memories = (n.setpoint, n._trajectory, n._mission, n._mode_target, n._land)
+    memories = (n.setpoint, *n.memory)
     before = [memory.copy() for memory in memories]
     state = vehicle.state.copy()
     state[7] = bad
@@ -138,3 +139,49 @@ def test_a_finished_mission_holds_at_its_last_place() -> None:
     vehicle.mode = Mode.HOLD
     vehicle.run(8.0)
     assert vehicle.position == pytest.approx([8.0, 0.0, -5.0], abs=1e-4)
+
+
+# ---------------------------------------------------------------------- resets of the estimate, and lost positions
+
+
+def test_reset_of_the_estimate_shifts_the_reference_and_not_the_goal() -> None:
+    vehicle = in_air()
+    vehicle.enter(Mode.HOLD)
+    vehicle.navigator.reposition(20.0, 0.0, -5.0, math.nan)
+    vehicle.run(2.0)
+    error = vehicle.navigator.setpoint[:6] - vehicle.state[:6]
+    step, speed = Vector3(3.0, -4.0, 1.0), Vector3(0.5, 0.25, -0.125)
+    vehicle.state[:3] += step
+    vehicle.state[3:6] += speed
+    vehicle.navigator.shift(step, speed, 0.25)
+    assert vehicle.navigator.setpoint[:6] - vehicle.state[:6] == pytest.approx(error)
+    vehicle.run(0.01)
+    assert vehicle.navigator.setpoint[:6] - vehicle.state[:6] == pytest.approx(error, abs=0.05)
+    vehicle.run(20.0)
+    assert vehicle.position == pytest.approx([20.0, 0.0, -5.0], abs=0.05)
+
+
+def test_landing_without_a_position_brakes_and_goes_down_where_it_is() -> None:
+    vehicle = in_air(down=-10.0)
+    vehicle.state[3:6] = 3.0, 0.0, 0.0
+    vehicle.navigator.reset_reference(vehicle.state)
+    assert vehicle.navigator.set_known(position=False, velocity=True)
+    assert not vehicle.navigator.set_known(position=False, velocity=True)
+    vehicle.enter(Mode.LAND)
+    vehicle.run(0.5)
+    assert 1.0 < vehicle.state[3] < 3.0
+    vehicle.run(3.0)
+    assert abs(vehicle.state[3]) < 0.05
+    assert vehicle.position[:2] == pytest.approx([0.0, 0.0])  # the setpoint is where the vehicle is
+    assert vehicle.position[2] > -8.0
+
+
+def test_landing_without_a_velocity_demands_no_tilt() -> None:
+    vehicle = in_air(down=-10.0)
+    vehicle.state[3:6] = 3.0, -1.0, 0.0
+    vehicle.navigator.set_known(position=False, velocity=False)
+    vehicle.enter(Mode.LAND)
+    vehicle.run(1.0)
+    setpoint = vehicle.navigator.setpoint
+    assert (setpoint[6:8] == 0.0).all()
+    assert setpoint[3:5] == pytest.approx(vehicle.state[3:5])

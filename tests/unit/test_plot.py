@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flightstack.mavlink.dialect import mavlink
+from gcs_cli.charts.canvas import rows_of_text
 from gcs_cli.tui.fly.history import History
 from gcs_cli.tui.palette import DARK
 from gcs_cli.tui.plot.drawing import (
@@ -27,7 +28,6 @@ from gcs_cli.tui.plot.drawing import (
     value_text,
 )
 from gcs_cli.tui.plot.fields import FIRST_FIELDS, MOST_FIELDS, PlotFields, field_choices, value_note
-from gcs_cli.tui.widgets.canvas import rows_of_text
 from gcs_cli.tui.widgets.fuzzy import search
 from gcs_cli.vehicle.field_units import enum_text, field_unit, shown_unit, shown_values
 from tests.support.telemetry_frames import attitude, received
@@ -40,7 +40,7 @@ SPAN = Span(0.0, 60.0)
 
 
 def drawn(curves, span=SPAN, width=60, height=14):
-    return rows_of_text(draw_plot(curves, span, width, height, DARK).segments()).splitlines()
+    return rows_of_text(draw_plot(curves, span, width, height, DARK).rows()).splitlines()
 
 
 def dots_of(row: str) -> int:
@@ -80,7 +80,7 @@ def test_lanes_that_do_not_fit_are_left_out():
 @pytest.mark.parametrize("size", [(0, 0), (1, 1), (5, 2), (20, 3), (300, 90)])
 def test_any_size_is_drawn(size):
     canvas = draw_plot([RAMP, RAMP._replace(unit="s")], Span(0, 60, 30.0), *size, DARK)
-    assert len(canvas.segments()) == size[1]
+    assert len(canvas.rows()) == size[1]
 
 
 @given(st.floats(-1e9, 1e9), st.floats(0.0, 1e9), st.integers(4, 60))

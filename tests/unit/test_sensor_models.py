@@ -226,7 +226,7 @@ def test_jammed_gnss_loses_satellites_accuracy_and_at_last_the_fix() -> None:
 
 def test_rangefinder_measures_along_its_axis() -> None:
     """At a tilt of 30° the ground is 1/cos 30° as far; the mounting is 5 cm below the origin."""
-    sensor = Rangefinder(with_sensors(range={"position_frd_m": (0.0, 0.0, 0.05)}), 1)
+    sensor = Rangefinder(with_sensors(range={"position_frd_m": (0.0, 0.0, 0.05)}))
     for angle in (0.0, math.radians(30.0)):
         _, attitude = turned(1.0, 0.0, angle)
         sensor.measure(state_at(position=(3.0, 2.0, FOOT - 10.0), attitude=attitude))
@@ -234,7 +234,7 @@ def test_rangefinder_measures_along_its_axis() -> None:
 
 
 def test_rangefinder_out_of_range_has_no_echo() -> None:
-    sensor = Rangefinder(with_sensors(range={"min_m": 0.3, "max_m": 8.0}), 1)
+    sensor = Rangefinder(with_sensors(range={"min_m": 0.3, "max_m": 8.0}))
     _, over = turned(0.0, 0.0, math.radians(70.0))
     for state in (
         state_at(position=(0.0, 0.0, FOOT - 9.0)),
@@ -246,7 +246,7 @@ def test_rangefinder_out_of_range_has_no_echo() -> None:
 
 
 def test_rangefinder_noise_grows_with_the_distance() -> None:
-    sensor = Rangefinder(with_sensors(range={"noise_m": 0.03, "noise_share": 0.01}), 1)
+    sensor = Rangefinder(with_sensors(range={"noise_m": 0.03, "noise_share": 0.01}))
     for height, expected in ((1.0, math.hypot(0.03, 0.01)), (20.0, math.hypot(0.03, 0.2))):
         out = np.empty(4000)
         for index in range(len(out)):
@@ -265,12 +265,12 @@ def test_optical_flow_is_the_motion_of_the_ground_below_the_lens() -> None:
     later = (rotation * Rotation.from_rotvec(rates * dt)).inv().apply(ground - position - velocity * dt)
     # the point moves against the turn of the body
     expected = np.array([later[1] / later[2], -later[0] / later[2]]) / dt
-    sensor = OpticalFlow(with_sensors(), 1)
+    sensor = OpticalFlow(with_sensors())
     sensor.measure(state_at(position, velocity, attitude, rates))
     assert sensor.records[0]["out"] == pytest.approx([*expected, 1.0], abs=1e-5)
 
 
 def test_optical_flow_near_the_ground_has_no_quality() -> None:
-    sensor = OpticalFlow(with_sensors(flow={"min_height_m": 0.1}), 1)
+    sensor = OpticalFlow(with_sensors(flow={"min_height_m": 0.1}))
     sensor.measure(state_at(position=(0.0, 0.0, FOOT - 0.05), velocity=(1.0, 0.0, 0.0)))
     assert sensor.records[0]["out"].tolist() == [0.0, 0.0, 0.0]

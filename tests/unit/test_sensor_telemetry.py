@@ -14,10 +14,11 @@ from flightstack.core.geometry import conjugate, quaternion_product, rotate, rot
 from flightstack.estimation.error_state import ATTITUDE, POSITION, VELOCITY, read_nominal, turned
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_report import ControlFlags, RejectionFlags, SolutionFlags
+from flightstack.estimation.imu_track import ImuTrack
 from flightstack.estimation.motion_covariance import motion_covariance, pose_covariance, twist_covariance
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples
-from flightstack.estimation.sensor_samples import BaroSample, GnssFix, GnssSample, ImuSample, MagSample
+from flightstack.estimation.sensor_samples import BaroSample, GnssFix, GnssSample, MagSample
 from flightstack.estimation.vibration import vibration_of
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
@@ -73,7 +74,7 @@ def test_report_of_a_good_flight_has_good_flags() -> None:
         | ControlFlags.TILT_ALIGN | ControlFlags.YAW_ALIGN | ControlFlags.IN_AIR | ControlFlags.GNSS_HEIGHT
     )  # fmt: skip
     assert report.control == in_use
-    assert report.rejected == RejectionFlags(0)
+    assert report.rejected == 0
     assert report.range is None
     assert 0.0 < report.velocity_ratio < 1.0
     assert report.resets.position == report.resets.velocity == 0
@@ -81,8 +82,8 @@ def test_report_of_a_good_flight_has_good_flags() -> None:
 
 def test_report_before_alignment_claims_nothing() -> None:
     report = Sensed(Estimator().memory[0], NewestSamples()).report
-    assert report.solution == SolutionFlags(0)
-    assert report.control == ControlFlags(0)
+    assert report.solution == 0
+    assert report.control == 0
 
 
 @pytest.mark.parametrize(
@@ -90,7 +91,7 @@ def test_report_before_alignment_claims_nothing() -> None:
     [(2.0, GOOD), (8.0, SolutionFlags.ATTITUDE | SolutionFlags.VELOCITY_VERTICAL | SolutionFlags.HEIGHT_ABSOLUTE
                   | SolutionFlags.CONSTANT_POSITION)],
 )  # fmt: skip
-def test_position_is_invalid_after_five_seconds_without_gnss(without_s: float, flags: SolutionFlags) -> None:
+def test_position_is_invalid_after_five_seconds_without_gnss(without_s: float, flags: int) -> None:
     faults = Faults(no_gnss_s=(SECONDS - without_s, math.inf))
     report = sensed_after(SECONDS, faults)[0].report
     assert report.solution == flags
@@ -202,7 +203,7 @@ def test_highres_imu_is_corrected_for_the_estimated_biases() -> None:
 def test_highres_imu_marks_silent_sensors() -> None:
     sensed = sensed_after(SECONDS)[0]
     old = sensed.samples.mag._replace(time_s=SECONDS - 0.2)
-    shown = Sensed(sensed_after(SECONDS)[1].memory[0], NewestSamples(imu=sensed.samples.imu, mag=old))
+    shown = Sensed(sensed_after(SECONDS)[1].memory[0], NewestSamples(sensed.samples.imu_track, mag=old))
     assert the(mavlink.MAVLINK_MSG_ID_HIGHRES_IMU, shown).fields_updated == 0b111111
 
 
@@ -244,7 +245,7 @@ def test_sys_status_has_the_health_of_each_sensor() -> None:
     assert lost.onboard_control_sensors_health & mag
     sensed, estimator = sensed_after(SECONDS)
     unfixed = sensed.samples.gnss._replace(fix_type=GnssFix.NO_FIX)
-    without_fix = Sensed(estimator.memory[0], NewestSamples(imu=sensed.samples.imu, gnss=unfixed))
+    without_fix = Sensed(estimator.memory[0], NewestSamples(sensed.samples.imu_track, gnss=unfixed))
     m = the(mavlink.MAVLINK_MSG_ID_SYS_STATUS, without_fix)
     assert not m.onboard_control_sensors_health & gps
     assert not m.onboard_control_sensors_present & mag
@@ -252,14 +253,11 @@ def test_sys_status_has_the_health_of_each_sensor() -> None:
 
 def test_vibration_measures_change_from_sample_to_sample() -> None:
     size = 0.3
-    shaken = [
-        ImuSample(0.004 * i, 0.004, Vector3(0.0, 0.0, 0.0), Vector3(0.0, size * (-1) ** i, -9.81))
-        for i in range(100)
-    ]
-    found = vibration_of(shaken)
+    rows = np.array([(0.004 * i, 0.004, 0.0, 0.0, 0.0, 0.0, size * (-1) ** i, -9.81) for i in range(100)])
+    found = vibration_of(rows)
     assert found.accel_m_s2 == pytest.approx(2.0 * size)
     assert found.gyro_rad_s == found.coning_rad2 == 0.0
-    assert vibration_of(shaken[:1]) == (0.0, 0.0, 0.0)
+    assert vibration_of(rows[:1]) == (0.0, 0.0, 0.0)
     m = the(mavlink.MAVLINK_MSG_ID_VIBRATION)
     assert m.vibration_z == pytest.approx(0.05 * math.sqrt(2.0) * 1.6, rel=0.2)  # noise of three axes
     assert (m.clipping_0, m.clipping_1, m.clipping_2) == (0, 0, 0)
@@ -299,15 +297,28 @@ def test_messages_of_absurd_measurements_are_sent(values: list[float]) -> None:
     memory["nominal"][:] = np.resize(values, 28)
     a, b = Vector3(*values[:3]), Vector3(*values[3:6])
     samples = NewestSamples(
-        ImuSample(20.0, 0.004, a, b), MagSample(20.0, a), BaroSample(20.0, *values[:3]),
+        ImuTrack(), MagSample(20.0, a), BaroSample(20.0, *values[:3]),
         GnssSample(20.0, *values[:3], a, *values[3:6], 3, 12),
     )  # fmt: skip
-    samples.past_imu.extend([samples.imu] * 2)
+    for _ in range(2):
+        samples.imu_track.take(20.0, 0.004, a, b)
     shown = status(state=np.array(values), sensed=Sensed(memory, samples))
     told = Telemetry(lambda: shown, lambda: shown.time_us, usual_timing, has_sensors=True)
     for message_id in SENSOR_STREAMED:
         for message in told.messages(message_id):
             assert Link(1, 1).encode(message)
+
+
+def test_places_on_earth_are_not_sent_before_the_first_fix() -> None:
+    memory, samples = sensed_after(SECONDS)[1].memory[0], sensed_after(SECONDS)[0].samples
+    for message_id in (
+        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        mavlink.MAVLINK_MSG_ID_HOME_POSITION,
+        mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
+    ):
+        assert sent(message_id, Sensed(memory, samples, has_origin=False)) == []
+        assert len(sent(message_id, Sensed(memory, samples))) == 1
+    assert sent(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, Sensed(memory, samples, has_origin=False))
 
 
 # ---------------------------------------------------------------------- streams

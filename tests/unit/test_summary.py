@@ -33,8 +33,10 @@ REQUIRED = {
     "sim_time_s", "wall_time_s", "real_time_factor", "waypoints", "rms_tracking_error_m",
     "max_tracking_error_m", "overruns", "log_sha256", "wind_m_s", "gust_m_s", "torque_gust_n_m",
     "battery_start_percent", "battery_capacity_mah", "battery_drain", "faults", "ideal_rotors",
-    "params", "force_n", "torque_n_m", "param", "outcome_text", "drag_n_s_m", "faults_not_begun", "flight_time_s",
+    "params", "force_n", "torque_n_m", "slope_deg", "boat_m_s", "param", "outcome_text",
+    "drag_n_s_m", "faults_not_begun", "flight_time_s",
     "rms_attitude_error_deg", "max_attitude_error_deg", "rms_torque_n_m", "rms_rotor_command_rate_rad_s2",
+    "estimate_error",
 }  # fmt: skip
 
 

@@ -19,11 +19,10 @@ from flightstack.guidance.fence import FenceBreach
 from flightstack.guidance.navigator import MissionProgress
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
 from flightstack.mavlink.link import Link
-from flightstack.services.telemetry.streams import API_RATES_HZ, GROUND_RATES_HZ, Streams
-from flightstack.services.telemetry.telemetry import STREAMED, Telemetry
+from flightstack.services.telemetry.telemetry import STREAMED
 from flightstack.services.telemetry.vehicle import autopilot_version, heartbeat, status_texts
 from flightstack.simulator_link.endpoint import Battery
-from tests.support.telemetry_status import EULER, HOME, W, X, Y, Z, status, telemetry, usual_timing
+from tests.support.telemetry_status import EULER, HOME, W, X, Y, Z, status, telemetry
 
 ATTITUDE = mavlink.MAVLINK_MSG_ID_ATTITUDE
 
@@ -346,78 +345,6 @@ def test_long_texts_come_in_chunks_of_which_only_the_last_is_not_full(length: in
 def test_texts_are_utf_8() -> None:
     (message,) = status_texts(6, "Höhe 5 m")
     assert message._text_raw == "Höhe 5 m".encode()  # pymavlink shows texts as ASCII
-
-
-# ---------------------------------------------------------------------- streams
-
-
-def count(streams: Streams, seconds: float, vehicle_rate: float, step_s: float = 0.0005) -> dict[int, int]:
-    """Poll at the link's steps while vehicle time runs ``vehicle_rate`` times as fast; count messages."""
-    counts: dict[int, int] = {}
-    now_s, shown = 0.0, status()
-    told = Telemetry(lambda: shown, lambda: round(now_s * vehicle_rate * 1e6), usual_timing)
-    for tick in range(round(seconds / step_s)):
-        now_s = tick * step_s
-        for message in streams.due(told, 100.0 + now_s):
-            counts[message.get_msgId()] = counts.get(message.get_msgId(), 0) + 1
-    return counts
-
-
-@pytest.mark.parametrize("rates", [GROUND_RATES_HZ, API_RATES_HZ], ids=["ground", "api"])
-def test_rates_are_kept_when_both_clocks_are_one(rates: dict[int, float]) -> None:
-    counts = count(Streams(rates), 10.0, 1.0)
-    for message_id, rate in rates.items():
-        assert counts[message_id] == pytest.approx(rate * 10.0, abs=1), message_id
-
-
-def test_at_fast_vehicle_time_the_links_clock_limits() -> None:
-    counts = count(Streams(GROUND_RATES_HZ), 4.0, 50.0)
-    for message_id, rate in GROUND_RATES_HZ.items():
-        assert counts[message_id] == pytest.approx(rate * 4.0, abs=2), message_id
-
-
-def test_at_slow_vehicle_time_the_vehicles_clock_limits() -> None:
-    counts = count(Streams(GROUND_RATES_HZ), 10.0, 0.2)
-    for message_id, rate in GROUND_RATES_HZ.items():
-        assert counts[message_id] == pytest.approx(rate * 2.0, abs=1), message_id
-
-
-def test_while_vehicle_time_stands_each_is_sent_once() -> None:
-    assert count(Streams(GROUND_RATES_HZ), 10.0, 0.0) == dict.fromkeys(GROUND_RATES_HZ, 1)
-
-
-def test_after_a_gap_nothing_is_made_up_for() -> None:
-    streams = Streams({ATTITUDE: 10.0})
-    count(streams, 1.0, 1.0)
-    late = [
-        list(streams.due(telemetry(status(time_us=at)), at * 1e-6 + 100.0))
-        for at in (60_000_000, 60_010_000, 60_110_000)
-    ]
-    assert [len(sent) for sent in late] == [1, 0, 1]
-
-
-def test_intervals_can_be_set_stopped_and_reset() -> None:
-    streams = Streams(GROUND_RATES_HZ)
-    quaternion = mavlink.MAVLINK_MSG_ID_ODOMETRY  # one that this link does not send by itself
-    assert [streams.interval_us(number) for number in (ATTITUDE, quaternion, 9999)] == [20_000, -1, 0]
-    assert streams.set_interval(ATTITUDE, 100_000)
-    assert streams.set_interval(quaternion, 50_000)
-    assert streams.set_interval(mavlink.MAVLINK_MSG_ID_VFR_HUD, -1)
-    counts = count(streams, 10.0, 1.0)
-    assert counts[ATTITUDE] == pytest.approx(100, abs=1)
-    assert counts[quaternion] == pytest.approx(200, abs=1)
-    assert mavlink.MAVLINK_MSG_ID_VFR_HUD not in counts
-    assert streams.set_interval(ATTITUDE, 0)
-    assert streams.set_interval(quaternion, 0)  # its default is not to be sent
-    assert (streams.interval_us(ATTITUDE), streams.interval_us(quaternion)) == (20_000, -1)
-
-
-@pytest.mark.parametrize("interval", [math.nan, math.inf, -2.0, 2.0**31, 1e30])
-def test_intervals_that_cannot_be(interval: float) -> None:
-    streams = Streams(GROUND_RATES_HZ)
-    assert not streams.set_interval(ATTITUDE, interval)
-    assert not streams.set_interval(9999, 1e5)
-    assert streams.interval_us(ATTITUDE) == 20_000
 
 
 def test_the_loops_timing_is_streamed() -> None:

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from gcs_cli.tui.widgets.canvas import DASHED, Canvas, circle_vertices, rows_of_text
+from gcs_cli.charts.canvas import DASHED, Canvas, circle_vertices, rows_of_text
 
 pytestmark = pytest.mark.unit
 
 
 def shown(canvas):
-    return rows_of_text(canvas.segments())
+    return rows_of_text(canvas.rows())
 
 
 @pytest.mark.parametrize(
@@ -106,13 +106,13 @@ def test_rows_fill_the_width_and_colours_make_runs():
     canvas = Canvas(6, 2)
     canvas.points([0, 2], [0, 0], "red")
     canvas.points([4], [0], "green")
-    first, second = canvas.segments()
-    assert [(segment.text, str(segment.style)) for segment in first] == [
+    first, second = canvas.rows()
+    assert [(text, str(style)) for text, style in first] == [
         ("⠁⠁", "red"),
         ("⠁", "green"),
         ("   ", "none"),
     ]
-    assert [segment.text for segment in second] == [" " * 6]
+    assert [text for text, _ in second] == [" " * 6]
     assert canvas.text().plain == "⠁⠁⠁   \n      "
 
 

@@ -6,11 +6,12 @@ import pytest
 
 from flightstack.core.contract import Vector3
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.param_values import INT32, wire_value
 from flightstack.plan import Plan
 from gcs_cli.tui.fly.history import History
 from gcs_cli.tui.map.drawing import draw_map
 from gcs_cli.tui.map.model import MapModel
-from gcs_cli.tui.map.traffic import KEPT_S, Aircraft, Traffic
+from gcs_cli.tui.map.traffic import KEPT_S, OWN_ADDRESS, Aircraft, Traffic
 from gcs_cli.tui.map.viewport import Viewport
 from gcs_cli.tui.palette import DARK
 from tests.support.map_views import FRAME, VIEW
@@ -83,6 +84,46 @@ def test_only_aircraft_with_a_position_count(message, names) -> None:
     traffic = Traffic()
     traffic.record(message, NOW_S)
     assert [each.name for each in traffic.aircraft(NOW_S)] == names
+
+
+OWN = 0x3C6444
+
+
+def own_report():
+    message = report(OWN)
+    message.pack(mavlink.MAVLink(None, 1, 1))
+    return message
+
+
+@pytest.mark.parametrize("casts", [False, True], ids=["px4", "ardupilot"])
+def test_the_vehicle_s_own_transponder_is_no_traffic(casts) -> None:
+    traffic = Traffic()
+    traffic.record(report(OWN), NOW_S)
+    traffic.record(report(0x123456), NOW_S)
+    value = float(OWN) if casts else wire_value(OWN, is_integer=True)
+    answer = mavlink.MAVLink_param_value_message(OWN_ADDRESS.encode(), value, INT32, 9, 3)
+    traffic.record(answer, NOW_S, casts_parameters=casts)
+    assert len(traffic.aircraft(NOW_S)) == 1
+
+
+def test_own_address_is_requested_until_it_is_known() -> None:
+    traffic, message = Traffic(), own_report()
+    request = traffic.own_address_request(message, NOW_S)
+    assert (request.target_system, request.target_component, request.param_id) == (1, 1, OWN_ADDRESS)
+    assert traffic.own_address_request(message, NOW_S + 9.0) is None
+    assert traffic.own_address_request(message, NOW_S + 10.0) is not None
+    answer = mavlink.MAVLink_param_value_message(
+        OWN_ADDRESS.encode(), wire_value(OWN, is_integer=True), INT32, 9, 3
+    )
+    answer.pack(mavlink.MAVLink(None, 1, 1))
+    traffic.record(answer, NOW_S)
+    assert traffic.own_address_request(message, NOW_S + 20.0) is None
+
+
+def test_a_vehicle_without_own_address_is_asked_three_times() -> None:
+    traffic, message = Traffic(), own_report()
+    asked = [traffic.own_address_request(message, NOW_S + 10.0 * step) for step in range(9)]
+    assert sum(request is not None for request in asked) == 3
 
 
 def test_aircraft_are_bounded_and_old_ones_make_room() -> None:

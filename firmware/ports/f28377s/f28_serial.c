@@ -97,9 +97,11 @@ static void init_pins(void)
     GPIO_setQualificationMode(DEVICE_GPIO_PIN_SCITXDA, GPIO_QUAL_ASYNC);
 }
 
+/* SCI_setConfig switches the FIFOs off. */
 static void set_rate(uint32_t baud)
 {
     SCI_setConfig(SCIA_BASE, F28_LSPCLK_HZ, baud, SCI_CONFIG_WLEN_8); /* one stop bit, no parity: both are 0 */
+    SCI_enableFIFO(SCIA_BASE);
     silence_ms = 2UL + 20000UL / baud;
 }
 
@@ -120,7 +122,6 @@ void f28_serial_init(void)
     SCI_resetChannels(SCIA_BASE);
     SCI_resetRxFIFO(SCIA_BASE);
     SCI_resetTxFIFO(SCIA_BASE);
-    SCI_enableFIFO(SCIA_BASE);
     SCI_setFIFOInterruptLevel(SCIA_BASE, SCI_FIFO_TX4, SCI_FIFO_RX8);
     SCI_clearOverflowStatus(SCIA_BASE);
     SCI_clearInterruptStatus(SCIA_BASE, SCI_INT_TXFF | SCI_INT_RXFF);

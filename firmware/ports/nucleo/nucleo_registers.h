@@ -3,6 +3,7 @@
  *
  * Sources: ST's reference manuals RM0368 (STM32F401) and RM0390 (STM32F446): memory map, 2.3 and 2.2; flash interface, 3;
  * PWR, 5; RCC, 6; GPIO, 8 and 7; IWDG; USART, 19 and 25. Arm's ARMv7-M manual: SysTick B3.3, NVIC B3.4, DWT C1.8.
+ * Compared with ST's cmsis_device_f4 2.6.10 and CMSIS-Core 5.9.0: tests/firmware/test_register_numbers.py.
  */
 #ifndef NUCLEO_REGISTERS_H
 #define NUCLEO_REGISTERS_H

@@ -3,6 +3,7 @@
  *
  * Source: Raspberry Pi, RP2350 Datasheet: address map 2.2; atomic aliases 2.1.3; boot blocks 5.9; resets 7.5; clocks 8.1;
  * XOSC 8.2; PLL 8.6; tick generators 8.5; GPIO 9.11; SIO 3.1; UART 12.1; timers 12.8; watchdog 12.9.
+ * Compared with the headers of pico-sdk 2.2.0: tests/firmware/test_register_numbers.py.
  */
 #ifndef PICO2_REGISTERS_H
 #define PICO2_REGISTERS_H

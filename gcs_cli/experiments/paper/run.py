@@ -30,7 +30,7 @@ from gcs_cli.experiments.paper.report import pictures
 from gcs_cli.experiments.paper.report.page import render, report_figures
 from gcs_cli.experiments.paper.report.pictures import Picture
 from gcs_cli.experiments.paper.results import results_of, text_of
-from gcs_cli.report.run_directory import results_directory
+from gcs_cli.run_directory import results_directory
 from gcs_cli.tui.widgets.transfer_bar import step_bar
 
 JSON_NAME, HTML_NAME, FIGURES_NAME = "results.json", "report.html", "figures"

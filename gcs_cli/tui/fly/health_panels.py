@@ -21,7 +21,7 @@ def health_panel(view: VehicleView, _now_s: float, width: int, height: int, colo
     lines = [
         _failsafe(view, colours),
         _gnss(view, width, colours),
-        _estimator(view, colours),
+        _estimator(view, width, colours),
         _wind(view, colours),
     ]
     lines.insert(1 if view.unhealthy else len(lines), _sensors(view, colours))
@@ -69,10 +69,12 @@ def _gnss(view: VehicleView, width: int, colours: Palette) -> Text:
         parts.append(f"{gnss.satellites} sats")
     if gnss.hdop is not None and width >= 36:
         parts.append(f"HDOP {gnss.hdop:.1f}")
+    elif gnss.horizontal_accuracy_m is not None and width >= 36:
+        parts.append(f"±{gnss.horizontal_accuracy_m:.1f} m")
     return row_of("gnss", "  ".join(parts), colours.good if gnss.has_position else colours.bad, colours)
 
 
-def _estimator(view: VehicleView, colours: Palette) -> Text:
+def _estimator(view: VehicleView, width: int, colours: Palette) -> Text:
     estimator = view.estimator
     if estimator is None:
         return row_of("estimator", UNKNOWN, colours.text, colours)
@@ -87,6 +89,8 @@ def _estimator(view: VehicleView, colours: Palette) -> Text:
     parts = ["no " + ", ".join(missing) if missing else "good" if estimator.healthy else "rejects"]
     if ratio is not None:
         parts.append(f"ratio {ratio:.2f}")
+    if estimator.horizontal_m is not None and width >= 36:
+        parts.append(f"±{estimator.horizontal_m:.1f} m")
     doubtful = ratio is not None and ratio >= _DOUBTFUL_RATIO
     style = colours.bad if not estimator.healthy else colours.warning if doubtful else colours.good
     return row_of("estimator", "  ".join(parts), style, colours)

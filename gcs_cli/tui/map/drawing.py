@@ -9,10 +9,10 @@ from rich.text import Text
 
 from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import LocalFrame
+from gcs_cli.charts.canvas import DASHED, DOTS_X, DOTS_Y, DOTTED, Canvas, circle_vertices
 from gcs_cli.tui.map.scene import Craft, MapArea, MapPlan, MapScene, Place
 from gcs_cli.tui.map.viewport import Viewport, round_step
 from gcs_cli.tui.palette import Palette
-from gcs_cli.tui.widgets.canvas import DASHED, DOTS_X, DOTS_Y, DOTTED, Canvas, circle_vertices
 
 _GRID_DOTS = 40
 """Least distance of grid lines."""

@@ -8,7 +8,6 @@ from rich.text import Text
 from textual import work
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.widgets import Static
 
 from flightstack.core.contract import Vector3
 from gcs_cli.actions import in_flight
@@ -18,7 +17,7 @@ from gcs_cli.tui.map.widget import MapWidget
 from gcs_cli.tui.mission.plan_fetcher import PlanFetcher
 from gcs_cli.tui.orders.orders import vehicle_name
 from gcs_cli.tui.watch_screen import WatchScreen
-from gcs_cli.tui.widgets.drawing import watch_app
+from gcs_cli.tui.widgets.drawing import LineWidget, watch_app
 from gcs_cli.vehicle.view_types import VehicleView
 
 _EVERY = 2
@@ -28,7 +27,6 @@ _EVERY = 2
 class MapScreen(WatchScreen):
     """The map, and below it the legend and the place under the cursor."""
 
-    CSS = "MapScreen #place { height: 1; }"
     BINDINGS: ClassVar = [
         Binding("g", "goto", "Go here"),
         Binding("f", "map('follow')", "Follow"),
@@ -51,7 +49,7 @@ class MapScreen(WatchScreen):
     def compose_body(self) -> ComposeResult:
         """Yield the map and the line below."""
         yield MapWidget(id="map")
-        yield Static(id="place")
+        yield LineWidget(id="place")
 
     @property
     def map(self) -> MapWidget:
@@ -83,7 +81,7 @@ class MapScreen(WatchScreen):
 
     def _show_place(self) -> None:
         colours = watch_app(self).palette
-        line = self.query_one("#place", Static)
+        line = self.query_one("#place", LineWidget)
         width = line.size.width
         place = Text(no_wrap=True, end="")
         if self._model.frame is None:
@@ -101,7 +99,7 @@ class MapScreen(WatchScreen):
             left = Text(f"downloading the {self.plans.loading}", colours.muted, no_wrap=True, end="")
         left.append(" " * max(1, width - len(left) - len(place)))
         left.append_text(place)
-        line.update(left)
+        line.show_line(left)
 
     def action_map(self, method: str) -> None:
         """Call a method of the map without arguments."""

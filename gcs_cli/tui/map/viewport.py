@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flightstack.core.contract import FloatArray
-from gcs_cli.tui.widgets.canvas import DOTS_X, DOTS_Y
+from gcs_cli.charts.canvas import DOTS_X, DOTS_Y
 
 SMALLEST_M_PER_DOT, LARGEST_M_PER_DOT = 1e-3, 1e5
 _SMALLEST_FIT_M = 10.0

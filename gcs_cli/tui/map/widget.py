@@ -5,10 +5,10 @@ from __future__ import annotations
 from textual.events import Leave, MouseDown, MouseMove, MouseScrollDown, MouseScrollUp, MouseUp, Resize
 from textual.message import Message
 
+from gcs_cli.charts.canvas import DOTS_X, DOTS_Y
 from gcs_cli.tui.map.drawing import draw_map
 from gcs_cli.tui.map.scene import MapScene
 from gcs_cli.tui.map.viewport import Viewport
-from gcs_cli.tui.widgets.canvas import DOTS_X, DOTS_Y
 from gcs_cli.tui.widgets.canvas_widget import CanvasWidget
 from gcs_cli.tui.widgets.drawing import watch_app
 
@@ -58,7 +58,7 @@ class MapWidget(CanvasWidget):
         self._adjust_view()
         if self.view.width and self.view.height:
             canvas = draw_map(scene, self.view, watch_app(self).palette, grid=self._grid, cursor=self.cursor)
-            self.draw(canvas.segments())
+            self.draw(canvas)
 
     def _adjust_view(self) -> None:
         vehicle = self.scene.vehicle

@@ -7,7 +7,7 @@ from typing import ClassVar
 from textual import on, work
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.widgets import Input, Static
+from textual.widgets import Input
 
 from gcs_cli.actions import on_vehicle
 from gcs_cli.tui.fly.history import StreamKey
@@ -24,7 +24,7 @@ from gcs_cli.tui.orders.form import OrderForm
 from gcs_cli.tui.orders.orders import Field, Order
 from gcs_cli.tui.plot.fields import MOST_FIELDS
 from gcs_cli.tui.watch_screen import WatchScreen
-from gcs_cli.tui.widgets.drawing import watch_app
+from gcs_cli.tui.widgets.drawing import LineWidget, watch_app
 from gcs_cli.tui.widgets.line_list import LineList
 from gcs_cli.tui.widgets.search_field import SearchField
 from gcs_cli.vehicle.view_types import VehicleView
@@ -36,9 +36,6 @@ _EVERY = 2
 class InspectorScreen(WatchScreen):
     """Messages of all sources; Enter shows the fields of one."""
 
-    CSS = """
-    InspectorScreen #summary, InspectorScreen #header { height: 1; }
-    """
     BINDINGS: ClassVar = [
         Binding("enter", "expand", "Fields"),
         Binding("slash", "search", "Search"),
@@ -57,15 +54,15 @@ class InspectorScreen(WatchScreen):
     def __init__(self, mode: str) -> None:
         super().__init__(mode)
         self._rows: list[MessageRow] = []
-        self._lines: list[Line] = []
+        self.lines_shown: list[Line] = []
         self._expanded: frozenset[StreamKey] = frozenset()
         self._words = ""
         self._is_paused = False
 
     def compose_body(self) -> ComposeResult:
         """Yield the summary, the titles, the list and the search field."""
-        yield Static(id="summary")
-        yield Static(id="header")
+        yield LineWidget(id="summary")
+        yield LineWidget(id="header")
         yield LineList(id="messages")
         yield SearchField("words of a message, field or source", id="search")
 
@@ -77,7 +74,9 @@ class InspectorScreen(WatchScreen):
     @property
     def selected(self) -> Line | None:
         """The line at the cursor."""
-        return self._lines[self.line_list.cursor] if self.line_list.cursor < len(self._lines) else None
+        return (
+            self.lines_shown[self.line_list.cursor] if self.line_list.cursor < len(self.lines_shown) else None
+        )
 
     def show(self, view: VehicleView, now_s: float) -> None:
         """Read the messages, unless paused."""
@@ -89,11 +88,13 @@ class InspectorScreen(WatchScreen):
     def _redraw(self) -> None:
         app, width = watch_app(self), self.line_list.size.width - self.line_list.scrollbar_size_vertical
         rows = filtered(self._rows, self._words)
-        self._lines = lines(rows, self._expanded, app.plot_fields.names, max(20, width), app.palette)
-        self.line_list.set_lines([line.key for line in self._lines], [line.text for line in self._lines])
+        self.lines_shown = lines(rows, self._expanded, app.plot_fields.names, max(20, width), app.palette)
+        self.line_list.set_lines(
+            [line.key for line in self.lines_shown], [line.text for line in self.lines_shown]
+        )
         state = summary(self._rows, len(rows), self._words, self._is_paused, app.palette)
-        self.query_one("#summary", Static).update(state)
-        self.query_one("#header", Static).update(header(max(20, width), app.palette))
+        self.query_one("#summary", LineWidget).show_line(state)
+        self.query_one("#header", LineWidget).show_line(header(max(20, width), app.palette))
 
     def on_resize(self) -> None:
         """Draw in the new size."""

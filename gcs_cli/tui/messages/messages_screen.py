@@ -8,14 +8,14 @@ from rich.text import Text
 from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.widgets import Input, RichLog, Static
+from textual.widgets import Input, RichLog
 
 from flightstack.core.enums import Severity
 from gcs_cli.tui.fly.panels import message_lines
 from gcs_cli.tui.messages.message_log import ENTRIES_KEPT, Entry, selected
 from gcs_cli.tui.palette import Palette
 from gcs_cli.tui.watch_screen import WatchScreen
-from gcs_cli.tui.widgets.drawing import watch_app
+from gcs_cli.tui.widgets.drawing import LineWidget, watch_app
 from gcs_cli.tui.widgets.search_field import SearchField
 from gcs_cli.vehicle.view_types import VehicleView
 
@@ -45,7 +45,7 @@ class MessagesScreen(WatchScreen):
 
     def compose_body(self) -> ComposeResult:
         """Yield the filter's state, the list, and the search field."""
-        yield Static(id="filter")
+        yield LineWidget(id="filter")
         yield RichLog(id="texts", wrap=False, max_lines=ENTRIES_KEPT, auto_scroll=False, markup=False)
         yield SearchField("words to search", id="search")
 
@@ -80,7 +80,7 @@ class MessagesScreen(WatchScreen):
         text = f"{LEVELS[self._level][1]}: {shown} of {len(entries)}"
         if self._words:
             text += f", with “{self._words}”"
-        self.query_one("#filter", Static).update(Text(text))
+        self.query_one("#filter", LineWidget).show_line(Text(text))
 
     def on_resize(self) -> None:
         """Wrap the lines anew."""

@@ -11,7 +11,6 @@ from textual import on, work
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
-from textual.widgets import Static
 
 from flightstack.core.enums import Severity
 from flightstack.core.geodesy import GeoPoint
@@ -37,7 +36,7 @@ from gcs_cli.tui.mission.rows import (
     summary,
 )
 from gcs_cli.tui.orders.orders import asks_to_start, in_air, vehicle_name
-from gcs_cli.tui.widgets.drawing import watch_app
+from gcs_cli.tui.widgets.drawing import LineWidget, watch_app
 from gcs_cli.tui.widgets.entry_form import EntryForm
 from gcs_cli.tui.widgets.job_screen import JobScreen, some_of
 from gcs_cli.tui.widgets.row_list import RowList, title_text
@@ -83,9 +82,9 @@ class MissionScreen(JobScreen):
 
     def compose_body(self) -> ComposeResult:
         """Yield the line of state and the table."""
-        yield Static(id="mission-state")
+        yield LineWidget(id="mission-state")
         with Vertical(id="mission-table"):
-            yield Static(id="mission-titles")
+            yield LineWidget(id="mission-titles")
             yield RowList(id="mission-rows")
 
     def on_mount(self) -> None:
@@ -144,7 +143,7 @@ class MissionScreen(JobScreen):
     def _draw_table(self, table: MissionTable, progress: Progress, *, in_flight: bool) -> None:
         colours = watch_app(self).palette
         columns = mission_columns(self.rows.size.width, in_flight=in_flight)
-        self.query_one("#mission-titles", Static).update(title_text(columns, colours.muted))
+        self.query_one("#mission-titles", LineWidget).show_line(title_text(columns, colours.muted))
 
         def draw(seq: int, _width: int) -> Text:
             return mission_row(table, seq, progress, columns, colours)

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from flightstack.core.contract import FloatArray
+from gcs_cli.charts.canvas import DOTS_X, DOTS_Y, Canvas
 from gcs_cli.tui.map.viewport import round_step
 from gcs_cli.tui.palette import Palette
-from gcs_cli.tui.widgets.canvas import DOTS_X, DOTS_Y, Canvas
 
 CURVE_COLOURS = ("#63a8ff", "#ffa04d", "#4fd196", "#ff7ab8", "#b797ff", "#dcbb4a", "#4dd0dd", "#ff6b6b")
 _GAP_PERIODS, _LEAST_GAP_S = 6.0, 1.0

@@ -9,11 +9,11 @@ from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.events import Leave, MouseMove, MouseScrollDown, MouseScrollUp, Resize
 
+from gcs_cli.charts.canvas import Canvas
 from gcs_cli.tui.plot.drawing import Curve, Span, cell_time, draw_plot, gutter_of
 from gcs_cli.tui.plot.field_picker import Choice, FieldPicker
 from gcs_cli.tui.plot.fields import MOST_FIELDS, PlotFields, field_choices
 from gcs_cli.tui.watch_screen import WatchScreen
-from gcs_cli.tui.widgets.canvas import Canvas
 from gcs_cli.tui.widgets.canvas_widget import CanvasWidget
 from gcs_cli.tui.widgets.drawing import watch_app
 from gcs_cli.vehicle.view_types import VehicleView
@@ -58,7 +58,7 @@ class PlotWidget(CanvasWidget):
         else:
             canvas = Canvas(self.size.width, self.size.height)
             canvas.label(2, 1, "nothing is plotted: press Enter to add fields", colours.muted)
-        self.draw(canvas.segments())
+        self.draw(canvas)
 
     def zoom(self, steps: int) -> None:
         """Show a longer (positive) or shorter time."""

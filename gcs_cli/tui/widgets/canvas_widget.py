@@ -1,31 +1,16 @@
-"""A widget that shows rows of segments, such as those of a canvas."""
+"""A widget that shows a canvas."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from rich.segment import Segment
-from textual.strip import Strip
-from textual.widget import Widget
+from gcs_cli.charts.canvas import Canvas
+from gcs_cli.tui.widgets.drawing import LinesWidget
 
 
-class CanvasWidget(Widget):
-    """Shows the rows given to ``draw``; only rows that changed are drawn again."""
+class CanvasWidget(LinesWidget):
+    """Shows the canvas given to ``draw``; only rows that changed are drawn again."""
 
     DEFAULT_CSS = "CanvasWidget { width: 1fr; height: 1fr; }"
 
-    def __init__(self, *, id: str | None = None) -> None:
-        super().__init__(id=id)
-        self._strips: list[Strip] = []
-
-    def draw(self, rows: Sequence[Sequence[Segment]]) -> None:
-        """Show ``rows``, from the top."""
-        strips = [Strip(row) for row in rows]
-        if strips != self._strips:
-            self._strips = strips
-            self.refresh()
-
-    def render_line(self, y: int) -> Strip:
-        """Return a row."""
-        strip = self._strips[y] if y < len(self._strips) else Strip([])
-        return strip.adjust_cell_length(self.content_size.width).apply_style(self.rich_style)
+    def draw(self, canvas: Canvas) -> None:
+        """Show ``canvas``."""
+        self.show_lines(canvas.rows())

@@ -1,4 +1,4 @@
-"""A widget that shows lines drawn by a pure function of the vehicle's state."""
+"""Widgets that show lines, of which only the changed ones are drawn again."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from rich.segment import Segment
 from rich.style import Style
 from rich.text import Text
 from textual.events import Resize
+from textual.filter import ANSIToTruecolor, LineFilter
 from textual.geometry import Region
 from textual.strip import Strip
 from textual.widget import Widget
 
+from gcs_cli.charts.runs import Runs
 from gcs_cli.tui.palette import Palette
-from gcs_cli.tui.widgets.runs import Runs
 from gcs_cli.vehicle.view_types import VehicleView
 
 if TYPE_CHECKING:
@@ -26,32 +27,22 @@ Draw: TypeAlias = Callable[[VehicleView, float, int, int, Palette], Sequence[Tex
 """Draws a vehicle's state as of a time [s] in a number of columns and rows."""
 
 
-class Drawing(Widget):
-    """Shows the lines of ``draw``; a line is sent to the terminal only if it changed.
-
-    ``every``: draw in one of so many redraws of the screen; figures that change faster cannot be read.
-    """
+class LinesWidget(Widget):
+    """Shows lines in the colours of the palette; a line is sent to the terminal only if it changed."""
 
     ALLOW_SELECT = False
 
-    def __init__(self, draw: Draw, title: str = "", *, every: int = 2, id: str | None = None) -> None:
+    def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
-        self.every = every
-        self._draw = draw
         self._lines: Sequence[Text | Runs] = []
         self._strips: list[Strip] = []
         self._background = Style()
         self._palette: Palette | None = None
         """The palette of ``_background``; None if the style has changed since."""
-        self.border_title = title or None
 
-    def show(self, view: VehicleView, now_s: float) -> None:
-        """Draw ``view``."""
-        width, height = self.content_size
-        if width <= 0 or height <= 0:
-            return
-        colours = watch_app(self).palette
-        lines = self._draw(view, now_s, width, height, colours)
+    def show_lines(self, lines: Sequence[Text | Runs]) -> None:
+        """Show ``lines`` from the top."""
+        width, colours = self.content_size.width, watch_app(self).palette
         if colours is not self._palette:  # rich_style collects the styles of all ancestors
             self._palette, background = colours, self.rich_style
             if background != self._background:
@@ -70,15 +61,14 @@ class Drawing(Widget):
         if changed:
             self.refresh(*changed)
 
+    def get_line_filters(self) -> Sequence[LineFilter]:
+        """Return the filters that the colours of the palette need."""
+        return palette_filters(super().get_line_filters())
+
     def notify_style_update(self) -> None:
         """Read the style again at the next drawing."""
         self._palette = None
         super().notify_style_update()
-
-    def on_resize(self, _event: Resize) -> None:
-        """Draw in the new size."""
-        feed = watch_app(self).feed
-        self.show(feed.view, feed.now_s)
 
     def render_line(self, y: int) -> Strip:
         """Return a line of the content."""
@@ -87,6 +77,52 @@ class Drawing(Widget):
             if y < len(self._strips)
             else Strip.blank(self.content_size.width, self.rich_style)
         )
+
+
+class Drawing(LinesWidget):
+    """Shows the lines that ``draw`` returns for the vehicle's state.
+
+    ``every``: draw in one of so many redraws of the screen; figures that change faster cannot be read.
+    """
+
+    def __init__(self, draw: Draw, title: str = "", *, every: int = 2, id: str | None = None) -> None:
+        super().__init__(id=id)
+        self.every = every
+        self._draw = draw
+        self.border_title = title or None
+
+    def show(self, view: VehicleView, now_s: float) -> None:
+        """Draw ``view``."""
+        width, height = self.content_size
+        if width > 0 and height > 0:
+            self.show_lines(self._draw(view, now_s, width, height, watch_app(self).palette))
+
+    def on_resize(self, _event: Resize) -> None:
+        """Draw in the new size."""
+        feed = watch_app(self).feed
+        self.show(feed.view, feed.now_s)
+
+
+class LineWidget(LinesWidget):
+    """Shows one line."""
+
+    DEFAULT_CSS = "LineWidget { height: 1; }"
+
+    def show_line(self, line: Text) -> None:
+        """Show ``line``."""
+        self.show_lines([line])
+
+    def on_resize(self, _event: Resize) -> None:
+        """Draw in the new size."""
+        self.show_lines(self._lines)
+
+
+def palette_filters(filters: Sequence[LineFilter]) -> list[LineFilter]:
+    """Return ``filters`` without the one of the terminal's 16 colours: the palette has none of them.
+
+    It takes as long as the drawing of a plot.
+    """
+    return [each for each in filters if not isinstance(each, ANSIToTruecolor)]
 
 
 def strip_of(line: Text | Runs, base: Style) -> Strip:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TypeVar
 
 from rich.text import Text
-from textual.widgets import Static
 
 from flightstack.core.enums import Severity
 from flightstack.core.errors import ConfigError
@@ -16,7 +15,7 @@ from gcs_cli.errors import CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.tui.orders.confirm import Confirm
 from gcs_cli.tui.watch_screen import WatchScreen
-from gcs_cli.tui.widgets.drawing import watch_app
+from gcs_cli.tui.widgets.drawing import LineWidget, watch_app
 from gcs_cli.tui.widgets.entry_form import Entry, EntryForm, PathSuggester
 
 Value = TypeVar("Value")
@@ -119,11 +118,11 @@ class JobScreen(WatchScreen):
 
     def show_line(self, id: str, left: Text, right: Text) -> None:
         """Show two texts in a line, at its ends; the left one is cut if they do not fit."""
-        line = self.query_one(f"#{id}", Static)
+        line = self.query_one(f"#{id}", LineWidget)
         room = max(0, line.content_size.width - len(right) - 1)
         left = left.copy()
         left.truncate(room, overflow="ellipsis", pad=True)
-        line.update(left.append(" ").append_text(right))
+        line.show_line(left.append(" ").append_text(right))
 
 
 def some_of(lines: Sequence[str]) -> str:

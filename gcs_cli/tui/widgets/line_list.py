@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
+from itertools import zip_longest
 
 from rich.segment import Segment
 from rich.style import Style
 from rich.text import Text
 from textual.events import Click
+from textual.filter import LineFilter
 from textual.geometry import Size
 from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
-from gcs_cli.tui.widgets.drawing import strip_of, watch_app
+from gcs_cli.tui.widgets.drawing import palette_filters, strip_of, watch_app
 
 
 class LineList(ScrollView):
@@ -33,13 +35,16 @@ class LineList(ScrollView):
 
     def set_lines(self, keys: Sequence[Hashable], texts: Sequence[Text]) -> None:
         """Show ``texts``."""
-        selected = self._keys[self.cursor] if self.cursor < len(self._keys) else None
+        former, cursor = self._texts, self.cursor
+        selected = self._keys[cursor] if cursor < len(self._keys) else None
         self._keys, self._texts = list(keys), list(texts)
         if selected in self._keys:
             self.cursor = self._keys.index(selected)
         self.cursor = max(0, min(self.cursor, len(self._keys) - 1))
         self.virtual_size = Size(self.size.width, len(self._texts))
-        self.refresh()
+        for index, (old, new) in enumerate(zip_longest(former, texts)):
+            if old != new or (self.cursor != cursor and index in (self.cursor, cursor)):
+                self.refresh_line(index)
 
     def move(self, steps: int) -> None:
         """Move the cursor, and scroll so that it is visible."""
@@ -63,6 +68,10 @@ class LineList(ScrollView):
             self.cursor = index
             self.refresh()
             self.post_message(self.Chosen())
+
+    def get_line_filters(self) -> Sequence[LineFilter]:
+        """Return the filters that the colours of the palette need."""
+        return palette_filters(super().get_line_filters())
 
     def render_line(self, y: int) -> Strip:
         """Return a visible line."""

@@ -8,12 +8,13 @@ from typing import ClassVar, NamedTuple, TypeAlias
 from rich.text import Text
 from textual.binding import Binding
 from textual.events import Click, Resize
+from textual.filter import LineFilter
 from textual.geometry import Region, Size
 from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
-from gcs_cli.tui.widgets.drawing import strip_of, watch_app
+from gcs_cli.tui.widgets.drawing import palette_filters, strip_of, watch_app
 
 _GAP = 1
 
@@ -91,15 +92,24 @@ class RowList(ScrollView, can_focus=True):
         self.cursor = 0
         self.count = 0
         self._draw: DrawRow | None = None
+        self._texts: dict[int, Text] = {}
+        """The rows that were drawn, by index."""
 
     def show_rows(self, count: int, draw: DrawRow) -> None:
         """Show the rows 0 to ``count`` - 1; the cursor keeps its row."""
         self._draw = draw
+        first, width = self.scroll_offset.y, self.size.width
         if count != self.count:
             self.count = count
-            self.virtual_size = Size(self.size.width, count)
+            self.virtual_size = Size(width, count)
+            self.refresh()
         self.cursor = max(0, min(self.cursor, count - 1))
-        self.refresh()
+        visible = range(first, min(count, first + self.size.height))
+        texts = {index: draw(index, width) for index in visible}
+        for index, text in texts.items():
+            if text != self._texts.get(index):
+                self.refresh_line(index)
+        self._texts = texts
 
     def select(self, index: int) -> None:
         """Move the cursor to a row, and scroll to it."""
@@ -112,8 +122,18 @@ class RowList(ScrollView, can_focus=True):
 
     def on_resize(self, _event: Resize) -> None:
         """Keep the cursor on the screen."""
+        self._texts.clear()
         self.virtual_size = Size(self.size.width, self.count)
         self.scroll_to_region(Region(0, self.cursor, 1, 1), animate=False, force=True)
+
+    def get_line_filters(self) -> Sequence[LineFilter]:
+        """Return the filters that the colours of the palette need."""
+        return palette_filters(super().get_line_filters())
+
+    def notify_style_update(self) -> None:
+        """Draw the rows in the colours of another theme."""
+        self._texts.clear()
+        super().notify_style_update()
 
     def render_line(self, y: int) -> Strip:
         """Return a line of the content."""
@@ -121,12 +141,15 @@ class RowList(ScrollView, can_focus=True):
         base = self.rich_style
         if self._draw is None or index >= self.count:
             return Strip.blank(width, base)
-        row = self._draw(index, width)
+        row = self._texts.get(index)
+        if row is None:
+            row = self._texts[index] = self._draw(index, width)
         if index == self.cursor:
             colours = watch_app(self).palette
             if self.has_focus:
                 chosen = f"bold {colours.background} on {colours.accent}"
                 return strip_of(Text(row.plain.ljust(width), chosen), base).crop(0, width)
+            row = row.copy()
             row.stylize(f"on {colours.surface}")
         return strip_of(row, base).adjust_cell_length(width, base)
 

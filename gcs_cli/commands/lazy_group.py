@@ -17,17 +17,18 @@ from gcs_cli.commands.examples import epilog
 
 
 class LazyCommand(NamedTuple):
-    """A command of ``module.app``."""
+    """A command of the Typer app ``app`` in ``module``."""
 
     module: str
     summary: str
     """The line in the list of commands; equal to the first sentence of the command's help."""
     hidden: bool = False
     """True for a former name, which the list leaves out."""
+    app: str = "app"
 
     def load(self, words: str) -> Any:
         """Import the module and return the Click command, named by its ``words``, such as ``mission upload``."""
-        loaded = get_command(import_module(self.module).app)
+        loaded = get_command(getattr(import_module(self.module), self.app))
         command = loaded.commands[words.rsplit(maxsplit=1)[-1]] if isinstance(loaded, TyperGroup) else loaded
         command.epilog = epilog(words)
         return command

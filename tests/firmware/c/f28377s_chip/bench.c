@@ -12,6 +12,7 @@ volatile uint16_t f28_stack[F28_STACK_WORDS]; /* the linker's on the board */
 void bench_passes(uint32_t cycles, uint32_t work);
 void bench_run_line(uint32_t work);
 uint32_t bench_stack_size(void);
+void bench_software_reset(void);
 
 /* Run the main loop for so many cycles; each pass has `work` cycles of its own besides its calls of driverlib. */
 void bench_passes(uint32_t cycles, uint32_t work)
@@ -36,4 +37,9 @@ void bench_run_line(uint32_t work)
 uint32_t bench_stack_size(void)
 {
     return F28_STACK_WORDS;
+}
+
+void bench_software_reset(void)
+{
+    SCI_performSoftwareReset(SCIA_BASE);
 }

@@ -1,7 +1,8 @@
 /*
- * The chip that the tests simulate behind driverlib's names, cycle by cycle of SYSCLK: SCIA with its FIFOs, CPU timers
- * 0 and 1, the interrupt controller, the watchdog, pins. Every call of a driverlib function takes FAKE_CALL cycles, in
- * which octets come and go and interrupts strike, so the port is interrupted between any two of its calls.
+ * The chip that the tests simulate below driverlib, register by register and cycle by cycle of SYSCLK: SCIA with its FIFOs,
+ * CPU timers 0 and 1, the interrupt controller, the watchdog, pins. Driverlib is TI's where there is C2000Ware, otherwise
+ * the part in own/. Every access to a register takes FAKE_ACCESS cycles, in which octets come and go and interrupts strike,
+ * so the port is interrupted between any two of its accesses.
  */
 #ifndef FAKE_H
 #define FAKE_H
@@ -9,7 +10,7 @@
 #include "driverlib.h"
 
 #define FAKE_SYSCLK 200000000ULL
-#define FAKE_CALL 10U
+#define FAKE_ACCESS 10U
 
 /* What the line brings: an octet in the low 8 bits, or with one of these. */
 #define FAKE_FRAMING 0x100U /* the octet arrives, its stop bit is low */
@@ -32,8 +33,8 @@
 #define FAKE_EDGE 1U
 
 /*
- * A moment between two given calls is hit by an interrupt once in hours. fake_strike_every makes that common: whatever
- * the FIFOs hold, those of SCIA's interrupts that the SCI has enabled strike at every n-th call of the main loop, or
+ * A moment between two given accesses is hit by an interrupt once in hours. fake_strike_every makes that common: whatever
+ * the FIFOs hold, those of SCIA's interrupts that the SCI has enabled strike at every n-th access of the main loop, or
  * wait there until they are unmasked.
  */
 void fake_strike_every(uint32_t n); /* 0, as after power on: only when the chip has a reason */

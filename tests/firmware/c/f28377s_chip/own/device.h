@@ -1,6 +1,6 @@
 /* Stands in for the board's device.h with _LAUNCHXL_F28377S: names and values alone, written for the tests. */
-#ifndef FAKE_DEVICE_H
-#define FAKE_DEVICE_H
+#ifndef OWN_DEVICE_H
+#define OWN_DEVICE_H
 
 #include "driverlib.h"
 

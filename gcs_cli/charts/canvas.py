@@ -6,7 +6,7 @@ down from the upper left corner, so that dot i covers i to i + 1; all drawing is
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from functools import cache
 from typing import Any, NamedTuple, TypeAlias
 
@@ -17,6 +17,7 @@ from rich.style import Style
 from rich.text import Text
 
 from flightstack.core.contract import FloatArray
+from gcs_cli.charts.runs import Run, Runs
 
 DOTS_X, DOTS_Y = 2, 4
 """Dots in a cell."""
@@ -47,7 +48,7 @@ def parse_style(style: str) -> Style:
 
 
 class Canvas:
-    """Dots and text of ``width`` × ``height`` cells, drawn by methods and read by ``text`` or ``segments``.
+    """Dots and text of ``width`` × ``height`` cells, drawn by methods and read by ``text`` or ``rows``.
 
     Where lines of several colours meet in a cell, the last one gives the colour.
     """
@@ -119,8 +120,8 @@ class Canvas:
             return False
         return not self._codes[row, column : column + length].any()
 
-    def segments(self) -> list[list[Segment]]:
-        """Return the rows, each as segments of equal style that fill the width."""
+    def rows(self) -> list[Runs]:
+        """Return the rows, each as runs of equal style that fill the width."""
         cells = self._dots.reshape(self.height, DOTS_Y, self.width, DOTS_X)
         bits = np.einsum("ijkl,jl->ik", cells, _WEIGHTS, dtype=np.uint8, casting="unsafe")
         has_text = self._codes > 0
@@ -131,18 +132,18 @@ class Canvas:
         is_start[:, 1:] = styles[:, 1:] != styles[:, :-1]
         starts = np.flatnonzero(is_start)
         ends = np.append(starts[1:], styles.size)[: len(starts)]
-        rows: list[list[Segment]] = [[] for _ in range(self.height)]
+        rows: list[list[Run]] = [[] for _ in range(self.height)]
         runs = zip(starts.tolist(), ends.tolist(), styles.ravel()[starts].tolist(), strict=True)
         for start, end, style in runs:
-            rows[start // self.width].append(Segment(marks[start:end], self._styles[style]))
-        return rows
+            rows[start // self.width].append((marks[start:end], self._styles[style]))
+        return [Runs(row) for row in rows]
 
     def text(self) -> Text:
         """Return the canvas as one text, a line a row."""
         text = Text(no_wrap=True, end="")
-        for row, segments in enumerate(self.segments()):
+        for row, runs in enumerate(self.rows()):
             text.append("\n" if row else "")
-            text.append_tokens((segment.text, segment.style) for segment in segments)
+            text.append_tokens(runs)
         return text
 
     def _style_index(self, style: str) -> int:
@@ -190,9 +191,9 @@ def circle_vertices(x: float, y: float, radius: float) -> tuple[FloatArray, Floa
     return x + radius * np.cos(angles), y + radius * np.sin(angles)
 
 
-def rows_of_text(rows: Iterable[Sequence[Segment]]) -> str:
-    """Return the characters of rows of segments, without trailing spaces."""
-    return "\n".join("".join(segment.text for segment in row).rstrip() for row in rows)
+def rows_of_text(rows: Iterable[Runs]) -> str:
+    """Return the characters of rows, without trailing spaces."""
+    return "\n".join(row.plain.rstrip() for row in rows)
 
 
 @cache

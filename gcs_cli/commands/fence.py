@@ -1,8 +1,0 @@
-"""``gcs fence``: the vehicle's geofence."""
-
-from __future__ import annotations
-
-from flightstack.plan import MissionType
-from gcs_cli.commands.plan_commands import make_part_app
-
-app = make_part_app(MissionType.FENCE)

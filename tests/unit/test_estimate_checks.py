@@ -1,0 +1,76 @@
+"""Checks of the estimate: reasons not to arm, and conditions of failsafes in flight."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from flightstack.commander.estimate_checks import PREFLIGHT, estimate_failsafes, estimate_refusals
+from flightstack.commander.failsafe import Failsafe
+from flightstack.estimation.health import NO_HEALTH, EstimateHealth
+from flightstack.params.behaviour import Behaviour
+
+GOOD = EstimateHealth(
+    aligned=True, has_origin=True, imu_age_s=0.0, imu_is_stuck=False, mag_age_s=0.01, baro_age_s=0.02, fix_age_s=0.1,
+    unaided_s=0.1, refused_s=0.0, horizontal_m=0.5, velocity_m_s=0.1, tilt_rad=0.005, gyro_bias_rad_s=0.005,
+    accel_bias_m_s2=0.05, velocity_ratio=0.2, position_ratio=0.2, height_ratio=0.2, heading_ratio=0.3,
+)  # fmt: skip
+
+
+def test_good_estimate_has_no_refusal_and_no_failsafe() -> None:
+    assert estimate_refusals(GOOD) == estimate_refusals(None) == ()
+    assert estimate_failsafes(GOOD, Behaviour()) == estimate_failsafes(None, Behaviour()) == frozenset()
+
+
+REFUSED = [
+    ({"imu_age_s": 2.0}, "the inertial sensor is missing"),
+    ({"imu_is_stuck": True}, "the inertial sensor is missing"),
+    ({"mag_age_s": math.inf}, "the compass is missing"),
+    ({"baro_age_s": 1.5}, "the barometer is missing"),
+    ({"fix_age_s": 3.0}, "GNSS has no fix"),
+    ({"aligned": False}, "the attitude is not aligned yet"),
+    ({"has_origin": False}, "the GNSS fix is not accurate enough yet"),
+    ({"gyro_bias_rad_s": 0.2}, "the gyroscope bias is too high"),
+    ({"accel_bias_m_s2": 0.4}, "the accelerometer bias is too high"),
+    ({"velocity_ratio": 0.6}, "the velocity estimate is not stable"),
+    ({"position_ratio": 0.6}, "the position estimate is not stable"),
+    ({"height_ratio": 1.1}, "the height estimate is not stable"),
+    ({"heading_ratio": 0.6}, "the heading estimate is not stable"),
+]
+
+
+@pytest.mark.parametrize(("change", "reason"), REFUSED)
+def test_each_fault_of_the_estimate_is_a_reason_not_to_arm(change: dict, reason: str) -> None:
+    assert estimate_refusals(GOOD._replace(**change)) == (reason,)
+
+
+def test_every_preflight_check_of_the_estimate_is_tested() -> None:
+    assert {reason for _, reason in REFUSED} == {text for text, _ in PREFLIGHT}
+
+
+def test_estimate_before_the_first_measurement_is_refused() -> None:
+    assert "GNSS has no fix" in estimate_refusals(NO_HEALTH)
+    assert "the attitude is not aligned yet" in estimate_refusals(NO_HEALTH)
+
+
+@pytest.mark.parametrize(
+    ("change", "failsafe"),
+    [
+        ({"imu_age_s": 0.05}, Failsafe.IMU_FAULT),
+        ({"imu_is_stuck": True}, Failsafe.IMU_FAULT),
+        ({"tilt_rad": 0.2}, Failsafe.ATTITUDE_DOUBTFUL),
+        ({"unaided_s": 5.1}, Failsafe.POSITION_LOST),
+        ({"horizontal_m": 5.1}, Failsafe.POSITION_LOST),
+        ({"refused_s": 1.1}, Failsafe.GNSS_REFUSED),
+    ],
+)
+def test_each_fault_of_the_estimate_is_a_condition_in_flight(change: dict, failsafe: Failsafe) -> None:
+    assert estimate_failsafes(GOOD._replace(**change), Behaviour()) == {failsafe}
+
+
+def test_limits_of_the_estimate_are_parameters() -> None:
+    behaviour = Behaviour(dead_reckoning_s=20.0, position_accuracy_m=-1.0, tilt_accuracy_deg=0.0)
+    doubtful = GOOD._replace(unaided_s=19.0, horizontal_m=90.0, tilt_rad=1.0)
+    assert estimate_failsafes(doubtful, behaviour) == frozenset()
+    assert estimate_failsafes(doubtful._replace(unaided_s=21.0), behaviour) == {Failsafe.POSITION_LOST}
