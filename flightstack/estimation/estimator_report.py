@@ -247,8 +247,8 @@ def _control(
     at_rest = bool(flags[LANDED]) and fused(REST_VELOCITY, 3)
     has_position, has_velocity = has_gnss and fused(GNSS_POSITION, 2), has_gnss and fused(GNSS_VELOCITY, 2)
     is_true = (
-        (ControlFlags.TILT_ALIGN, max(variances[ATTITUDE : ATTITUDE + 2]) < _TILT_RAD**2),
-        (ControlFlags.YAW_ALIGN, variances[ATTITUDE + 2] < _YAW_RAD**2),
+        (ControlFlags.TILT_ALIGN, max(variances[ATTITUDE : ATTITUDE + 2]) < _TILT_RAD * _TILT_RAD),
+        (ControlFlags.YAW_ALIGN, variances[ATTITUDE + 2] < _YAW_RAD * _YAW_RAD),
         (ControlFlags.GNSS_POSITION, has_position),
         (ControlFlags.MAG_3D, fused(MAG, 3)),
         (ControlFlags.IN_AIR, not flags[LANDED]),

@@ -74,6 +74,15 @@ class MissionProgress(NamedTuple):
     wants_return: bool
 
 
+class GuidanceMemory(NamedTuple):
+    """State of guidance: reference, mission, goal of the other modes, land detector."""
+
+    trajectory: FloatArray
+    mission: RecordArray
+    mode_target: RecordArray
+    land: FloatArray
+
+
 class Navigator:
     """Holds the state of guidance and enters modes. No I/O, no clock."""
 
@@ -161,6 +170,11 @@ class Navigator:
         return self._speeds
 
     # ------------------------------------------------------------------ state
+
+    @property
+    def memory(self) -> GuidanceMemory:
+        """The arrays in which guidance keeps its state."""
+        return GuidanceMemory(self._trajectory, self._mission, self._mode_target, self._land)
 
     @property
     def landed(self) -> bool:
