@@ -97,7 +97,7 @@ class Estimation:
 
     def sensed(self) -> Sensed:
         """Return what the estimator and its sensors know now; valid until the next update."""
-        return Sensed(self.estimator.memory[0], self._feed.newest)
+        return Sensed(self.estimator.memory[0], self._feed.newest, self._now.has_state)
 
     def _on_parameter(self, name: str, value: float) -> None:
         if name in ESTIMATOR_SPECS:
