@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -51,6 +52,15 @@ LEAD_M = 0.5
 PRESS_1_S, PRESSED_LIFT = 7.0, 0.45
 """Downward acceleration setpoint of such a vehicle per missing sink rate, until the lift is this share of the weight.
 It reduces the thrust independently of the gains: a vehicle in the air then sinks."""
+
+
+class GuidanceMemory(NamedTuple):
+    """State of guidance: reference, mission, goal of the other modes, land detector."""
+
+    trajectory: FloatArray
+    mission: RecordArray
+    mode_target: RecordArray
+    land: FloatArray
 
 
 @compiled

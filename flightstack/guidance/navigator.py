@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from flightstack.guidance.kernels import (
     DESCEND,
     DESCEND_LEVEL,
     TRAJECTORY_SIZE,
+    GuidanceMemory,
     goal_kernel,
     levelling_kernel,
     rest_kernel,
@@ -37,6 +38,7 @@ from flightstack.guidance.mission import (
     MISSION,
     NAV_DELAY,
     PLAN_ITEM,
+    MissionProgress,
     mission_start,
 )
 from flightstack.guidance.mission import LAND as LAND_ITEM
@@ -63,24 +65,6 @@ _YAW_AT = 9  # of trajectory and setpoint
 _NUMBER_WITHOUT_POSITION = _NUMBER | {Mode.LAND: DESCEND, Mode.POSITION: int(Mode.ALTITUDE)}
 _NUMBER_WITHOUT_VELOCITY = _NUMBER_WITHOUT_POSITION | {Mode.LAND: DESCEND_LEVEL}
 _STREAM_NUMBERS = frozenset(int(mode) for mode in STREAM_MODES)
-
-
-class MissionProgress(NamedTuple):
-    """Progress of the mission."""
-
-    current: int
-    reached: int
-    finished: bool
-    wants_return: bool
-
-
-class GuidanceMemory(NamedTuple):
-    """State of guidance: reference, mission, goal of the other modes, land detector."""
-
-    trajectory: FloatArray
-    mission: RecordArray
-    mode_target: RecordArray
-    land: FloatArray
 
 
 class Navigator:
