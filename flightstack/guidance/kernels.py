@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -55,6 +56,15 @@ LEAD_M = 0.5
 PRESS_1_S, PRESSED_LIFT = 7.0, 0.45
 """Downward acceleration setpoint of such a vehicle per missing sink rate, until the lift is this share of the weight.
 It reduces the thrust independently of the gains: a vehicle in the air then sinks."""
+
+
+class GuidanceMemory(NamedTuple):
+    """State of guidance: reference, mission, goal of the other modes, land detector."""
+
+    trajectory: FloatArray
+    mission: RecordArray
+    mode_target: RecordArray
+    land: FloatArray
 
 
 def mode_numbers(position: bool, velocity: bool) -> Mapping[Mode, int]:

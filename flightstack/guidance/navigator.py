@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from flightstack.core.enums import STREAM_MODES, Mode
 from flightstack.core.portable_math import atan2, distance
 from flightstack.guidance.kernels import (
     TRAJECTORY_SIZE,
+    GuidanceMemory,
     goal_kernel,
     levelling_kernel,
     mode_numbers,
@@ -36,6 +37,7 @@ from flightstack.guidance.mission import (
     MISSION,
     NAV_DELAY,
     PLAN_ITEM,
+    MissionProgress,
     mission_start,
 )
 from flightstack.guidance.mission import LAND as LAND_ITEM
@@ -59,24 +61,6 @@ ARRIVED_M = 0.5
 _OFFBOARD = Mode.OFFBOARD
 _YAW_AT = 9  # of trajectory and setpoint
 _STREAM_NUMBERS = frozenset(int(mode) for mode in STREAM_MODES)
-
-
-class MissionProgress(NamedTuple):
-    """Progress of the mission."""
-
-    current: int
-    reached: int
-    finished: bool
-    wants_return: bool
-
-
-class GuidanceMemory(NamedTuple):
-    """State of guidance: reference, mission, goal of the other modes, land detector."""
-
-    trajectory: FloatArray
-    mission: RecordArray
-    mode_target: RecordArray
-    land: FloatArray
 
 
 class Navigator:

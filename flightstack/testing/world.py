@@ -1,12 +1,4 @@
-"""A vehicle in a simulated world, with a ground station: one process, simulated time, no ports.
-
-world = World(vehicle="x_quad", wind=(4.0, 0.0))
-world.upload("square.plan")
-world.arm()
-world.start_mission()
-world.run_until(lambda s: not s.armed, timeout_s=120)
-assert world.flight().max_error_m < 0.5
-"""
+"""A vehicle in a simulated world, with a ground station: one process, simulated time, no ports."""
 
 from __future__ import annotations
 
