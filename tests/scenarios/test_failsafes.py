@@ -120,7 +120,7 @@ CASES: dict[Failsafe, Case] = {
         "estimated",
     ),
     F.GNSS_REFUSED: Case(
-        {"FS_GNSS_ACT": 2}, nothing, jump_gnss, "GNSS contradicts the estimate", "estimate", "estimated"
+        {"FS_GNSS_ACT": 2}, nothing, jump_gnss, "Spoofed GNSS suspected", "estimate", "estimated"
     ),
     F.NOT_FINITE: Case(
         {"FS_BLIND_T": 0.3},

@@ -16,11 +16,12 @@ def test_square_on_sensors_is_completed_within_the_limits_of_gnss() -> None:
         watch = Watch(world)
         flight = world.fly("square")
     assert flight.completed, flight.outcome
-    errors = watch.errors()  # measured: 0.24°, 0.60°, 0.05 m/s, 0.52 m, 0.56 m, 0.31 m
+    errors = watch.errors()  # measured: 0.21°, 0.55°, 0.05 m/s, 0.24 m, 0.17 m, 0.38 m
     assert errors.tilt_deg < 0.5
     assert errors.yaw_deg < 2.0
     assert errors.velocity_m_s < 0.15
     assert errors.horizontal_m < 0.7
+    assert errors.vertical_m < 0.4
     assert errors.landing_m < 1.5
 
 
@@ -85,6 +86,28 @@ def test_vehicle_does_not_tilt_for_a_reset_of_its_position() -> None:
         assert max(tilts) < 15.0  # 12.0, on the way back to the goal; 45 without the shift
         error_m = world.engine.stack.now.setpoint[:2] - world.engine.stack.now.state[:2]
         assert max(abs(error_m)) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("begin_s", "fault", "tilt_deg", "yaw_deg"),
+    [
+        (0.0, "sensor:gyro:bias=1,1,1", 0.5, 1.5),  # 0.22, 0.56
+        (0.0, "sensor:imu:vibration=10", 0.5, 1.5),  # 0.22, 0.58
+        (10.0, "sensor:mag:turn=90", 0.5, 3.0),  # 0.20, 1.41
+        (10.0, "sensor:accel:bias=0.5,0,0", 1.5, 2.5),  # 0.97, 1.08
+    ],
+)
+def test_estimate_stays_true_with_a_faulty_sensor(
+    begin_s: float, fault: str, tilt_deg: float, yaw_deg: float
+) -> None:
+    with World(vehicle="x_quad", state="estimated") as world:
+        watch = Watch(world)
+        world.after(begin_s, lambda: world.fault(fault))
+        assert world.fly("square").completed
+    errors = watch.errors()
+    assert errors.tilt_deg < tilt_deg
+    assert errors.yaw_deg < yaw_deg
+    assert errors.horizontal_m < 0.7  # 0.28 at most
 
 
 def test_square_on_sensors_is_flown_by_the_loops_in_c() -> None:

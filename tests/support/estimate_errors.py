@@ -13,7 +13,7 @@ from flightstack.testing import World
 
 
 class Errors(NamedTuple):
-    """Root mean squares of a flight."""
+    """Root mean squares of a flight; positions count from the origin of each."""
 
     tilt_deg: float
     yaw_deg: float

@@ -50,7 +50,7 @@ def test_every_preflight_check_of_the_estimate_is_tested() -> None:
 def test_condition_that_acts_in_the_air_prevents_arming() -> None:
     refused = GOOD._replace(refused_s=2.0)
     assert estimate_refusals(refused, Behaviour()) == ()  # a warning
-    reasons = ("spoofing suspected: GNSS contradicts the estimate",)
+    reasons = ("spoofed GNSS suspected",)
     assert estimate_refusals(refused, Behaviour(gnss_doubt_action=2)) == reasons
     assert estimate_refusals(GOOD._replace(tilt_rad=0.2), Behaviour()) == ("attitude estimate is doubtful",)
 
