@@ -17,7 +17,7 @@ from rich.style import Style
 from rich.text import Text
 
 from flightstack.core.contract import FloatArray
-from gcs_cli.tui.widgets.runs import Run, Runs
+from gcs_cli.charts.runs import Run, Runs
 
 DOTS_X, DOTS_Y = 2, 4
 """Dots in a cell."""

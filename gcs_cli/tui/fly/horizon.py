@@ -10,8 +10,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from rich.style import Style
 
+from gcs_cli.charts.runs import Run, Runs
 from gcs_cli.tui.palette import DARK, Palette
-from gcs_cli.tui.widgets.runs import Run, Runs
 from gcs_cli.vehicle.view_types import Euler
 
 _Codes: TypeAlias = np.ndarray[Any, np.dtype[np.uint8]]

@@ -16,8 +16,8 @@ from textual.geometry import Region
 from textual.strip import Strip
 from textual.widget import Widget
 
+from gcs_cli.charts.runs import Runs
 from gcs_cli.tui.palette import Palette
-from gcs_cli.tui.widgets.runs import Runs
 from gcs_cli.vehicle.view_types import VehicleView
 
 if TYPE_CHECKING:
