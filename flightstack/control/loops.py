@@ -74,25 +74,28 @@ class PythonLoops:
         max_tilt_rad: float,
     ) -> None:
         self._outer_dt_s = 1.0 / outer_hz
-        self._fraction_step, self._fraction = outer_hz / inner_hz, 0.0
+        self._fraction_step = outer_hz / inner_hz
+        self.fraction = 0.0
+        """Share of the way from the last attitude target to the present one."""
         controller = controller_of(controller)
         check_python(controller)
         numbers, laws = loop_numbers(vehicle, controller, gains, max_tilt_rad), controller.laws
-        self._memory: RecordArray = np.zeros(
-            1, inner_layout(len(vehicle.rotors), laws[ATTITUDE], laws[MIXER])
-        )
-        record = self._memory[0]
+        self.memory: RecordArray = np.zeros(1, inner_layout(len(vehicle.rotors), laws[ATTITUDE], laws[MIXER]))
+        """State and parameters of the inner loop."""
+        record = self.memory[0]
         for name, values in mixer_for(vehicle)._asdict().items():
             record[name] = values
         record["dt_s"], record["reference_params"] = 1.0 / inner_hz, numbers.reference
         record["attitude_params"], record["mixer_params"] = numbers.laws[ATTITUDE], numbers.laws[MIXER]
         self._initial = {role: np.array(law.initial_memory, np.float64) for role, law in laws.items()}
-        self._outer_memory, outer = joined(self._initial)
-        self._memories = {**outer, ATTITUDE: record["attitude"], MIXER: record["mixer"]}
+        self.outer_memory, outer = joined(self._initial)
+        """Integrals of the outer loop's laws."""
+        self.memories = {**outer, ATTITUDE: record["attitude"], MIXER: record["mixer"]}
+        """Memory of each law, by role."""
         self._outer_params, outer = joined(numbers.laws)
         live = {**outer, ATTITUDE: record["attitude_params"], MIXER: record["mixer_params"]}
         numbers = numbers._replace(laws=live, reference=record["reference_params"])
-        self._parameters = LoopParameters(numbers, controller, self._memories)
+        self._parameters = LoopParameters(numbers, controller, self.memories)
         self.parameter_specs = numbers.specs
         self.attitude_target: FloatArray = record["target"]
         self._last_target: FloatArray = record["last_target"]
@@ -133,19 +136,19 @@ class PythonLoops:
     def reset(self, state: FloatArray) -> None:
         """Reset the integrators to zero and the reference to the present attitude, at rest."""
         for role, values in self._initial.items():
-            self._memories[role][:] = values
+            self.memories[role][:] = values
         self._reference_memory[:4] = state[6:10]
         self._reference_memory[4:] = 0.0
         self.attitude_target[:4] = state[6:10]
         self.attitude_target[4] = 0.0
         self._last_target[:] = self.attitude_target
-        self._fraction = 0.0
+        self.fraction = 0.0
         self._last[:] = 0.0
 
     def set_attitude_target(self, target: FloatArray) -> None:
         """Use ``target``, shape (5,), instead of the outer loop's target. Call once per outer period."""
         self._last_target[:] = self.attitude_target
-        self._fraction = 0.0
+        self.fraction = 0.0
         self.attitude_target[:] = target
 
     def step(
@@ -162,27 +165,27 @@ class PythonLoops:
             self._bind(state, rotor_speed_rad_s, setpoint, row)
         if outer_due:
             self._last_target[:] = self.attitude_target
-            self._fraction = 0.0
+            self.fraction = 0.0
             self._outer(
                 state,
                 setpoint,
-                self._outer_memory,
+                self.outer_memory,
                 self._outer_params,
                 self._last,
                 self._outer_dt_s,
                 self.attitude_target,
             )
-        self._fraction += self._fraction_step
-        self._inner(state, self._fraction, rotor_speed_rad_s, self._memory, row)
+        self.fraction += self._fraction_step
+        self._inner(state, self.fraction, rotor_speed_rad_s, self.memory, row)
 
     def _bind(self, state: FloatArray, speeds: FloatArray, setpoint: FloatArray, row: FloatArray) -> None:
         """Select the generic kernels for new arrays, or bind direct calls when the same arrays come a second time."""
         self._inner, self._outer = self._kernel, self._outer_kernel
         self._bound = None
         if self._last_arrays is not None and state is self._last_arrays[0] and speeds is self._last_arrays[1]:
-            self._inner = direct(self._kernel, state, 1.0, speeds, self._memory, row)
+            self._inner = direct(self._kernel, state, 1.0, speeds, self.memory, row)
             self._outer = direct(
-                self._outer_kernel, state, setpoint, self._outer_memory, self._outer_params, self._last,
+                self._outer_kernel, state, setpoint, self.outer_memory, self._outer_params, self._last,
                 self._outer_dt_s, self.attitude_target,
             )  # fmt: skip
             self._bound = state, speeds

@@ -54,7 +54,7 @@ class FenceShape:
                 vertices += [self.local(*point) for point in area.points_deg]
             row["end"] = len(vertices)
         self.vertices: FloatArray = np.array(vertices, dtype=np.float64).reshape(-1, 2)
-        self._begins, self._ends = self._edges()
+        self.update_edges()
 
     def local(self, latitude_deg: float, longitude_deg: float) -> tuple[float, float]:
         """Return the place north and east of home [m]."""
@@ -66,10 +66,10 @@ class FenceShape:
         row = self.areas[index]
         return self.vertices[row["start"] : row["end"]]
 
-    def _edges(self) -> tuple[FloatArray, FloatArray]:
-        """Return start and end points of all polygon edges, each of shape (n, 2)."""
+    def update_edges(self) -> None:
+        """Compute the edges of all polygons from ``vertices``."""
         ends = [np.roll(self.polygon(index), -1, axis=0) for index in range(len(self.areas))]
-        return self.vertices, np.concatenate(ends) if ends else self.vertices
+        self._begins, self._ends = self.vertices, np.concatenate(ends) if ends else self.vertices
 
     def allowed(self, places: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         """Return for each of ``places``, shape (n, 2), whether the vehicle may be there."""

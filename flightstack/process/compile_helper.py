@@ -36,7 +36,7 @@ from flightstack.simulator_link.endpoint import SimulatorEndpoint
 GUIDANCE = "flightstack.process.compile_helper:compile_guidance"
 COMMANDER = "flightstack.process.compile_helper:compile_commander"
 
-_helper: subprocess.Popen[bytes] | None = None
+helper: subprocess.Popen[bytes] | None = None
 _tasks: tuple[str, ...] = ()
 
 
@@ -46,12 +46,12 @@ def start(announced: Sequence[str] = (), tasks: Sequence[str] = (GUIDANCE, COMMA
     It ends at the latest with this process. It announces its kernels on stderr if ``announced`` names all kernels of
     the program.
     """
-    global _helper, _tasks  # noqa: PLW0603  # one helper for each process
-    if _helper is not None or not _is_useful():
+    global helper, _tasks  # noqa: PLW0603  # one helper for each process
+    if helper is not None or not is_useful():
         return
     path = os.pathsep.join(str(Path(entry).absolute()) for entry in sys.path)
     try:
-        _helper = subprocess.Popen(
+        helper = subprocess.Popen(
             [sys.executable, "-P", "-m", __name__, ",".join(tasks), *announced],
             stdin=subprocess.PIPE,  # closes with this process
             stdout=subprocess.PIPE,
@@ -61,7 +61,7 @@ def start(announced: Sequence[str] = (), tasks: Sequence[str] = (GUIDANCE, COMMA
     except OSError:
         return
     _tasks = tuple(tasks)
-    atexit.register(_end, _helper)
+    atexit.register(_end, helper)
 
 
 def _end(helper: subprocess.Popen[bytes]) -> None:
@@ -74,27 +74,28 @@ def finish(*, with_streams: bool) -> None:
 
     ``with_streams``: wait for the kernel of modes that follow a stream too.
     """
-    if _helper is None or _helper.stdout is None or _helper.stdout.closed:
+    if helper is None or helper.stdout is None or helper.stdout.closed:
         return
     if COMMANDER not in _tasks:
         compile_commander()
-    _helper.stdout.read(1)  # one byte after the tasks, none if it failed
-    _helper.stdout.close()
+    helper.stdout.read(1)  # one byte after the tasks, none if it failed
+    helper.stdout.close()
     if with_streams:
-        _helper.wait()
+        helper.wait()
     else:
-        threading.Thread(target=_helper.wait, daemon=True).start()
+        threading.Thread(target=helper.wait, daemon=True).start()
 
 
-def _is_useful() -> bool:
+def is_useful() -> bool:
     """Return True if a helper can run beside this process and share its results, and has something to do."""
     if numba.config.DISABLE_JIT or not is_shared():
         return False
     cpus = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return cpus > 1 and not _is_cached(goal_kernel)
+    return cpus > 1 and not is_cached(goal_kernel)
 
 
-def _is_cached(kernel: Any) -> bool:
+def is_cached(kernel: Any) -> bool:
+    """Return True if the cache on disk holds a compiled version of ``kernel``."""
     return any(Path(kernel.stats.cache_path).glob(f"*.{kernel.__name__}-*.nbi"))
 
 

@@ -67,18 +67,18 @@ class Server:
         """Number from which the ports derive."""
         self._faults = list(faults)
         self._kept_in: list[Path] = []
-        self._guard: subprocess.Popen[bytes] | None = None
+        self.guard: subprocess.Popen[bytes] | None = None
         end_s = time.monotonic() + timeout_s
         taken: set[int] = set()
-        while self._guard is None:
+        while self.guard is None:
             self.instance = free_instance(taken)
             taken.add(self.instance)
             try:
-                self._guard = self._start(speed)
+                self.guard = self._start(speed)
                 self._await_ports(end_s)
                 self._await_health(end_s)
             except _BusyError:  # another program took a port since: try the next instance
-                self._guard = None
+                self.guard = None
             except BaseException:
                 self.stop()
                 raise
@@ -111,16 +111,16 @@ class Server:
 
     def stop(self) -> None:
         """End both processes in order, and wait for their end; a second call does nothing."""
-        if self._guard is None:
+        if self.guard is None:
             return
-        guard, self._guard = self._guard, None
+        guard, self.guard = self.guard, None
         guard.communicate()  # closes its standard input
         for folder in self._kept_in:
             self._copy_to(folder)
 
     def keep_in(self, folder: Path) -> None:
         """Copy the files to ``folder`` once the processes have ended."""
-        if self._guard is None:
+        if self.guard is None:
             self._copy_to(folder)
         else:
             self._kept_in.append(folder)
@@ -159,18 +159,18 @@ class Server:
 
     def _await_ports(self, end_s: float) -> None:
         """Wait until both processes have their ports."""
-        assert self._guard is not None
-        assert self._guard.stdout is not None
-        while not select.select([self._guard.stdout], [], [], _STEP_S)[0]:
+        assert self.guard is not None
+        assert self.guard.stdout is not None
+        while not select.select([self.guard.stdout], [], [], _STEP_S)[0]:
             self._check_time(end_s)
-        line = self._guard.stdout.readline()
+        line = self.guard.stdout.readline()
         if line != READY:
             self._raise_end(line)
 
     def _await_health(self, end_s: float) -> None:
         """Wait until the vehicle reports that it can arm."""
-        assert self._guard is not None
-        assert self._guard.stdout is not None
+        assert self.guard is not None
+        assert self.guard.stdout is not None
         with Connection(parse_endpoint(self.gcs_url)) as connection:
             session, request = connection.session, None
             while not session.view.healthy:
@@ -181,7 +181,7 @@ class Server:
                     # before the first state of the simulator, SYS_STATUS is sent on request only
                     request = calls.command(session, *calls.REQUEST_SYS_STATUS, now_s)
                 connection.step(now_s + _STEP_S)
-                if select.select([self._guard.stdout], [], [], 0.0)[0]:
+                if select.select([self.guard.stdout], [], [], 0.0)[0]:
                     self._raise_end(b"")
                 self._check_time(end_s)
 
@@ -191,8 +191,8 @@ class Server:
 
     def _raise_end(self, line: bytes) -> NoReturn:
         """Raise the error of processes that have ended, for the reason that the guard gives."""
-        assert self._guard is not None
-        reason = (line + self._guard.communicate()[0]).decode(errors="replace").strip()
+        assert self.guard is not None
+        reason = (line + self.guard.communicate()[0]).decode(errors="replace").strip()
         kind = _BusyError if "in use" in reason else ServerError
         raise kind(f"{reason or 'the processes ended'}\n{self._tail()}")
 
@@ -221,6 +221,8 @@ def fly_options(setup: Setup, instance: int, speed: float) -> FlyOptions:
         drag=setup.drag,
         force=numbers(setup.force),
         torque=numbers(setup.torque),
+        slope=setup.slope_deg or None,
+        boat=numbers(setup.boat),
         torque_gust=setup.torque_gust or None,
         battery_start=setup.battery_percent,
         battery_capacity=setup.battery_capacity_mah,

@@ -55,7 +55,9 @@ def write_figure(path: Path, figure: AnyFigure, width_in: float = WIDTH_IN) -> N
     if metadata is None:
         raise ValueError(f"{path}: expected .pdf, .svg or .png")
     with mpl.rc_context(_SETTINGS):
-        canvas = _space(figure, width_in) if isinstance(figure, SpaceFigure) else _plane(figure, width_in)
+        canvas = (
+            _space(figure, width_in) if isinstance(figure, SpaceFigure) else plane_canvas(figure, width_in)
+        )
         with replacing(path) as temporary:
             canvas.savefig(temporary, format=path.suffix[1:], metadata=metadata, dpi=200)
 
@@ -69,7 +71,8 @@ def _band_labels(axes: Any, panel: Panel) -> None:
                       ha="center", va="bottom", fontsize=6.5, color=LIGHT["soft"])  # fmt: skip
 
 
-def _plane(figure: Figure, width_in: float) -> Canvas:
+def plane_canvas(figure: Figure, width_in: float) -> Canvas:
+    """Return the printed panels of a figure, ``width_in`` inches wide."""
     rows = math.ceil(len(figure.panels) / figure.columns)
     height_in = rows * (figure.height / _PX_PER_IN) + 0.7
     canvas = Canvas(figsize=(width_in, height_in), layout="constrained")

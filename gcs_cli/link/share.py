@@ -140,7 +140,7 @@ class ShareServer:
     """Serves the link of ``endpoint`` to other processes of the same user."""
 
     def __init__(self, listener: socket.socket, path: Path) -> None:
-        self._listener = listener
+        self.listener = listener
         self._path = path
         self._clients: list[tuple[StreamLine, FrameReader]] = []
 
@@ -169,7 +169,7 @@ class ShareServer:
     def interests(self) -> Iterable[Interest]:
         """Return the descriptors to wait for."""
         clients = [interest for line, _ in self._clients for interest in line.interests()]
-        return [(self._listener.fileno(), select.POLLIN), *clients]
+        return [(self.listener.fileno(), select.POLLIN), *clients]
 
     def receive(self, now_s: float) -> Iterator[bytes]:
         """Yield the frames that clients send to the vehicle; accept clients."""
@@ -179,7 +179,7 @@ class ShareServer:
         self._clients = [client for client in self._clients if client[0].is_connected]
         with contextlib.suppress(OSError):
             while True:
-                accepted = self._listener.accept()[0]
+                accepted = self.listener.accept()[0]
                 accepted.setblocking(False)
                 self._clients.append((StreamLine(socket.AF_UNIX, None, _SHARED, accepted), FrameReader()))
 
@@ -192,6 +192,6 @@ class ShareServer:
         """Close all connections and remove the socket."""
         for line, _ in self._clients:
             line.close()
-        self._listener.close()
+        self.listener.close()
         with contextlib.suppress(OSError):
             self._path.unlink()

@@ -168,7 +168,7 @@ class ReplayVehicle:
                 self._shows_state = True
                 self._heartbeat_due_s = now_s
             self._heard_s[peer], self._decoders[peer] = now_s, decoder
-            answer = _ANSWERS.get(message.get_type())
+            answer = ANSWERS.get(message.get_type())
             if answer is not None and (message.get_type() in _BROADCAST or is_for(message, self.address)):
                 answer(self, message, peer)
 
@@ -257,7 +257,7 @@ class ReplayVehicle:
 
 _BROADCAST = ("TIMESYNC",)
 """Messages without a target."""
-_ANSWERS: dict[str, Callable[[ReplayVehicle, Message, Place], None]] = {
+ANSWERS: dict[str, Callable[[ReplayVehicle, Message, Place], None]] = {
     "COMMAND_LONG": ReplayVehicle._on_command,
     "COMMAND_INT": ReplayVehicle._on_command,
     "PARAM_REQUEST_LIST": ReplayVehicle._on_parameter_list,

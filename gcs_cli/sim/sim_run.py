@@ -183,7 +183,7 @@ def simulate(options: SimOptions, out: Output, watch: bool) -> None:
         if not interruption.reason:
             out.say("ready", _ready_sentence(len(vehicles)), vehicles=len(vehicles))
             try:
-                with _view(first, watch) as view:
+                with opened_view(first, watch) as view:
                     while not interruption.reason and (view is None or view.poll() is None):
                         fleet.step(out, due_s, shows=view is None)
             finally:
@@ -197,7 +197,7 @@ def _ready_sentence(count: int) -> str:
 
 
 @contextlib.contextmanager
-def _view(vehicle: SimOptions, wanted: bool) -> Iterator[subprocess.Popen[bytes] | None]:
+def opened_view(vehicle: SimOptions, wanted: bool) -> Iterator[subprocess.Popen[bytes] | None]:
     """Run ``gcs watch`` on this terminal; at the end terminate it, so that it restores the terminal.
 
     It ends with this process, also if that is killed.

@@ -58,7 +58,7 @@ class Feed:
     """
 
     def __init__(self, connection: Connection) -> None:
-        self._connection = connection
+        self.connection = connection
         self.history = History()
         self.traffic = Traffic()
         self.messages = MessageLog()
@@ -73,19 +73,19 @@ class Feed:
         self._calls: deque[Callable[[], None]] = deque()
         """Short calls that run between two steps of the link, during a job too."""
         self._running: dict[int, _Running] = {}
-        self._rates_hz: dict[int, float] = dict(ROTORS_AND_TIMING)
+        self.rates_hz: dict[int, float] = dict(ROTORS_AND_TIMING)
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
 
     @property
     def view(self) -> VehicleView:
         """State of the selected vehicle."""
-        return self._connection.session.view
+        return self.connection.session.view
 
     @property
     def views(self) -> tuple[VehicleView, ...]:
         """States of all vehicles on the link, by system id."""
-        sessions = tuple(self._connection.fleet.sessions.values())
+        sessions = tuple(self.connection.fleet.sessions.values())
         return tuple(sorted((session.view for session in sessions), key=lambda view: view.identity or ()))
 
     @property
@@ -97,19 +97,19 @@ class Feed:
     @property
     def now_s(self) -> float:
         """Clock of the connection [s]."""
-        return self._connection.now_s
+        return self.connection.now_s
 
     @property
     def link_name(self) -> str:
         """Address of the link."""
-        return str(self._connection.endpoint)
+        return str(self.connection.endpoint)
 
     def start(self) -> None:
         """Start to receive."""
-        self._connection.fleet.observe = self._observe
-        self._connection.on_step = self._serve
-        self._connection.fleet.subscribe(self._rates_hz)
-        self._connection.fleet.keep()
+        self.connection.fleet.observe = self._observe
+        self.connection.on_step = self._serve
+        self.connection.fleet.subscribe(self.rates_hz)
+        self.connection.fleet.keep()
         self._thread = threading.Thread(target=self._run, name="link", daemon=True)
         self._thread.start()
 
@@ -158,11 +158,11 @@ class Feed:
 
     def keep_rate(self, message_id: int, rate_hz: float | None) -> None:
         """Request a stream of the screens at this rate from now on; not at all if it is 0, or None for the default."""
-        if message_id not in self._rates_hz:
+        if message_id not in self.rates_hz:
             return
-        rates = {number: rate for number, rate in self._rates_hz.items() if number != message_id}
-        self._rates_hz = {**rates, message_id: rate_hz} if rate_hz else rates
-        self.submit(lambda connection: connection.fleet.subscribe(self._rates_hz))
+        rates = {number: rate for number, rate in self.rates_hz.items() if number != message_id}
+        self.rates_hz = {**rates, message_id: rate_hz} if rate_hz else rates
+        self.submit(lambda connection: connection.fleet.subscribe(self.rates_hz))
 
     def _observe(self, message: Message) -> None:
         now_s = self.now_s
@@ -175,15 +175,15 @@ class Feed:
         self.traffic.record(message, now_s, casts_parameters=view.autopilot.casts_parameters)
         if view.identity is not None and view.identity.system_id == message.get_srcSystem():
             request = self.traffic.own_address_request(message, now_s)
-            if request is not None and not self._connection.is_recording:
-                self._connection.send(request)
+            if request is not None and not self.connection.is_recording:
+                self.connection.send(request)
 
     def _run(self) -> None:
         try:
             while not self._stopping.wait(self._pause_s()):
                 while self._jobs and not self.is_stopping:
                     self._execute(self._jobs.popleft())
-                self._connection.step(self.now_s + _STEP_S)
+                self.connection.step(self.now_s + _STEP_S)
         except Exception as error:
             self.error = error
         finally:
@@ -191,7 +191,7 @@ class Feed:
                 self._jobs.popleft().future.cancel()
 
     def _pause_s(self) -> float:
-        return 0.0 if self._connection.session.awaits_round_trip(self.now_s) else GATHER_S
+        return 0.0 if self.connection.session.awaits_round_trip(self.now_s) else GATHER_S
 
     def _serve(self) -> None:
         """Begin the actions, and follow the messages and the effects; after every step of the link, in jobs too.
@@ -212,15 +212,15 @@ class Feed:
             return
         self._job = job
         try:
-            job.future.set_result(job.run(self._connection))
+            job.future.set_result(job.run(self.connection))
         except Exception as error:
             job.future.set_exception(error)
         finally:
             self._job = None
 
     def _begin(self, action: Action, system_id: int) -> None:
-        session = self._connection.fleet.sessions[system_id]
-        if self._connection.is_recording:
+        session = self.connection.fleet.sessions[system_id]
+        if self.connection.is_recording:
             self._say(session, f"{action.name}: a recording takes no commands", Severity.WARNING)
             return
         former = self._running.pop(system_id, None)

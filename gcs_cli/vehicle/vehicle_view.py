@@ -62,7 +62,7 @@ def update(view: VehicleView, message: Any, now_s: float) -> VehicleView:
     elif (message.get_srcSystem(), message.get_srcComponent()) != view.identity[:2]:
         return view
     view = without_stale_piece(view, now_s)._replace(link=_counted(view.link, message.get_seq(), now_s))
-    fold = _FOLDS.get(message.get_type())
+    fold = FOLDS.get(message.get_type())
     return view if fold is None else _restarted(view.time_s, fold(view, message, now_s))
 
 
@@ -314,7 +314,7 @@ def _system_time(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     return view._replace(time_s=message.time_boot_ms / 1e3)
 
 
-_FOLDS: dict[str, Callable[[VehicleView, Any, float], VehicleView]] = {
+FOLDS: dict[str, Callable[[VehicleView, Any, float], VehicleView]] = {
     "HEARTBEAT": _heartbeat,
     "AUTOPILOT_VERSION": _version,
     "AVAILABLE_MODES": _available_mode,

@@ -85,7 +85,7 @@ def test_a_gain_that_is_set_again_changes_no_bit(real: str) -> None:
     """A host that hears no answer sets again; integral * gain / gain is often another integral."""
     python, c = both("pid", load_vehicle("paper_quad"), real)
     gains = [f"PID_{axis}_I" for axis in ("ROLL", "PITCH", "YAW")]
-    memory = python._memories["attitude"]
+    memory = python.memories["attitude"]
     for value in np.random.default_rng(2).uniform(1.0, 100.0, 50).tolist():
         for name in gains:
             python.set_parameter(name, value)

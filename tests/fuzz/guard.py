@@ -43,7 +43,7 @@ class Guard:
 
     def _content(self) -> tuple[object, object, object]:
         stack, loops = self._stack, self._stack.loops
-        memory = loops._memory.tobytes() + loops._outer_memory.tobytes()
+        memory = loops.memory.tobytes() + loops.outer_memory.tobytes()
         plans = (stack.places.ids, stack.parts.mission.items)
         return memory, plans, stack.params.values()
 

@@ -177,7 +177,7 @@ def test_socket_of_a_killed_process_is_replaced() -> None:
     first = ShareServer.open(endpoint)
     assert first is not None
     assert ShareServer.open(endpoint) is None
-    first._listener.close()
+    first.listener.close()
     second = ShareServer.open(endpoint)
     assert second is not None
     second.close()

@@ -54,7 +54,7 @@ def test_sim_ends_all_when_one_process_dies() -> None:
     sim = Process("gcs_cli", "sim", "--instance", str(first), "--log", "none", "--state-dir", "none")
     try:
         sim.wait_for("Ctrl-C ends the simulation")
-        os.kill(children_of(sim._popen.pid)["flightstack"], signal.SIGKILL)
+        os.kill(children_of(sim.popen.pid)["flightstack"], signal.SIGKILL)
         assert sim.end() == 1
         assert f"gcs: vehicle {first + 1}: flightstack was killed by signal 9" in sim.output
     finally:
@@ -67,7 +67,7 @@ def test_killed_sim_ends_its_vehicle() -> None:
     )
     try:
         sim.wait_for("Ctrl-C ends the simulation")
-        with ends_of(*children_of(sim._popen.pid).values()):
+        with ends_of(*children_of(sim.popen.pid).values()):
             sim.kill()
     finally:
         sim.kill()

@@ -139,7 +139,7 @@ def flying(*arguments: str) -> tuple[Process, int]:
     write(a=GOOD, b=ENDLESS)
     run = Process("gcs_cli", "test", "-j", "1", *arguments)
     run.wait_for("PASS  a")
-    return run, children_of(run._popen.pid)[WORKER]
+    return run, children_of(run.popen.pid)[WORKER]
 
 
 def test_ctrl_c_shows_the_flights_that_are_over(folder: Path) -> None:
@@ -195,7 +195,7 @@ def test_a_killed_worker_is_a_failure_and_the_next_flight_has_a_new_one(folder: 
     write(a=GOOD, b=ENDLESS, c=GOOD)
     run = Process("gcs_cli", "test", "-j", "1")
     run.wait_for("PASS  a")
-    os.kill(children_of(run._popen.pid)[WORKER], signal.SIGKILL)
+    os.kill(children_of(run.popen.pid)[WORKER], signal.SIGKILL)
     run.wait_for("FAIL  b  seed 1  flight: the process that flew it was killed by signal 9")
     run.wait_for("PASS  c")
     assert run.end() == 1
@@ -217,7 +217,7 @@ def test_watch_flies_what_changed_until_ctrl_c(folder: Path) -> None:
     write(b=GOOD)
     run.wait_for("PASS  b")
     run.wait_for("watching 3 files")
-    worker = children_of(run._popen.pid)[WORKER]
+    worker = children_of(run.popen.pid)[WORKER]
     run.interrupt()
     assert run.end() == 0
     assert has_ended(worker)

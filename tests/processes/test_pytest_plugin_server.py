@@ -177,8 +177,8 @@ def test_killed_run_leaves_no_process_and_a_readable_log(
 
 def test_killed_guard_ends_simulator_and_flight_stack(tmp_path: Path) -> None:
     started = Server(Setup(vehicle="x_quad"), tmp_path, speed=10.0)
-    assert started._guard is not None
-    guard = started._guard.pid
+    assert started.guard is not None
+    guard = started.guard.pid
     programs = children_of(guard)
     assert set(programs) == PROGRAMS
     with ends_of(*programs.values()):

@@ -223,7 +223,7 @@ def test_field_is_sent_to_the_plot_and_back():
 
 def test_another_rate_is_asked_for_and_requested():
     async def story(pilot, app, _screen):
-        app.feed._rates_hz = {mavlink.MAVLINK_MSG_ID_ATTITUDE: 10.0}
+        app.feed.rates_hz = {mavlink.MAVLINK_MSG_ID_ATTITUDE: 10.0}
         await pilot.press("r")
         await pilot.pause()
         assert isinstance(app.screen, OrderForm)
@@ -231,13 +231,13 @@ def test_another_rate_is_asked_for_and_requested():
         await pilot.pause()
         (action,) = app.feed.actions
         assert action.facts == {"message": "ATTITUDE", "rate_hz": 25.0}
-        assert app.feed._rates_hz == {mavlink.MAVLINK_MSG_ID_ATTITUDE: 25.0}
+        assert app.feed.rates_hz == {mavlink.MAVLINK_MSG_ID_ATTITUDE: 25.0}
         await pilot.press("r")
         await pilot.pause()
         await pilot.press("enter")
         await pilot.pause()
         assert app.feed.actions[1].facts["rate_hz"] is None
-        assert app.feed._rates_hz == {}
+        assert app.feed.rates_hz == {}
 
     drive(story)
 
@@ -262,11 +262,11 @@ def test_search_hides_other_messages():
     async def story(pilot, app, screen):
         await pilot.press("slash", *"batt", "enter")
         await pilot.pause()
-        assert [line.row.name for line in screen._lines] == ["BATTERY_STATUS[0]"]
+        assert [line.row.name for line in screen.lines_shown] == ["BATTERY_STATUS[0]"]
         assert "1 with “batt”" in shown(app)[2]
         await pilot.press("escape")
         await pilot.pause()
-        assert len(screen._lines) == 4
+        assert len(screen.lines_shown) == 4
         assert not screen.query_one(Input).display
 
     drive(story)

@@ -152,9 +152,9 @@ def test_parameter_table_and_details_at_three_sizes(size):
 def test_search_and_changed_only_filter_the_table():
     async def story(pilot, _app, screen):
         await pilot.press("slash", "r", "t", "l")
-        assert screen._names == ["RTL_RETURN_ALT"]
+        assert screen.names_shown == ["RTL_RETURN_ALT"]
         await pilot.press("enter", "escape", "c")
-        assert screen._names == ["MPC_XY_CRUISE"]
+        assert screen.names_shown == ["MPC_XY_CRUISE"]
 
     drive(story)
 
@@ -205,7 +205,7 @@ def test_saved_parameters_load_after_a_question_with_the_differences(tmp_path: P
         assert "MPC_XY_CRUISE\t4\t" in file.read_text()
         file.write_text(file.read_text().replace("MPC_XY_CRUISE\t4", "MPC_XY_CRUISE\t8"))
         await enter(pilot, app, "f")
-        assert screen._names == ["MPC_XY_CRUISE"]
+        assert screen.names_shown == ["MPC_XY_CRUISE"]
         await enter(pilot, app, "o")
         assert isinstance(app.screen, Confirm)
         assert "MPC_XY_CRUISE: 4 → 8" in "\n".join(shown(app))

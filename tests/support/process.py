@@ -81,15 +81,15 @@ class Process:
     def __init__(self, module: str, *arguments: str, listens: bool = False) -> None:
         """Start the process; with ``listens`` its standard input is the lines of :meth:`tell`, else empty."""
         self.name = module
-        self._popen = start(module, arguments, listens)
+        self.popen = start(module, arguments, listens)
         self._fresh: Queue[str | None] = Queue()
         self.lines: list[str] = []
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
     def _read(self) -> None:
-        assert self._popen.stdout is not None
-        with self._popen.stdout as output:
+        assert self.popen.stdout is not None
+        with self.popen.stdout as output:
             for line in output:
                 self.lines.append(line.rstrip())
                 self._fresh.put(line)
@@ -112,28 +112,28 @@ class Process:
 
     def tell(self, line: str) -> None:
         """Write a line to the standard input of the process."""
-        assert self._popen.stdin is not None
-        self._popen.stdin.write(line + "\n")
-        self._popen.stdin.flush()
+        assert self.popen.stdin is not None
+        self.popen.stdin.write(line + "\n")
+        self.popen.stdin.flush()
 
     def end(self) -> int:
         """Close its input, wait for its end and return its exit code."""
-        if self._popen.stdin is not None:
-            self._popen.stdin.close()
-        code = self._popen.wait(BOUND_S)
+        if self.popen.stdin is not None:
+            self.popen.stdin.close()
+        code = self.popen.wait(BOUND_S)
         self._reader.join(BOUND_S)
         return code
 
     def kill(self) -> None:
-        self._popen.kill()
+        self.popen.kill()
         self.end()
 
     @property
     def is_running(self) -> bool:
-        return self._popen.poll() is None
+        return self.popen.poll() is None
 
     def interrupt(self) -> None:
-        self._popen.send_signal(signal.SIGINT)
+        self.popen.send_signal(signal.SIGINT)
 
     @property
     def output(self) -> str:

@@ -176,7 +176,7 @@ def test_printed_figures_repeat_byte_for_byte(described: AnyFigure, suffix: str,
 
 def test_print_of_linked_panels_keeps_each_y_axis() -> None:
     panels = [Panel(Axis(name, "m"), [curve([0.0, 1.0], [0.0, 1.0])]) for name in "abcd"]
-    canvas = print_figure._plane(Figure("linked", "Linked", panels, columns=2, linked=True), 7.0)
+    canvas = print_figure.plane_canvas(Figure("linked", "Linked", panels, columns=2, linked=True), 7.0)
     canvas.draw_without_rendering()
     assert [axes.get_ylabel() for axes in canvas.axes] == ["a [m]", "b [m]", "c [m]", "d [m]"]
     assert [axes.get_xlabel() for axes in canvas.axes] == ["", "", "time [s]", "time [s]"]

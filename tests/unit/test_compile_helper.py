@@ -42,7 +42,7 @@ ORPHAN = """
 import os
 from flightstack.process import compile_helper
 compile_helper.start(["goal_kernel"])
-os.write(1, str(compile_helper._helper.pid).encode())
+os.write(1, str(compile_helper.helper.pid).encode())
 os._exit(0)
 """
 
@@ -67,12 +67,12 @@ def run(code: str, *arguments: str, cache: Path) -> subprocess.CompletedProcess[
 
 @pytest.fixture
 def not_started(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compile_helper, "_helper", None)
+    monkeypatch.setattr(compile_helper, "helper", None)
 
 
 @pytest.fixture
 def cold(monkeypatch: pytest.MonkeyPatch, not_started: None) -> None:
-    monkeypatch.setattr(compile_helper, "_is_cached", lambda kernel: False)
+    monkeypatch.setattr(compile_helper, "is_cached", lambda kernel: False)
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1}, raising=False)
 
 
@@ -120,20 +120,20 @@ def test_compile_helper_ends_in_order() -> None:
 def test_a_failing_compile_helper_changes_nothing(cold: None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compile_helper, "__name__", "flightstack.process.no_such_module")
     expected = digest_of_flight()
-    assert compile_helper._helper is not None
-    assert compile_helper._helper.wait() != 0
-    monkeypatch.setattr(compile_helper, "_helper", None)
+    assert compile_helper.helper is not None
+    assert compile_helper.helper.wait() != 0
+    monkeypatch.setattr(compile_helper, "helper", None)
     monkeypatch.setattr(sys, "executable", "/no/such/python")
     assert digest_of_flight() == expected
-    assert compile_helper._helper is None
+    assert compile_helper.helper is None
 
 
 def test_compile_helper_starts_for_a_cold_cache_only(not_started: None) -> None:
     World(**FLIGHT)  # compiles, or loads from the cache
-    assert not compile_helper._is_useful()
+    assert not compile_helper.is_useful()
 
 
 def test_compile_helper_needs_a_second_cpu(cold: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert compile_helper._is_useful()
+    assert compile_helper.is_useful()
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0})
-    assert not compile_helper._is_useful()
+    assert not compile_helper.is_useful()

@@ -35,7 +35,7 @@ def shape_of(
     ]
     shape = FenceShape(areas, HOME)
     shape.vertices[:] = [point for points in polygons for point in points]
-    shape._begins, shape._ends = shape._edges()
+    shape.update_edges()
     return shape
 
 
@@ -141,7 +141,7 @@ def test_segments_outside_match_dense_walk(
     areas = [Area(0, False, 0, ((0.0, 0.0),), float(radius)) for _, radius in holes]
     combined = FenceShape([Area(0, True, 0, tuple((0.0, 0.0) for _ in outer)), *areas], HOME)
     combined.vertices[:] = shape.vertices
-    combined._begins, combined._ends = combined._edges()
+    combined.update_edges()
     for row, (centre, _) in zip(combined.areas[1:], holes, strict=True):
         row["north"], row["east"] = centre
     walk = np.linspace(begin, end, 400).astype(np.float64)

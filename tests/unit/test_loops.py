@@ -40,7 +40,7 @@ def setpoint(position=(0.0, 0.0, 0.0), yaw: float = 0.0) -> np.ndarray:
 
 
 def memories(loops: PythonLoops) -> list[np.ndarray]:
-    return [loops._reference_memory, *loops._memories.values()]
+    return [loops.memory[0]["reference"], *loops.memories.values()]
 
 
 class Flight:
@@ -97,7 +97,7 @@ def test_the_outer_loop_runs_only_when_it_is_due() -> None:
 def test_between_outer_ticks_the_target_moves_in_a_straight_line() -> None:
     """Without the reference filter, the reference is the target: a fifth of the way in each of five ticks."""
     loops = make()
-    loops._memory[0]["reference_params"][0] = 0.0
+    loops.memory[0]["reference_params"][0] = 0.0
     flight = Flight(loops, at_rest(), setpoint((0.4, 0.0, 0.0)))
     flight.tick(5)
     w, x, y, z = loops.attitude_target[:4]
@@ -210,11 +210,11 @@ def test_integral_of_a_saturated_axis_waits() -> None:
     flight.tick(40)
     saturated = [bool(int(row[LoopRow.STATUS]) & LoopStatus.YAW_SATURATED) for row in flight.rows]
     assert any(saturated)
-    before = flight.loops._memories["attitude"][2]
+    before = flight.loops.memories["attitude"][2]
     first = saturated.index(True)
     assert all(saturated[first:])
     flight.tick(40)
-    assert flight.loops._memories["attitude"][2] == before
+    assert flight.loops.memories["attitude"][2] == before
 
 
 def test_row_shows_what_the_rotors_make() -> None:
@@ -231,7 +231,7 @@ def test_an_attitude_given_from_outside_is_flown_in_a_straight_line_over_an_oute
     loops = make()
     flight = Flight(loops, at_rest(), setpoint())
     flight.tick(5)
-    integral = loops._outer_memory.copy()
+    integral = loops.outer_memory.copy()
     pitch = 0.2
     target = np.array([math.cos(0.5 * pitch), 0.0, math.sin(0.5 * pitch), 0.0, 0.7 * PAPER.weight_n])
     references, thrusts = [], []
@@ -242,17 +242,17 @@ def test_an_attitude_given_from_outside_is_flown_in_a_straight_line_over_an_oute
             loops.step(flight.state, flight.wish, SPEEDS, False, row)
             references.append(row[LoopRow.REFERENCE_ATTITUDE][2])
             thrusts.append(row[LoopRow.WRENCH][0])
-        assert period or loops._fraction == pytest.approx(1.0)
+        assert period or loops.fraction == pytest.approx(1.0)
     assert thrusts == pytest.approx([0.7 * PAPER.weight_n] * 200)
     assert references[-1] == pytest.approx(math.sin(0.5 * pitch), rel=1e-3)
     steps = np.diff(references)
     assert steps.min() >= -1e-9  # it comes from one side
     assert np.abs(np.diff(steps)).max() < 1e-3
-    assert loops._outer_memory.tolist() == integral.tolist()
+    assert loops.outer_memory.tolist() == integral.tolist()
     before = loops.attitude_target.copy()
     row = np.zeros(LoopRow.SIZE)
     loops.step(flight.state, flight.wish, SPEEDS, True, row)
-    assert loops._last_target.tolist() == before.tolist()  # the way back begins here
+    assert loops.memory[0]["last_target"].tolist() == before.tolist()  # the way back begins here
 
 
 def rate_damping(
@@ -274,10 +274,10 @@ def test_a_reference_that_is_not_finite_is_not_kept_by_a_law_that_ignores_it() -
     )
     flight = Flight(make(law), at_rest(), setpoint())
     flight.tick(3)
-    flight.loops._memory[0]["reference_params"][3] = 1e308  # its largest acceleration
-    flight.loops._memory[0]["reference_params"][0] = 1e200  # and bandwidth
+    flight.loops.memory[0]["reference_params"][3] = 1e308  # its largest acceleration
+    flight.loops.memory[0]["reference_params"][0] = 1e200  # and bandwidth
     flight.state = at_rest(rates=(0.1, 0.0, 0.0))
     flight.loops.set_attitude_target(np.array([0.0, 1.0, 0.0, 0.0, 4.0]))
     held = flight.tick()
     assert held[LoopRow.STATUS] == LoopStatus.OUTPUT_NOT_FINITE
-    assert np.isfinite(flight.loops._reference_memory).all()
+    assert np.isfinite(flight.loops.memory[0]["reference"]).all()

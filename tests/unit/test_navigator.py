@@ -37,7 +37,7 @@ def test_hold_stops_ahead_and_never_goes_back_far(north: float, east: float, sin
     """The hold's point is where the reference comes to rest."""
     vehicle = in_air(down=-50.0)
     vehicle.state[3:6] = north, east, sink
-    vehicle.navigator._trajectory[3:6] = north, east, sink
+    vehicle.navigator.memory.trajectory[3:6] = north, east, sink
     vehicle.enter(Mode.HOLD)
     vehicle.run(15.0)
     path = np.array(vehicle.path)
@@ -108,7 +108,7 @@ def test_nothing_moves_while_the_state_is_not_finite(mode: Mode, bad: float) -> 
     vehicle.enter(mode, 8.0)
     vehicle.run(1.0)
     n = vehicle.navigator
-    memories = (n.setpoint, n._trajectory, n._mission, n._mode_target, n._land)
+    memories = (n.setpoint, *n.memory)
     before = [memory.copy() for memory in memories]
     state = vehicle.state.copy()
     state[7] = bad

@@ -84,7 +84,7 @@ def test_the_loops_on_a_target_of_a_run_before_do_not_stay_beside_new_results(
 
 def test_a_bad_file_is_one_sentence_from_another_process_too() -> None:
     with pytest.raises(ConfigError, match=r"^soft: is neither a file nor built-in gains"):
-        experiments._in_processes([QUICK._replace(gains="soft")], 2, lambda done, total: None)
+        experiments.run_in_processes([QUICK._replace(gains="soft")], 2, lambda done, total: None)
 
 
 def test_a_process_that_was_ended_from_outside_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,7 +25,7 @@ from gcs_cli.logs.ulog_reader import read_ulog
 from gcs_cli.replay.keys import names_of
 from gcs_cli.replay.playback import Playback, TlogPlayback
 from gcs_cli.replay.replay_run import apply_keys
-from gcs_cli.replay.replay_vehicle import _ANSWERS, ReplayVehicle
+from gcs_cli.replay.replay_vehicle import ANSWERS, ReplayVehicle
 from gcs_cli.replay.throttle import throttle_of
 from gcs_cli.replay.ulog_playback import UlogPlayback
 from tests.support.sample_logs import small_tlog, small_ulog
@@ -187,8 +187,8 @@ def test_any_content_of_a_message_is_answered_or_ignored(log: str, request: pyte
     playback: Playback = request.getfixturevalue(log)
     client = Client(ReplayVehicle(playback, [STATION], 0.0))
     rng = random.Random(1)
-    kinds = [kind for kind in mavlink.mavlink_map.values() if kind.msgname in _ANSWERS]
-    assert len(kinds) == len(_ANSWERS)
+    kinds = [kind for kind in mavlink.mavlink_map.values() if kind.msgname in ANSWERS]
+    assert len(kinds) == len(ANSWERS)
     for number in range(600):
         kind = kinds[number % len(kinds)]
         payload = bytearray(rng.choice((rng.randbytes(kind.unpacker.size), b"\xff" * kind.unpacker.size)))

@@ -135,12 +135,12 @@ def test_view_is_a_process_that_ends_with_the_simulation(monkeypatch: pytest.Mon
         return [sys.executable, "-c", "import signal; signal.pause()"]
 
     monkeypatch.setattr(sim_run, "supervised", program)
-    with sim_run._view(SimOptions(instance=3, signing_key=Path("k")), wanted=True) as view:
+    with sim_run.opened_view(SimOptions(instance=3, signing_key=Path("k")), wanted=True) as view:
         assert view is not None
         assert view.poll() is None
     assert view.returncode == -signal.SIGTERM
     assert started == [("gcs_cli", "--signing-key", "k", "--instance", "3", "watch")]
-    with sim_run._view(SimOptions(), wanted=False) as nothing:
+    with sim_run.opened_view(SimOptions(), wanted=False) as nothing:
         assert nothing is None
 
 
@@ -186,7 +186,7 @@ def test_notices_are_printed_after_the_view(
         processes.is_ready = True
         return False
 
-    monkeypatch.setattr(sim_run, "_view", view)
+    monkeypatch.setattr(sim_run, "opened_view", view)
     monkeypatch.setattr(sim_run, "Children", NoisyChildren)
     monkeypatch.setattr(sim_run, "check_ports", lambda _vehicle: None)
     monkeypatch.setattr(sim_run.VehicleProcesses, "poll", become_ready)

@@ -260,9 +260,9 @@ def test_no_payload_raises(messages: list[tuple[int, bytes]]) -> None:
 
 
 def test_the_list_of_folded_messages_is_whole() -> None:
-    from gcs_cli.vehicle.vehicle_view import _FOLDS  # noqa: PLC0415
+    from gcs_cli.vehicle.vehicle_view import FOLDS  # noqa: PLC0415
 
-    assert {mavlink.mavlink_map[number].msgname for number in FOLDED} == set(_FOLDS)
+    assert {mavlink.mavlink_map[number].msgname for number in FOLDED} == set(FOLDS)
 
 
 def test_unhealthy_sensors_are_named(vehicle: Vehicle) -> None:

@@ -14,7 +14,7 @@ from gcs_cli.tui.fly.compact import compact, waiting
 from gcs_cli.tui.fly.flight_display import flight_display
 from gcs_cli.tui.fly.health_panels import health_panel, link_panel
 from gcs_cli.tui.fly.history import History
-from gcs_cli.tui.fly.horizon import _SKY_CODE, _pixels, heading_tape
+from gcs_cli.tui.fly.horizon import SKY_CODE, heading_tape, sky_pixels
 from gcs_cli.tui.fly.panels import messages_panel, mission_panel, position_panel, power_panel
 from gcs_cli.tui.fly.timing_panels import timing_panel
 from gcs_cli.tui.fly.trends import trends_panel
@@ -176,7 +176,7 @@ def test_absurd_values_are_drawn(
 
 def _sky(attitude: Euler, width: int = 21, height: int = 10) -> list[list[bool]]:
     """Tell for each cell whether its upper pixel is sky."""
-    return (_pixels(attitude, width, 2 * height)[::2] == _SKY_CODE).tolist()
+    return (sky_pixels(attitude, width, 2 * height)[::2] == SKY_CODE).tolist()
 
 
 def test_horizon_level_has_sky_above_and_ground_below() -> None:

@@ -170,7 +170,7 @@ def test_an_error_of_the_link_ends_the_feed() -> None:
         def fail(_until_s: float) -> None:
             raise OSError("link")
 
-        feed._connection.step = fail  # type: ignore[method-assign]
+        feed.connection.step = fail  # type: ignore[method-assign]
         until(lambda: feed.error is not None)
         assert str(feed.error) == "link"
 
@@ -218,7 +218,7 @@ def test_several_vehicles_are_selected_and_commanded_together() -> None:
 
             until(lambda: run() or len(feed.views) == 2)
             assert [view.identity.system_id for view in feed.views if view.identity] == [3, 4]
-            assert feed._connection.fleet.is_kept  # a lost vehicle stays selected
+            assert feed.connection.fleet.is_kept  # a lost vehicle stays selected
             feed.select(4)
             until(lambda: run() or feed.view.identity[0] == 4)
             for number in vehicles:

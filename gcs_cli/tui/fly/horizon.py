@@ -17,7 +17,7 @@ from gcs_cli.vehicle.view_types import Euler
 _Codes: TypeAlias = np.ndarray[Any, np.dtype[np.uint8]]
 
 _LINE, _LADDER, _AIRCRAFT, _NO_DATA = "#f4f4f4", "#a9c4e2", "#ffd75f", "#303030"
-_SKY_CODE, _GROUND_CODE, _LADDER_CODE, _LINE_CODE, _NO_DATA_CODE = range(5)
+SKY_CODE, _GROUND_CODE, _LADDER_CODE, _LINE_CODE, _NO_DATA_CODE = range(5)
 _PITCH_SPAN_DEG = 50.0  # from top to bottom
 _LADDER_STEP_DEG = 10.0
 _SHORT_DEG, _LONG_DEG = 4.5, 8.0
@@ -31,7 +31,7 @@ def horizon(attitude: Euler | None, width: int, height: int, colours: Palette = 
 
     Cells of the same colours are joined: runs are drawn faster than cells.
     """
-    codes = _pixels(attitude, width, 2 * height)
+    codes = sky_pixels(attitude, width, 2 * height)
     shades = (colours.sky, colours.ground, _LADDER, _LINE, _NO_DATA)
     lower = codes[1::2]
     pairs = codes[::2].astype(np.int16) * len(shades) + lower
@@ -65,7 +65,8 @@ def _scale(height: int) -> float:
     return _PITCH_SPAN_DEG / (2 * height)
 
 
-def _pixels(attitude: Euler | None, width: int, rows: int) -> _Codes:
+def sky_pixels(attitude: Euler | None, width: int, rows: int) -> _Codes:
+    """Return the code of each pixel of the horizon, shape (rows, width)."""
     if attitude is None:
         return np.full((rows, width), _NO_DATA_CODE, dtype=np.uint8)
     scale = _PITCH_SPAN_DEG / rows
@@ -76,7 +77,7 @@ def _pixels(attitude: Euler | None, width: int, rows: int) -> _Codes:
     elevation = up * cos_roll - right * sin_roll + math.degrees(attitude.pitch_rad)
     step = np.round(elevation / _LADDER_STEP_DEG) * _LADDER_STEP_DEG
     near = (elevation - step >= -scale / 2) & (elevation - step < scale / 2)
-    codes = np.where(elevation > 0.0, _SKY_CODE, _GROUND_CODE).astype(np.uint8)
+    codes = np.where(elevation > 0.0, SKY_CODE, _GROUND_CODE).astype(np.uint8)
     codes[near & (along < np.where(step % 20, _SHORT_DEG, _LONG_DEG))] = _LADDER_CODE
     codes[near & (step == 0.0)] = _LINE_CODE
     return codes

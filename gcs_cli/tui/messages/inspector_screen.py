@@ -54,7 +54,7 @@ class InspectorScreen(WatchScreen):
     def __init__(self, mode: str) -> None:
         super().__init__(mode)
         self._rows: list[MessageRow] = []
-        self._lines: list[Line] = []
+        self.lines_shown: list[Line] = []
         self._expanded: frozenset[StreamKey] = frozenset()
         self._words = ""
         self._is_paused = False
@@ -74,7 +74,9 @@ class InspectorScreen(WatchScreen):
     @property
     def selected(self) -> Line | None:
         """The line at the cursor."""
-        return self._lines[self.line_list.cursor] if self.line_list.cursor < len(self._lines) else None
+        return (
+            self.lines_shown[self.line_list.cursor] if self.line_list.cursor < len(self.lines_shown) else None
+        )
 
     def show(self, view: VehicleView, now_s: float) -> None:
         """Read the messages, unless paused."""
@@ -86,8 +88,10 @@ class InspectorScreen(WatchScreen):
     def _redraw(self) -> None:
         app, width = watch_app(self), self.line_list.size.width - self.line_list.scrollbar_size_vertical
         rows = filtered(self._rows, self._words)
-        self._lines = lines(rows, self._expanded, app.plot_fields.names, max(20, width), app.palette)
-        self.line_list.set_lines([line.key for line in self._lines], [line.text for line in self._lines])
+        self.lines_shown = lines(rows, self._expanded, app.plot_fields.names, max(20, width), app.palette)
+        self.line_list.set_lines(
+            [line.key for line in self.lines_shown], [line.text for line in self.lines_shown]
+        )
         state = summary(self._rows, len(rows), self._words, self._is_paused, app.palette)
         self.query_one("#summary", LineWidget).show_line(state)
         self.query_one("#header", LineWidget).show_line(header(max(20, width), app.palette))

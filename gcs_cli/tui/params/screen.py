@@ -63,7 +63,7 @@ class ParamScreen(JobScreen):
         super().__init__(mode)
         self._params = ParamList()
         self._references: Mapping[str, ParamInfo] = {}
-        self._names: list[str] = []
+        self.names_shown: list[str] = []
         self._changed_only = False
         self._system_id: int | None = None
         self._problem = ""
@@ -91,7 +91,7 @@ class ParamScreen(JobScreen):
     @property
     def selected(self) -> Parameter | None:
         """The parameter under the cursor."""
-        return self._params.parameters[self._names[self.rows.cursor]] if self._names else None
+        return self._params.parameters[self.names_shown[self.rows.cursor]] if self.names_shown else None
 
     def show(self, view: VehicleView, now_s: float) -> None:
         """Download the parameters of a new vehicle; show the progress."""
@@ -119,7 +119,7 @@ class ParamScreen(JobScreen):
         elif not params.parameters:
             left.append(self._problem or "waiting for a vehicle", colours.warning)
         else:
-            left.append(f"{len(self._names)} of {len(params.parameters)} parameters", colours.text)
+            left.append(f"{len(self.names_shown)} of {len(params.parameters)} parameters", colours.text)
             query = self.query_one(SearchField).value
             left.append(f", with “{query}”" if query else "", colours.text)
             left.append(", changed only" if self._changed_only else "", colours.warning)
@@ -139,10 +139,10 @@ class ParamScreen(JobScreen):
 
     def _filter(self, *, keeps: bool = True) -> None:
         rows = self.rows
-        before = self._names[rows.cursor] if self._names and keeps else ""
-        self._names = self._params.names(self.query_one(SearchField).value, self._changed_only)
-        rows.show_rows(len(self._names), self._draw)
-        rows.select(self._names.index(before) if before in self._names else 0)
+        before = self.names_shown[rows.cursor] if self.names_shown and keeps else ""
+        self.names_shown = self._params.names(self.query_one(SearchField).value, self._changed_only)
+        rows.show_rows(len(self.names_shown), self._draw)
+        rows.select(self.names_shown.index(before) if before in self.names_shown else 0)
         self._show_titles()
         self._show_details()
         self._show_state()
@@ -151,7 +151,7 @@ class ParamScreen(JobScreen):
         return "default" if self._params.file is None else "file"
 
     def _draw(self, index: int, width: int) -> Text:
-        name = self._names[index]
+        name = self.names_shown[index]
         info, reference = self._params.infos.get(name, UNKNOWN), self._references.get(name, UNKNOWN)
         columns = param_columns(width, self._compared())
         return param_row(self._params.parameters[name], info, reference, columns, watch_app(self).palette)

@@ -110,7 +110,7 @@ def run_cases(
             tell(len(found), len(cases))
     else:
         _warm_up(cases)
-        found = _in_processes(cases, jobs, tell)
+        found = run_in_processes(cases, jobs, tell)
     ordered = [(case.key, *found[case.key]) for case in cases]
     return Flown(
         {name: entry for name, entry, _ in ordered},
@@ -125,9 +125,10 @@ def _warm_up(cases: Sequence[Case]) -> None:
         fly(case._replace(trajectory="step_roll", inner_hz=250))
 
 
-def _in_processes(
+def run_in_processes(
     cases: Sequence[Case], jobs: int, tell: Callable[[int, int], None]
 ) -> dict[str, tuple[dict[str, Any], Recording | None]]:
+    """Fly ``cases`` in ``jobs`` processes; ``tell(done, total)`` is called after each."""
     found: dict[str, tuple[dict[str, Any], Recording | None]] = {}
     pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"))
     try:
