@@ -7,10 +7,8 @@ import time
 
 import pytest
 import textual._time
-from rich.text import Text
 from textual.color import Color
 from textual.pilot import Pilot
-from textual.screen import Screen
 
 from flightstack.core.enums import Severity
 from gcs_cli.tui.app import REDRAWS_HZ, WatchApp
@@ -18,8 +16,7 @@ from gcs_cli.tui.feed import Notice
 from gcs_cli.tui.orders.orders import ORDERS
 from gcs_cli.tui.palette import DARK, LIGHT
 from gcs_cli.tui.screens import SCREENS, ScreenEntry
-from gcs_cli.tui.widgets.line_list import LineList
-from gcs_cli.vehicle.view_types import Identity, Vector, VehicleView
+from gcs_cli.vehicle.view_types import Identity, VehicleView
 from tests.support.pictures import check_picture
 from tests.support.screens import shown
 from tests.support.watch_plays import GROUNDED, Story, asked, play
@@ -49,52 +46,6 @@ def test_every_screen_survives_any_size(entry: ScreenEntry, size: tuple[int, int
         assert len(shown(app)) == size[1]
 
     play(story, size=size)
-
-
-@pytest.mark.parametrize("entry", SCREENS, ids=lambda entry: entry.mode)
-def test_redraws_of_a_moving_vehicle_compute_no_layout(
-    entry: ScreenEntry, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A layout takes several times as long as the lines that change."""
-    layouts: list[Screen[object]] = []
-
-    def count(screen: Screen[object], *_: object, **__: object) -> None:
-        layouts.append(screen)
-
-    async def story(app: WatchApp, pilot: Pilot) -> None:
-        app.feed.history = flown_history()
-        await pilot.press(entry.key)
-        await pilot.pause(4 / REDRAWS_HZ)
-        app.redraw()
-        await pilot.pause()
-        monkeypatch.setattr(Screen, "_refresh_layout", count)
-        for step in range(1, 9):
-            app.feed.time_s += 0.125
-            place = Vector(FULL.position_ned_m.x + step, 0.0, -5.0)
-            app.feed.shown = FULL._replace(position_ned_m=place, time_s=100.0 + step)
-            app.redraw()
-            await pilot.pause()
-        assert not layouts
-
-    play(story, size=(120, 35))
-
-
-def test_list_draws_only_changed_lines_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    drawn: list[int] = []
-
-    async def story(app: WatchApp, pilot: Pilot) -> None:
-        app.feed.history = flown_history()
-        await pilot.press("6")
-        await pilot.pause(4 / REDRAWS_HZ)
-        lines = app.screen.query_one(LineList)
-        monkeypatch.setattr(lines, "refresh_line", drawn.append)
-        keys, texts = range(9), [Text(f"line {number}") for number in range(9)]
-        lines.set_lines(keys, texts)
-        drawn.clear()
-        lines.set_lines(keys, [*texts[:4], Text("other"), *texts[5:]])
-        assert drawn == [4]
-
-    play(story, size=(80, 24))
 
 
 def test_a_new_size_is_followed_when_the_process_is_held_up(monkeypatch: pytest.MonkeyPatch) -> None:
