@@ -46,7 +46,7 @@ DEAD_RECKONING_S = 5.0
 _TILT_RAD, _YAW_RAD = math.radians(10.0), math.radians(15.0)
 """Deviations above which tilt and yaw are not aligned."""
 _WIND_VARIANCE = 0.5
-"""Variance of the wind [m²/s²] below which it is observed: half of that at the start, which grows without drag."""
+"""Variance of the wind [m²/s²] below which it is observed; without fusion of drag it stays above that at the start."""
 
 
 class SolutionFlags:
