@@ -23,10 +23,25 @@ from benchmarks import (
     step_costs,
     three_processes,
     transfers,
+    watching,
 )
 from benchmarks.measure import OtherLoad
 
-SECTIONS = ("steps", "flights", "emulated", "multibody", "realtime", "load", "transfers", "start", "startup")
+SECTIONS = (
+    "steps",
+    "flights",
+    "emulated",
+    "multibody",
+    "realtime",
+    "load",
+    "transfers",
+    "start",
+    "startup",
+    "watch",
+)
+
+_LONG = ("watch",)
+"""Sections that run only if selected."""
 
 
 def _arguments() -> argparse.Namespace:
@@ -45,7 +60,7 @@ def _measured(name: str, measure: Callable[[], Any]) -> Any:
 def main() -> int:
     """Measure and print; return the exit code."""
     arguments = _arguments()
-    wanted = arguments.only or SECTIONS
+    wanted = arguments.only or [section for section in SECTIONS if section not in _LONG]
     quick = arguments.quick
     rounds, seconds = (2, 0.01) if quick else (7, 0.05)
     load = OtherLoad()
@@ -90,6 +105,10 @@ def main() -> int:
         )
     if "startup" in wanted:
         results["startup"] = _measured("commands of gcs", lambda: startup.startup(3 if quick else 20))
+    if "watch" in wanted:
+        results["watch"] = _measured(
+            "the screens of gcs watch", lambda: watching.watching(*((1, 3.0) if quick else (3, 10.0)))
+        )
     machine = {
         "system": f"{platform.system()} {platform.machine()}",
         "cores": os.cpu_count(),

@@ -17,6 +17,7 @@ from benchmarks.step_costs import Part
 from benchmarks.table import Row, table
 from benchmarks.three_processes import Flights
 from benchmarks.transfers import ITEMS, Transfers
+from benchmarks.watching import SIZES, Watched
 from flightstack.simulator_link.hot_frames import ActuatorsFrame, PlantStateFrame
 
 # on a machine of the same kind: PX4 with an external simulator, ArduCopter's SITL in one process
@@ -52,6 +53,8 @@ def texts(results: dict[str, Any], machine: dict[str, Any]) -> Iterator[str]:
         yield _start(results) + "\n"
     if "startup" in results:
         yield _startup(results["startup"]) + "\n"
+    if "watch" in results:
+        yield _watched(results["watch"]) + "\n"
 
 
 def _flights(results: dict[str, Any]) -> str:
@@ -207,6 +210,14 @@ def _startup(taken: Startup) -> str:
     ]
     head = ("", "processor time, s", "after the heartbeat, s", "all of it, s")
     return table("COMMANDS OF GCS: processor time, and time of an answer", head, rows)
+
+
+def _watched(seen: Watched) -> str:
+    rows: list[Row] = [
+        (title, *(shares[size].text(2) for size in SIZES)) for title, shares in seen.shares_percent.items()
+    ]
+    title = f"GCS WATCH, {seen.messages_hz:.0f} messages a second: processor time, % of a core"
+    return table(title, ("", *(f"{columns}x{rows}" for columns, rows in SIZES)), rows)
 
 
 def plain(results: dict[str, Any]) -> dict[str, Any]:

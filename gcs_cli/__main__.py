@@ -10,15 +10,22 @@ import sys
 
 from gcs_cli.help_generated import HELP, WIDTH
 
+_FAILED = 1
+"""``gcs_cli.errors.FAILED``, without the import."""
+
 
 def main(argv: list[str] | None = None) -> int:
     """Run the command line; return the exit code."""
     words = sys.argv[1:] if argv is None else argv
     if len(words) == 1 and words[0] in ("-h", "--help") and _columns() >= WIDTH and _prints(HELP):
         return 0
-    from gcs_cli.program import run  # noqa: PLC0415
+    try:
+        from gcs_cli.program import run  # noqa: PLC0415
 
-    return run(words)
+        return run(words)
+    except KeyboardInterrupt:  # during the imports: `run` reports those of the command
+        print("gcs: interrupted", file=sys.stderr)
+        return _FAILED
 
 
 def _columns() -> int:

@@ -21,6 +21,7 @@ from flightstack.estimation.error_state import (
     GYRO_BIAS,
     POSITION,
     VELOCITY,
+    WIND,
 )
 from tools.generated import ROOT, write_or_check
 
@@ -139,7 +140,14 @@ def measurements() -> dict[str, tuple[list[tuple[str, str]], Any, dict[int, Any]
     field = in_body(earth) + body
     arguments = [("q", "Quaternion"), ("earth", "Vector3"), ("body", "Vector3")]
     errors = {ATTITUDE: THETA, EARTH_FIELD: earth, BODY_FIELD: body}
-    return {f"field_{axis}": (arguments, field[i], errors) for i, axis in enumerate("xyz")}
+    found = {f"field_{axis}": (arguments, field[i], errors) for i, axis in enumerate("xyz")}
+    velocity, bias, rate = vector("velocity"), vector("bias"), sp.Symbol("rate", real=True)
+    wind = sp.Matrix(sp.symbols("wind_north wind_east", real=True))
+    drag = bias - rate * in_body(velocity - sp.Matrix([*wind, 0]))
+    arguments = [("q", "Quaternion"), ("velocity", "Vector3"), ("bias", "Vector3")]
+    arguments += [(name, "float") for name in ("wind_north", "wind_east", "rate")]
+    errors = {ATTITUDE: THETA, VELOCITY: velocity, ACCEL_BIAS: bias, WIND: wind}
+    return {**found, **{f"drag_{axis}": (arguments, drag[i], errors) for i, axis in enumerate("xy")}}
 
 
 def _code(expression: Any) -> str:

@@ -74,6 +74,8 @@ _TAIL = """
 attitude within 10⁻¹² rad, velocity within 10⁻¹¹ m/s. Noise has the Allan variance of its density and the
 wandering bias that of a Gauss-Markov process. `tests/unit/test_sensor_models.py` compares with NOAA's test
 values of the World Magnetic Model, the table of ISO 2533, covariances and closed forms.
+`tests/unit/test_sensor_faults.py` flies each fault of each sensor beside the same flight without it: the difference is
+the fault, within the steps of the messages.
 """
 
 

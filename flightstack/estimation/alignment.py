@@ -60,7 +60,7 @@ def set_initial_variances(f: Filter, params: EstimatorParams, speed_m_s: float, 
     reset_variance(p, POSITION, 3, 1e-4)
     reset_variance(p, GYRO_BIAS, 3, params.gyro_bias_rad_s * params.gyro_bias_rad_s)
     reset_variance(p, ACCEL_BIAS, 3, params.accel_bias_m_s2 * params.accel_bias_m_s2)
-    reset_variance(p, WIND, 2, 1.0)
+    reset_variance(p, WIND, 2, params.wind_m_s * params.wind_m_s)
     reset_variance(p, BARO_BIAS, 1, 1e4)
     reset_variance(p, GNSS_BIAS, 3, 1e-8)
 

@@ -18,7 +18,7 @@ from flightstack.estimation.error_state import (
     write_vector,
 )
 from flightstack.estimation.estimator_params import PARAMS_SIZE, EstimatorParams
-from flightstack.estimation.fusion import fuse_rest_rate, fuse_rest_velocity
+from flightstack.estimation.fusion import fuse_drag, fuse_rest_rate, fuse_rest_velocity
 from flightstack.estimation.height_sources import take_baro, take_range
 from flightstack.estimation.imu_input import (
     add_sample,
@@ -42,7 +42,12 @@ from flightstack.estimation.memory import (
     rings_of,
 )
 from flightstack.estimation.output_predictor import follow, read_motion, write_motion
-from flightstack.estimation.position_sources import hold_position, is_platform_at_rest, take_gnss
+from flightstack.estimation.position_sources import (
+    hold_position,
+    is_platform_at_rest,
+    is_velocity_measured,
+    take_gnss,
+)
 from flightstack.estimation.prediction import DeltaSample, less_bias, motion_of, moved, predict
 from flightstack.estimation.resets import count_of_resets
 from flightstack.estimation.rings import (
@@ -75,7 +80,7 @@ _STEPS = 4
 _MEASURED = 7
 """Time, position and velocity of a GNSS measurement; other measurements are shorter."""
 _GNSS_SPARE_ROWS, _WAIT_S = 2, 0.05
-_REST_PERIOD_S, _REST_MEAN_S = 0.1, 0.1
+_REST_PERIOD_S, _REST_MEAN_S, _DRAG_PERIOD_S = 0.1, 0.1, 0.05
 _STILL_RATE_RAD_S, _STILL_FORCE_M_S2 = 0.08, 1.0
 _LONGEST_GAP_S = 1.0
 """Longest time without samples that is bridged by the next one."""
@@ -235,7 +240,7 @@ def _advance(m: Record, f: Filter, r: Rings, horizon_s: float, params: Estimator
     stands = m["flags"][LANDED] == 1 and _stands(m, params)
     has_changed = _rest(m, f, step, params) if stands else hold_position(m, f, params)
     before = count_of_resets(m)
-    if _fuse_waiting(m, f, r, params):
+    if _fuse_waiting(m, f, r, params) or _drag(m, f, step, params):
         has_changed = True
     share = 1.0 if params.output_s <= step.dt_s else step.dt_s / params.output_s
     if count_of_resets(m) != before:
@@ -277,6 +282,17 @@ def _rest(m: Record, f: Filter, step: DeltaSample, params: EstimatorParams) -> b
         fuse_rest_velocity(f, params)
     density = max(step.gyro_density.x, step.gyro_density.y, step.gyro_density.z)
     fuse_rest_rate(f, mean_rate(m["sums"]), density / _REST_MEAN_S, params)
+    return True
+
+
+@compiled
+def _drag(m: Record, f: Filter, step: DeltaSample, params: EstimatorParams) -> bool:
+    """Fuse drag in flight while the velocity over ground is measured, twenty times a second; return True if it was."""
+    is_due = f.clock[0] - m["drag_s"][0] >= _DRAG_PERIOD_S
+    if params.drag_is_fused == 0.0 or m["flags"][LANDED] == 1 or not is_due or not is_velocity_measured(f):
+        return False
+    m["drag_s"][0] = f.clock[0]
+    fuse_drag(f, scaled(step.velocity_m_s, 1.0 / step.dt_s), params)
     return True
 
 

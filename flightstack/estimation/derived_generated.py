@@ -391,3 +391,50 @@ def field_z_jacobian(q: Quaternion, earth: Vector3, body: Vector3, h: ErrorVecto
     h[20] = 1.0
     predicted = body.z + earth.x*t8 - earth.y*t7 - earth.z*t0
     return predicted
+
+
+@compiled
+def drag_x_jacobian(q: Quaternion, velocity: Vector3, bias: Vector3, wind_north: float, wind_east: float, rate: float, h: ErrorVector) -> float:
+    """Write the derivative of drag_x to ``h``, which is zero; return the predicted value."""
+    t0 = q.w*q.z + q.x*q.y
+    t1 = velocity.y - wind_east
+    t2 = q.w*q.y - q.x*q.z
+    t3 = 2.0*rate
+    t4 = 2.0*(q.y*q.y) + 2.0*(q.z*q.z) - 1.0
+    t5 = velocity.x - wind_north
+    t6 = 2.0*t5
+    t7 = t0*t3
+    h[0] = -t3*(t0*velocity.z + t1*t2)
+    h[1] = -rate*(-t2*t6 + t4*velocity.z)
+    h[2] = rate*(t0*t6 + t1*t4)
+    h[3] = rate*t4
+    h[4] = -t7
+    h[5] = t2*t3
+    h[12] = 1.0
+    h[21] = -rate*t4
+    h[22] = t7
+    predicted = bias.x + rate*(-2.0*t0*t1 + 2.0*t2*velocity.z + t4*t5)
+    return predicted
+
+
+@compiled
+def drag_y_jacobian(q: Quaternion, velocity: Vector3, bias: Vector3, wind_north: float, wind_east: float, rate: float, h: ErrorVector) -> float:
+    """Write the derivative of drag_y to ``h``, which is zero; return the predicted value."""
+    t0 = 2.0*(q.x*q.x) + 2.0*(q.z*q.z) - 1.0
+    t1 = q.w*q.x + q.y*q.z
+    t2 = velocity.y - wind_east
+    t3 = 2.0*t2
+    t4 = q.w*q.z - q.x*q.y
+    t5 = velocity.x - wind_north
+    t6 = 2.0*rate
+    h[0] = rate*(t0*velocity.z + t1*t3)
+    h[1] = -t6*(t1*t5 + t4*velocity.z)
+    h[2] = -rate*(t0*t5 - t3*t4)
+    h[3] = t4*t6
+    h[4] = rate*t0
+    h[5] = -t1*t6
+    h[13] = 1.0
+    h[21] = -t4*t6
+    h[22] = -rate*t0
+    predicted = bias.y + rate*(t0*t2 - 2.0*t1*velocity.z + 2.0*t4*t5)
+    return predicted

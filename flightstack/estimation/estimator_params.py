@@ -54,12 +54,19 @@ class EstimatorParams(NamedTuple):
     range_delay_s: float = estimator_default("range_delay_s")
     range_noise_m: float = estimator_default("range_noise_m")
     range_gate: float = estimator_default("range_gate")
+    # drag
+    drag_is_fused: float = estimator_default("drag_is_fused")
+    drag_variance: float = estimator_default("drag_variance")  # (m/s²)²
+    ballistic_x_kg_m2: float = estimator_default("ballistic_x_kg_m2")
+    ballistic_y_kg_m2: float = estimator_default("ballistic_y_kg_m2")
+    momentum_drag_1_s: float = estimator_default("momentum_drag_1_s")
     # magnetometer
     mag_delay_s: float = estimator_default("mag_delay_s")
     mag_noise_gauss: float = estimator_default("mag_noise_gauss")
     mag_largest_noise_gauss: float = 0.05
     mag_gate: float = estimator_default("mag_gate")
     mag_corrects_tilt: float = 0.0
+    wind_m_s: float = 5.0
     # at rest
     rest_velocity_noise_m_s: float = 0.02
     rest_rate_noise_rad_s: float = 0.006

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from enum import IntFlag
 from typing import NamedTuple
 
 import numpy as np
@@ -47,10 +46,10 @@ DEAD_RECKONING_S = 5.0
 _TILT_RAD, _YAW_RAD = math.radians(10.0), math.radians(15.0)
 """Deviations above which tilt and yaw are not aligned."""
 _WIND_VARIANCE = 0.5
-"""Variance of the wind [m²/s²] below which it is observed: half of that at the start, which grows without drag."""
+"""Variance of the wind [m²/s²] below which it is observed; without fusion of drag it stays above that at the start."""
 
 
-class SolutionFlags(IntFlag):
+class SolutionFlags:
     """States that are good for flight, ESTIMATOR_STATUS_FLAGS."""
 
     ATTITUDE = mavlink.ESTIMATOR_ATTITUDE
@@ -67,7 +66,7 @@ class SolutionFlags(IntFlag):
     ACCEL_ERROR = mavlink.ESTIMATOR_ACCEL_ERROR
 
 
-class ControlFlags(IntFlag):
+class ControlFlags:
     """Alignment and sensors in use, by the bits of ``control_mode_flags``."""
 
     TILT_ALIGN = 1 << 0
@@ -85,7 +84,7 @@ class ControlFlags(IntFlag):
     GNSS_VELOCITY = 1 << 44
 
 
-class RejectionFlags(IntFlag):
+class RejectionFlags:
     """Newest measurements beyond their gates, by the bits of PX4's innovation faults."""
 
     VELOCITY_HORIZONTAL = 1 << 0
@@ -125,9 +124,9 @@ class EstimatorReport(NamedTuple):
     """Time of the output, that of the newest IMU sample."""
     horizon_s: float
     """Time of the filter's state, which is late by the longest delay of a sensor."""
-    solution: SolutionFlags
-    control: ControlFlags
-    rejected: RejectionFlags
+    solution: int
+    control: int
+    rejected: int
     nominal: Nominal
     """State at the horizon."""
     variances: tuple[float, ...]
@@ -236,9 +235,9 @@ def _is_recent(rows: Sequence[Observation], now_s: float, limit_s: float) -> boo
 
 def _control(
     now_s: float, flags: Sequence[int], rows: Sequence[Observation], variances: Sequence[float]
-) -> ControlFlags:
+) -> int:
     if not flags[ALIGNED]:
-        return ControlFlags(0)
+        return 0
 
     def fused(at: int, count: int = 1) -> bool:
         return _is_recent(rows[at : at + count], now_s, AIDED_S)
@@ -247,8 +246,8 @@ def _control(
     at_rest = bool(flags[LANDED]) and fused(REST_VELOCITY, 3)
     has_position, has_velocity = has_gnss and fused(GNSS_POSITION, 2), has_gnss and fused(GNSS_VELOCITY, 2)
     is_true = (
-        (ControlFlags.TILT_ALIGN, max(variances[ATTITUDE : ATTITUDE + 2]) < _TILT_RAD**2),
-        (ControlFlags.YAW_ALIGN, variances[ATTITUDE + 2] < _YAW_RAD**2),
+        (ControlFlags.TILT_ALIGN, max(variances[ATTITUDE : ATTITUDE + 2]) < _TILT_RAD * _TILT_RAD),
+        (ControlFlags.YAW_ALIGN, variances[ATTITUDE + 2] < _YAW_RAD * _YAW_RAD),
         (ControlFlags.GNSS_POSITION, has_position),
         (ControlFlags.MAG_3D, fused(MAG, 3)),
         (ControlFlags.IN_AIR, not flags[LANDED]),
@@ -261,7 +260,7 @@ def _control(
         (ControlFlags.FAKE_POSITION, fused(HOLD_POSITION, 2)),
         (ControlFlags.GNSS_VELOCITY, has_velocity),
     )
-    return ControlFlags(sum(flag for flag, value in is_true if value))
+    return sum(flag for flag, value in is_true if value)
 
 
 def _rejected(
@@ -270,7 +269,7 @@ def _rejected(
     height: Observation,
     field: Sequence[Observation],
     range_finder: Observation | None,
-) -> RejectionFlags:
+) -> int:
     def beyond(rows: Sequence[Observation]) -> bool:
         return any(row.ratio > 1.0 for row in rows)
 
@@ -284,7 +283,7 @@ def _rejected(
         (RejectionFlags.MAG_Z, beyond(field[2:])),
         (RejectionFlags.HEIGHT_ABOVE_GROUND, range_finder is not None and beyond([range_finder])),
     )
-    return RejectionFlags(sum(flag for flag, value in is_true if value))
+    return sum(flag for flag, value in is_true if value)
 
 
 _GNSS_REJECTIONS = (
@@ -297,11 +296,11 @@ def _solution(
     now_s: float,
     flags: Sequence[int],
     rows: Sequence[Observation],
-    control: ControlFlags,
-    rejected: RejectionFlags,
-) -> SolutionFlags:
+    control: int,
+    rejected: int,
+) -> int:
     if not flags[ALIGNED]:
-        return SolutionFlags(0)
+        return 0
     has_gnss = bool(flags[HAS_GNSS])
     gnss = [*rows[GNSS_VELOCITY : GNSS_VELOCITY + 2], *rows[GNSS_POSITION : GNSS_POSITION + 2]]
     at_rest = bool(control & ControlFlags.VEHICLE_AT_REST)
@@ -326,4 +325,4 @@ def _solution(
             fall > 0.0 and rows[GNSS_VELOCITY + 2].ratio > 1.0 and rows[BARO].ratio > 1.0,
         ),
     )
-    return SolutionFlags(sum(flag for flag, value in is_true if value))
+    return sum(flag for flag, value in is_true if value)

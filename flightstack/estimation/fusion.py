@@ -8,6 +8,8 @@ from typing import Annotated, TypeAlias
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Vector3
 from flightstack.estimation.derived_generated import (
+    drag_x_jacobian,
+    drag_y_jacobian,
     field_x_jacobian,
     field_y_jacobian,
     field_z_jacobian,
@@ -24,6 +26,7 @@ from flightstack.estimation.error_state import (
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import (
     BARO,
+    DRAG,
     FUSED_S,
     GNSS_POSITION,
     GNSS_VELOCITY,
@@ -46,6 +49,7 @@ GNSS_SIZE = 10
 _CONFIRMATION, _LEAST_SHARE = 0.02, 0.01
 _UNKNOWN_M, _UNKNOWN_VERTICAL_M, _UNKNOWN_M_S = 5.0, 8.0, 0.5
 """Accuracies of a GNSS receiver that states none."""
+_AIR_KG_M3, _DRAG_GATE = 1.225, 5.0
 _AIDED_S = 1.0
 """Time after an accepted GNSS velocity in which the horizontal motion counts as measured."""
 LEAST_COS_TILT = 0.7
@@ -184,6 +188,32 @@ def fuse_field(f: Filter, measured: Vector3, params: EstimatorParams) -> None:
             expected = field_z_jacobian(n.attitude, earth, body, f.h)
             innovation = measured.z - expected
         fuse(f, MAG + axis, innovation, noise, holds)
+
+
+@compiled
+def fuse_drag(f: Filter, force: Vector3, params: EstimatorParams) -> None:
+    """Fuse the specific force along the body's x and y axes, which in flight is the drag of the air.
+
+    Drag is −(``momentum_drag_1_s`` + ½ ρ |u| / ballistic coefficient) u for the velocity u relative to the air: that of
+    the rotors' momentum and that of the body. Its change with |u| is left out of the Jacobian.
+    """
+    deviation = math.sqrt(params.drag_variance)
+    noise = Noise(deviation, deviation, deviation, _DRAG_GATE, 0.0)
+    for axis in range(2):
+        n = read_nominal(f.nominal)
+        v, bias = n.velocity_ned_m_s, n.accel_bias_m_s2
+        north, east = n.wind_north_m_s, n.wind_east_m_s
+        speed = math.sqrt((v.x - north) * (v.x - north) + (v.y - east) * (v.y - east) + v.z * v.z)
+        ballistic = params.ballistic_x_kg_m2 if axis == 0 else params.ballistic_y_kg_m2
+        rate = params.momentum_drag_1_s + (0.5 * _AIR_KG_M3 * speed / ballistic if ballistic > 0.0 else 0.0)
+        clear(f.h)
+        if axis == 0:
+            expected = drag_x_jacobian(n.attitude, v, bias, north, east, rate, f.h)
+            innovation = force.x - expected
+        else:
+            expected = drag_y_jacobian(n.attitude, v, bias, north, east, rate, f.h)
+            innovation = force.y - expected
+        fuse(f, DRAG + axis, innovation, noise, 0.0)
 
 
 @compiled

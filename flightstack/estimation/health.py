@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from flightstack.core.contract import Record
+import numpy as np
+
+from flightstack.core.compiled import compiled, direct
+from flightstack.core.contract import FloatArray, RecordArray
 from flightstack.estimation.error_state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY
 from flightstack.estimation.kalman import BARO, FUSED_S, GNSS_POSITION, GNSS_VELOCITY, MAG, TEST_RATIO
 from flightstack.estimation.memory import ALIGNED
@@ -14,7 +17,9 @@ from flightstack.estimation.sensor_samples import GnssFix
 
 SMOOTHING = 0.1
 """Share of the newest test ratio in its mean."""
-_GYRO_BIAS_AT, _ACCEL_BIAS_AT = slice(GYRO_BIAS + 1, GYRO_BIAS + 4), slice(ACCEL_BIAS + 1, ACCEL_BIAS + 4)
+STUCK_SAMPLES = 100
+"""Equal successive samples of the inertial sensor after which it is stuck; PX4's limit. Noise changes the last bits."""
+MISSING_FIX_S = 1.0
 
 
 class EstimateHealth(NamedTuple):
@@ -48,47 +53,74 @@ NO_HEALTH = EstimateHealth(
     False, False, math.inf, False, math.inf, math.inf, math.inf, math.inf, 0.0, math.inf, math.inf,
     math.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
 )  # fmt: skip
-_RATIOS_AT = EstimateHealth._fields.index("velocity_ratio")
+_KNOWN, _SUMMARY_SIZE = 3, 12
+"""Columns of the summary: time of the filter, times of the last accepted horizontal position and velocity, and from
+``_KNOWN`` on the fields of ``EstimateHealth`` from ``horizontal_m`` on."""
 
 
-def estimate_health(
-    before: EstimateHealth, memory: Record, samples: NewestSamples, has_origin: bool, time_s: float
-) -> EstimateHealth:
-    """Return the health at ``time_s`` from the estimator's record; ``before`` is the last one, for the mean ratios."""
-    rows = memory["observations"].tolist()
-    variance = memory["covariance"].diagonal().tolist()
-    nominal = memory["nominal"].tolist()
-    horizon_s = float(memory["clock"][0])
-    fused = [row[FUSED_S] for row in rows]
-    position_s = min(fused[GNSS_POSITION : GNSS_POSITION + 2])
-    velocity_s = min(fused[GNSS_VELOCITY : GNSS_VELOCITY + 2])
-    fix_age_s, imu = _fix_age_s(samples, time_s), samples.imu
-    groups = ((GNSS_VELOCITY, 3), (GNSS_POSITION, 2), (BARO, 1), (MAG, 3))
-    ratios = (math.sqrt(max(row[TEST_RATIO] for row in rows[at : at + size])) for at, size in groups)
-    means = (mean + SMOOTHING * (new - mean) for mean, new in zip(before[_RATIOS_AT:], ratios, strict=True))
-    return EstimateHealth(
-        bool(memory["flags"][ALIGNED]),
-        has_origin,
-        math.inf if imu is None else time_s - imu.time_s,
-        samples.imu_track.repeats >= STUCK_SAMPLES,
-        math.inf if samples.mag is None else time_s - samples.mag.time_s,
-        math.inf if samples.baro is None else time_s - samples.baro.time_s,
-        fix_age_s,
-        horizon_s - max(position_s, velocity_s) if has_origin else math.inf,
-        horizon_s - position_s if has_origin and fix_age_s < 1.0 else 0.0,
-        math.sqrt(variance[POSITION] + variance[POSITION + 1]),
-        math.sqrt(variance[VELOCITY] + variance[VELOCITY + 1]),
-        math.sqrt(max(variance[ATTITUDE], variance[ATTITUDE + 1])),
-        max(map(abs, nominal[_GYRO_BIAS_AT])),
-        max(map(abs, nominal[_ACCEL_BIAS_AT])),
-        *means,
-    )
+@compiled
+def _largest(values: FloatArray, first: int, count: int) -> float:
+    largest = 0.0
+    for i in range(first, first + count):
+        largest = max(largest, abs(values[i]))
+    return largest
+
+
+@compiled
+def _mean_ratio(mean: float, observations: FloatArray, first: int, count: int) -> float:
+    """Return a mean of test ratios after the newest one, the largest of ``count`` rows."""
+    newest = math.sqrt(_largest(observations[:, TEST_RATIO], first, count))
+    return mean + SMOOTHING * (newest - mean)
+
+
+@compiled
+def health_kernel(memory: RecordArray, summary: FloatArray) -> None:
+    """Write the summary of an estimator's record, shape (12,); it holds the mean ratios of the last call."""
+    m = memory[0]
+    p, o, x = m["covariance"], m["observations"], m["nominal"]
+    summary[0] = m["clock"][0]
+    for i, row in ((1, GNSS_POSITION), (2, GNSS_VELOCITY)):
+        summary[i] = min(o[row, FUSED_S], o[row + 1, FUSED_S])
+    for i, at in ((3, POSITION), (4, VELOCITY)):
+        summary[i] = math.sqrt(p[at, at] + p[at + 1, at + 1])
+    summary[5] = math.sqrt(max(p[ATTITUDE, ATTITUDE], p[ATTITUDE + 1, ATTITUDE + 1]))
+    summary[6], summary[7] = _largest(x, GYRO_BIAS + 1, 3), _largest(x, ACCEL_BIAS + 1, 3)
+    summary[8] = _mean_ratio(summary[8], o, GNSS_VELOCITY, 3)
+    summary[9] = _mean_ratio(summary[9], o, GNSS_POSITION, 2)
+    summary[10] = _mean_ratio(summary[10], o, BARO, 1)
+    summary[11] = _mean_ratio(summary[11], o, MAG, 3)
+
+
+class HealthMonitor:
+    """Summarises an estimator at intervals."""
+
+    def __init__(self, memory: RecordArray) -> None:
+        """``memory`` is the estimator's, shape (1,)."""
+        self._memory = memory
+        self._aligned = memory["flags"][0]
+        self._summary = np.zeros(_SUMMARY_SIZE)
+        self._summarise = direct(health_kernel, memory, self._summary)
+
+    def update(self, samples: NewestSamples, has_origin: bool, time_s: float) -> EstimateHealth:
+        """Return the health at ``time_s``."""
+        self._summarise(self._memory, self._summary)
+        summary = self._summary.tolist()
+        horizon_s, position_s, velocity_s = summary[:_KNOWN]
+        fix_age_s, imu = _fix_age_s(samples, time_s), samples.imu
+        return EstimateHealth(
+            bool(self._aligned[ALIGNED]),
+            has_origin,
+            math.inf if imu is None else time_s - imu.time_s,
+            samples.imu_track.repeats >= STUCK_SAMPLES,
+            math.inf if samples.mag is None else time_s - samples.mag.time_s,
+            math.inf if samples.baro is None else time_s - samples.baro.time_s,
+            fix_age_s,
+            horizon_s - max(position_s, velocity_s) if has_origin else math.inf,
+            horizon_s - position_s if has_origin and fix_age_s < MISSING_FIX_S else 0.0,
+            *summary[_KNOWN:],
+        )
 
 
 def _fix_age_s(samples: NewestSamples, time_s: float) -> float:
     gnss = samples.gnss
     return math.inf if gnss is None or gnss.fix_type < GnssFix.FIX_3D else time_s - gnss.time_s
-
-
-STUCK_SAMPLES = 100
-"""Equal successive samples of the inertial sensor after which it is stuck; PX4's limit. Noise changes the last bits."""

@@ -68,6 +68,7 @@ MEMORY = np.dtype(
         ("ground_m", "f8", (1,)),
         ("hold", "f8", (3,)),  # north, east [m], time of the last fusion
         ("rest_s", "f8", (1,)),  # time of the last fusion at rest
+        ("drag_s", "f8", (1,)),  # and of drag
         ("flags", "i8", (FLAGS,)),
         ("resets", "f8", (RESETS,)),
         ("yaw_models", "f8", (MODELS, MODEL_SIZE)),

@@ -15,10 +15,14 @@ from flightstack.estimation.vibration import Vibration, vibration_of
 class Sensed:
     """What a vehicle that flies on its sensors knows at one time."""
 
-    def __init__(self, memory: Record, samples: NewestSamples) -> None:
-        """``memory`` is the estimator's record; both change with time, so read this before the next sample."""
+    def __init__(self, memory: Record, samples: NewestSamples, has_origin: bool = True) -> None:
+        """``memory`` is the estimator's record; both change with time, so read this before the next sample.
+
+        ``has_origin``: the vehicle knows where it is on earth, since its first fix.
+        """
         self.memory = memory
         self.samples = samples
+        self.has_origin = has_origin
 
     @cached_property
     def report(self) -> EstimatorReport:

@@ -74,7 +74,7 @@ BOARDS = {
     ),
     "pico2-riscv": Board(
         "Pico 2, Hazard3",
-        ("ports/pico2/pico2_start_riscv.c", "ports/pico2/pico2_board.c"),
+        ("ports/pico2/pico2_start_riscv.c", "ports/pico2/pico2_board.c", "ports/pico2/pico2_divide.c"),
         "ports/pico2/pico2.ld", "PICO2_BAUD", (), _ZIG_HAZARD3, (), 0xE48B_FF5A,
     ),
 }  # fmt: skip

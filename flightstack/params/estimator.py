@@ -65,6 +65,14 @@ ESTIMATOR_PARAMS = (
     _param("EKF2_RNG_DELAY", 5.0, 0.0, 300.0, "ms", "Delay of the rangefinder", "range_delay_s", _MS, 1),
     _param("EKF2_RNG_NOISE", 0.1, 0.01, 10.0, "m", "Least noise of the rangefinder", "range_noise_m"),
     _param("EKF2_RNG_GATE", 5.0, 1.0, 100.0, "SD", "Gate of the rangefinder", "range_gate", 1.0, 1),
+    # drag, from which the wind is estimated
+    _param("EKF2_DRAG_CTRL", 0, 0, 1, "", "Estimate the wind from the drag of a multirotor: 0 off, 1 on",
+           "drag_is_fused", integer=True),
+    _param("EKF2_DRAG_NOISE", 2.5, 0.05, 10.0, "(m/s^2)^2", "Variance of the drag", "drag_variance", 1.0, 2),
+    _param("EKF2_BCOEF_X", 100.0, 0.0, 200.0, "kg/m^2", "Ballistic coefficient along x; 0 for no drag of the body",
+           "ballistic_x_kg_m2", 1.0, 1),
+    _param("EKF2_BCOEF_Y", 100.0, 0.0, 200.0, "kg/m^2", "The same along y", "ballistic_y_kg_m2", 1.0, 1),
+    _param("EKF2_MCOEF", 0.15, 0.0, 1.0, "1/s", "Drag of the rotors' momentum, per m/s", "momentum_drag_1_s"),
     # magnetometer
     _param("EKF2_MAG_DELAY", 0.0, 0.0, 300.0, "ms", "Delay of the magnetometer", "mag_delay_s", _MS, 1),
     _param("EKF2_MAG_NOISE", 0.005, 0.001, 1.0, "gauss", "Least noise of the magnetometer", "mag_noise_gauss"),

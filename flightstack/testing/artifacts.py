@@ -144,6 +144,8 @@ def run_info(flight: Flight, name: str, reason: str, log: Path) -> RunInfo:
         torque_gust=setup.torque_gust or None,
         force=numbers(setup.force),
         torque=numbers(setup.torque),
+        slope=setup.slope_deg or None,
+        boat=numbers(setup.boat),
         battery_start=setup.battery_percent,
         battery_capacity=setup.battery_capacity_mah,
         battery_drain=setup.battery_drain,

@@ -123,6 +123,8 @@ class Scenario:
     force_n: tuple[float, ...] = key((0.0, 0.0, 0.0), "constant force NED", lengths=(3,))
     torque_n_m: tuple[float, ...] = key((0.0, 0.0, 0.0), "constant torque FRD", lengths=(3,))
     torque_gust_n_m: float = key(0.0, "standard deviation of the gusty torque", low=0.0, high=100.0)
+    slope_deg: float = key(0.0, "slope of the ground, which rises to the north", low=-30.0, high=30.0)
+    boat_m_s: tuple[float, ...] = key((0.0, 0.0), "velocity of the ground north and east", lengths=(2,))
     battery_percent: float | None = key(None, "charge at the start", low=0.0, high=100.0)
     battery_capacity_mah: float | None = key(None, "capacity of the battery", low=1.0)
     battery_drain: float | None = key(None, "factor on the discharge", low=0.0, high=1e4)
@@ -157,7 +159,7 @@ class Scenario:
         """Return the vehicle and conditions of the flight with ``seed``."""
         same = (
             "vehicle", "controller", "gains", "loops", "state", "plant", "drag", "ideal_rotors", "inner_hz", "outer_hz",
-            "battery_percent", "battery_capacity_mah", "battery_drain",
+            "battery_percent", "battery_capacity_mah", "battery_drain", "slope_deg",
         )  # fmt: skip
         folder = self.path.parent
         made = Setup(
@@ -167,6 +169,7 @@ class Scenario:
             gust=self.wind.gust_m_s,
             force=self.force_n,
             torque=self.torque_n_m,
+            boat=self.boat_m_s,
             torque_gust=self.torque_gust_n_m,
             seed=seed,
             folder=folder,

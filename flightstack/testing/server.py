@@ -221,6 +221,8 @@ def fly_options(setup: Setup, instance: int, speed: float) -> FlyOptions:
         drag=setup.drag,
         force=numbers(setup.force),
         torque=numbers(setup.torque),
+        slope=setup.slope_deg or None,
+        boat=numbers(setup.boat),
         torque_gust=setup.torque_gust or None,
         battery_start=setup.battery_percent,
         battery_capacity=setup.battery_capacity_mah,

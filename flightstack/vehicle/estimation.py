@@ -15,7 +15,7 @@ from flightstack.core.enums import Severity
 from flightstack.core.portable_math import distance
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits, tuning_of
-from flightstack.estimation.health import NO_HEALTH, estimate_health
+from flightstack.estimation.health import NO_HEALTH, HealthMonitor
 from flightstack.estimation.memory import POSITION_RESET, VELOCITY_RESET, YAW_RESET
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed
@@ -83,6 +83,7 @@ class Estimation:
         self._users = users
         self._recorder, self._truth = recorder, truth
         self._feed = SensorFeed(self.estimator, now.state, recorder)
+        self._monitor = HealthMonitor(self.estimator.memory)
         self._landed = False
         self._health_due_us = 0
         # as memory: a number of an array takes four times as long to read
@@ -96,7 +97,7 @@ class Estimation:
 
     def sensed(self) -> Sensed:
         """Return what the estimator and its sensors know now; valid until the next update."""
-        return Sensed(self.estimator.memory[0], self._feed.newest)
+        return Sensed(self.estimator.memory[0], self._feed.newest, self._now.has_state)
 
     def _on_parameter(self, name: str, value: float) -> None:
         if name in ESTIMATOR_SPECS:
@@ -115,7 +116,7 @@ class Estimation:
 
     def is_ready(self) -> bool:
         """Return True if the vehicle may take off on the estimate."""
-        return self._now.has_state and not estimate_refusals(self.health)
+        return self._now.has_state and not estimate_refusals(self.health, self._now.behaviour)
 
     def update(self, time_us: int) -> None:
         """Take the measurements since the last call; once per tick, at the time of the tick."""
@@ -164,8 +165,7 @@ class Estimation:
     def _update_health(self, time_us: int) -> None:
         now, users = self._now, self._users
         self._health_due_us = time_us + HEALTH_US
-        record = self.estimator.memory[0]
-        self.health = estimate_health(self.health, record, self._feed.newest, now.has_state, time_us * 1e-6)
+        self.health = self._monitor.update(self._feed.newest, now.has_state, time_us * 1e-6)
         users.failsafes.take_health(self.health)
         failsafes = users.failsafes
         changed = users.navigator.set_known(failsafes.position_is_known, failsafes.velocity_is_known)

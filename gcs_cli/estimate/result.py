@@ -10,18 +10,28 @@ from typing import Any
 
 import numpy as np
 
+from flightstack.estimation.error_state import ATTITUDE, POSITION, VELOCITY
 from flightstack.estimation.kalman import (
     BARO,
+    FUSED,
     GNSS_POSITION,
     GNSS_VELOCITY,
-    INNOVATION,
-    INNOVATION_VARIANCE,
     MAG,
+    NIS_SUM,
+    REFUSED,
 )
 from gcs_cli.charts.pages import render_page, shown
 from gcs_cli.estimate.charts import figures
 from gcs_cli.estimate.run import Estimate, run
-from gcs_cli.estimate.track import Differences, Track, differences, flight_span, logged_track, summary_of
+from gcs_cli.estimate.track import (
+    Differences,
+    Track,
+    differences,
+    errors_at,
+    flight_span,
+    logged_track,
+    summary_of,
+)
 from gcs_cli.logs.recording import Recording
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -33,6 +43,7 @@ _SENSORS = (
     ("mag", MAG, 3),
     ("baro", BARO, 1),
 )
+_PARTS = (("attitude", ATTITUDE), ("velocity", VELOCITY), ("position", POSITION))
 _COLUMNS = (
     ("roll", "deg", "°"),
     ("pitch", "deg", "°"),
@@ -62,7 +73,7 @@ class Result:
         return {
             "in_air_s": None if span is None else round(span[1] - span[0], 3),
             **{key: self._figures(name) for name, key in KEYS.items()},
-            "consistency": consistency(self.estimate),
+            "consistency": consistency(self.estimate, self.others.get(TRUTH), span),
             "samples": self.estimate.samples,
         }
 
@@ -88,15 +99,39 @@ def estimate_log(log: Recording, given: Mapping[str, float] = MappingProxyType({
     return Result(estimate, known, against, span)
 
 
-def consistency(estimate: Estimate) -> dict[str, float | None]:
-    """Return the mean of each sensor's squared innovations by their variance, 1 for a consistent filter."""
+def consistency(
+    estimate: Estimate, truth: Track | None, span_s: tuple[float, float] | None
+) -> dict[str, float | None]:
+    """Return figures that are 1 for a consistent filter, and the share of refused measurements of each sensor.
+
+    NIS: mean of the squares of accepted innovations by their variance, over all measurements. NEES: mean of the squares
+    of the errors against truth by their covariance, by their number; None without truth.
+    """
     found: dict[str, float | None] = {}
     for name, row, count in _SENSORS:
-        values = estimate.observations[:, row : row + count]
-        variance = values[:, :, INNOVATION_VARIANCE]
-        used = variance > 0.0
-        ratios = np.square(values[:, :, INNOVATION][used]) / variance[used]
-        found[f"{name}_nis"] = float(np.mean(ratios)) if len(ratios) else None
+        last = estimate.observations[-1, row : row + count]
+        fused, refused = float(np.sum(last[:, FUSED])), float(np.sum(last[:, REFUSED]))
+        found[f"{name}_nis"] = float(np.sum(last[:, NIS_SUM])) / fused if fused else None
+        found[f"{name}_refused_share"] = refused / (fused + refused) if fused + refused else None
+    return {**found, **_nees(estimate, truth, span_s)}
+
+
+def _nees(
+    estimate: Estimate, truth: Track | None, span_s: tuple[float, float] | None
+) -> dict[str, float | None]:
+    found: dict[str, float | None] = dict.fromkeys((f"{name}_nees" for name, _ in _PARTS), None)
+    if truth is None:
+        return found
+    x, begin_s, end_s = estimate.nominal, *(span_s or (-np.inf, np.inf))
+    state = Track(estimate.state_s, x[:, :4], estimate.state_s, x[:, 4:7], x[:, 7:10], estimate.track.origin)
+    errors = errors_at(state, truth)
+    inside = (estimate.state_s >= begin_s) & (estimate.state_s <= end_s)
+    for name, at in _PARTS:
+        e, p = errors[:, at : at + 3], estimate.covariance[:, at : at + 3, at : at + 3]
+        used = inside & np.isfinite(e).all(axis=1)
+        if used.any():
+            squares = np.einsum("ni,ni->n", e[used], np.linalg.solve(p[used], e[used, :, None])[:, :, 0])
+            found[f"{name}_nees"] = float(np.mean(squares)) / 3.0
     return found
 
 

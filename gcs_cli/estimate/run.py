@@ -13,7 +13,7 @@ from flightstack.core.contract import FloatArray
 from flightstack.core.earth_field import FIELD_YEAR, earth_field_ned_gauss
 from flightstack.estimation.error_state import ERROR_STATES, NOMINAL_SIZE
 from flightstack.estimation.estimator import Estimator
-from flightstack.estimation.kalman import OBSERVATION_COLUMNS, OBSERVATIONS
+from flightstack.estimation.kalman import OBSERVATION_COLUMNS, OBSERVATIONS, symmetric
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, ImuSample, MagSample, RangeSample
 from flightstack.estimation.snapshot import ESTIMATOR_START, restored
 from gcs_cli.errors import CliError
@@ -23,19 +23,23 @@ from gcs_cli.logs.recording import Recording
 
 SNAPSHOT_S = 0.1
 """Interval of the states, deviations and innovations that are kept."""
+MOTION_SIZE = 9
+"""Error states of attitude, velocity and position."""
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
     """The output of the filter at each IMU sample, and its inner state at intervals.
 
-    ``state_s`` (m,) has the times of ``nominal`` (m, 28), ``deviations`` (m, 27) and ``observations`` (m, 22, 6).
+    ``state_s`` (m,) has the times of ``nominal`` (m, 28), ``deviations`` (m, 27), ``covariance`` of attitude, velocity
+    and position (m, 9, 9) and ``observations`` (m, 23, 9): those of the horizon, which is behind the output.
     """
 
     track: Track
     state_s: FloatArray
     nominal: FloatArray
     deviations: FloatArray
+    covariance: FloatArray
     observations: FloatArray
     samples: dict[str, int]
     resets: FloatArray
@@ -90,7 +94,7 @@ class _Keeper:
         self._estimator = estimator
         self._record: Any = estimator.memory[0]
         self._outputs: list[FloatArray] = []
-        self._states: list[tuple[float, FloatArray, FloatArray, FloatArray]] = []
+        self._states: list[tuple[float, FloatArray, FloatArray, FloatArray, FloatArray]] = []
         self._samples: dict[str, int] = {}
         self._next_s = 0.0
 
@@ -107,9 +111,10 @@ class _Keeper:
             record = self._record
             self._states.append(
                 (
-                    time_s,
+                    float(record["clock"][0]),
                     record["nominal"].copy(),
                     self._estimator.deviations(),
+                    symmetric(record["covariance"][:MOTION_SIZE, :MOTION_SIZE]),
                     record["observations"].copy(),
                 )
             )
@@ -121,7 +126,7 @@ class _Keeper:
         frame = self._estimator.frame
         signs = np.where(np.sum(output[1:, 1:5] * output[:-1, 1:5], axis=1) < 0.0, -1.0, 1.0)
         attitude = output[:, 1:5] * np.concatenate([[1.0], np.cumprod(signs)])[:, None]
-        times, nominal, deviations, observations = zip(*self._states, strict=True)
+        times, nominal, deviations, covariance, observations = zip(*self._states, strict=True)
         return Estimate(
             Track(
                 output[:, 0],
@@ -134,6 +139,7 @@ class _Keeper:
             np.array(times),
             np.array(nominal).reshape(-1, NOMINAL_SIZE),
             np.array(deviations).reshape(-1, ERROR_STATES),
+            np.array(covariance).reshape(-1, MOTION_SIZE, MOTION_SIZE),
             np.array(observations).reshape(-1, OBSERVATIONS, OBSERVATION_COLUMNS),
             self._samples,
             self._record["resets"].copy(),

@@ -109,6 +109,27 @@ def differences(estimate: Track, reference: Track, begin_s: float, end_s: float)
     )
 
 
+def errors_at(estimate: Track, reference: Track) -> FloatArray:
+    """Return rotation vector [rad, NED], velocity and position, estimate minus reference, at ``estimate.motion_s``.
+
+    Shape (n, 9); the times of both kinds are equal. NaN outside the time of the reference, or without its origin.
+    """
+    times = estimate.motion_s
+    r = _at(times, reference.attitude_s, reference.attitude)
+    r = r / np.linalg.norm(r, axis=1)[:, None]
+    turn = _product(estimate.attitude, r * [1.0, -1.0, -1.0, -1.0])
+    turn = 2.0 * turn[:, 1:] * np.where(turn[:, :1] < 0.0, -1.0, 1.0)
+    velocity = estimate.velocity_m_s - _at(times, reference.motion_s, reference.velocity_m_s)
+    position = estimate.position_m - _at(times, reference.motion_s, reference.position_m)
+    if estimate.origin is None or reference.origin is None:
+        position = np.full_like(position, np.nan)
+    else:
+        position = position + np.array(LocalFrame(reference.origin).to_ned(estimate.origin))
+    errors = np.column_stack([turn, velocity, position])
+    errors[(times < reference.motion_s[0]) | (times > reference.motion_s[-1])] = np.nan
+    return errors
+
+
 def _times(a: FloatArray, b: FloatArray, begin_s: float, end_s: float) -> FloatArray:
     fewer = a if len(a) <= len(b) else b
     first, last = max(begin_s, a[0], b[0]), min(end_s, a[-1], b[-1])

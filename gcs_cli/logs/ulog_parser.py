@@ -62,7 +62,7 @@ def parse_ulog(content: bytes, source: object, topics: list[str] | None = None) 
 
     Raise ConfigError, which names ``source``.
     """
-    rows = _Rows()
+    rows = _Rows(topics)
     is_whole = rows.gather(content)
     try:
         # pyulog reports damage on stdout, which belongs to the command's own output
@@ -76,9 +76,11 @@ def parse_ulog(content: bytes, source: object, topics: list[str] | None = None) 
 
 
 class _Rows:
-    """The rows of each subscription, and the messages that define all the rest."""
+    """The rows of each subscription to the given topics, and the messages that define all the rest."""
 
-    def __init__(self) -> None:
+    def __init__(self, topics: list[str] | None) -> None:
+        self._topics = None if topics is None else {topic.encode() for topic in topics}
+        self._others: set[int] = set()  # subscriptions to other topics
         self.are_regular = True
         """True if no subscription id is used twice, and no data is appended."""
         self._rows: dict[int, list[bytes]] = {}
@@ -96,7 +98,11 @@ class _Rows:
             if after > end or (kind == DATA_TYPE and after < at + _ROW_AT):
                 return False
             if kind == DATA_TYPE:
-                number, row = content[at + 3] | content[at + 4] << 8, content[at + _ROW_AT : after]
+                number = content[at + 3] | content[at + 4] << 8
+                if number in self._others:
+                    at = after
+                    continue
+                row = content[at + _ROW_AT : after]
                 time = row[7::-1]  # big-endian, so that bytes compare as numbers do
                 if time > latest_time:
                     latest, latest_time = (at, after), time
@@ -117,7 +123,9 @@ class _Rows:
     def _check(self, kind: int, message: bytes) -> None:
         if kind == _SUBSCRIPTION_TYPE:
             number = int.from_bytes(message[1:3], "little")
-            self.are_regular &= number not in self._rows
+            self.are_regular &= number not in self._rows and number not in self._others
+            if self._topics is not None and message[3:] not in self._topics:
+                self._others.add(number)
         elif kind == _FLAG_TYPE:
             self.are_regular &= not any(message[_INCOMPATIBLE_AT:])
 

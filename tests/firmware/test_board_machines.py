@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import itertools
 import os
 import select
@@ -9,19 +10,22 @@ import subprocess
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from flightstack.firmware.boards import GCC, ZIG
 from flightstack.firmware.build import host_library
 from flightstack.firmware.c_loops import HostLoops
 from flightstack.firmware.numbers import default_numbers
+from flightstack.firmware.sources import firmware_root
 from gcs_cli.pil.conformance.check import FAILED, PASSED
 from gcs_cli.pil.conformance.line import Line
 from gcs_cli.pil.conformance.link_checks import all_bytes, burst, cut_frame, sizes
-from gcs_cli.pil.conformance.loop_checks import expected_outputs, stepped, vectors
+from gcs_cli.pil.conformance.loop_checks import SMALL_VECTORS, expected_outputs, stepped, vectors
 from gcs_cli.pil.conformance.run import conformance
 from tests.firmware.board_builds import image
 from tests.firmware.board_machines import BoardMachine, Nucleo, RegisterMisuseError
+from tests.firmware.codec_support import compiler
 from tests.firmware.pico2_machine import Pico2
 from tests.firmware.step_machines import tool
 from tests.support.tools import NIGHTLY
@@ -90,8 +94,8 @@ def test_a_pico2_exchanges_bytes_bursts_and_cut_frames() -> None:
     ("name", "board"), [("pico2", "Pico 2, Cortex-M33"), ("pico2-riscv", "Pico 2, Hazard3")]
 )
 def test_a_pico2_built_by_zig_has_the_bits_of_the_host(name: str, board: str) -> None:
-    """The floating-point arithmetic of Hazard3 is zig's run-time library."""
-    machine, steps = pico2(name), vectors(20)
+    """The floating-point arithmetic of Hazard3 is zig's run-time library, but for division."""
+    machine, steps = pico2(name), [*vectors(20), *vectors(SMALL_VECTORS, small=True)]
     line = Line(machine, 1.0, machine.now_s)
     identity = line.request("FS_PIL_IDENTITY")
     assert identity.board == board
@@ -100,6 +104,31 @@ def test_a_pico2_built_by_zig_has_the_bits_of_the_host(name: str, board: str) ->
     expected = expected_outputs(HostLoops(host_library(), default_numbers()), steps)
     assert [list(report.outputs) for report in reports] == expected[:, :-1].tolist()
     assert [report.status & 0xFFFF for report in reports] == expected[:, -1].tolist()
+
+
+def test_hazard3_divides_with_the_bits_of_ieee_754(tmp_path: Path) -> None:
+    """Quotients around the largest and the smallest numbers, and of zeros, infinities and NaN."""
+    path = tmp_path / "divide.so"
+    source = firmware_root() / "ports" / "pico2" / "pico2_divide.c"
+    subprocess.run([*compiler(), "-shared", "-fPIC", "-O2", str(source), "-o", str(path)], check=True)
+    divide = ctypes.CDLL(str(path))["__divsf3"]
+    divide.argtypes, divide.restype = [ctypes.c_float, ctypes.c_float], ctypes.c_float
+    rng = np.random.default_rng(14)
+    count = 20_000
+    exponents = rng.integers(0, 255, count)
+    others = np.clip(exponents + 127 - rng.choice([*range(-27, 4), *range(250, 257)], count), 0, 254)
+    words = [rng.integers(0, 2**32, count) & 0x807F_FFFF | e << 23 for e in (exponents, others)]
+    edges = np.array([0, 1, 2, 0x7F_FFFF, 0x80_0000, 0x3F80_0000, 0x7F7F_FFFF, 0x7F80_0000, 0x7FC0_0000])
+    pairs = np.array(
+        [*zip(*words, strict=True), *((a | s, b) for a in edges for b in edges for s in (0, 2**31))]
+    )
+    left, right = (pairs[:, place].astype(np.uint32).view(np.float32) for place in (0, 1))
+    with np.errstate(all="ignore"):
+        expected = left / right
+    found = np.array([divide(*pair) for pair in zip(left.tolist(), right.tolist(), strict=True)], np.float32)
+    is_number = ~np.isnan(expected)
+    assert np.isnan(found[~is_number]).all()
+    assert np.array_equal(found[is_number].view(np.uint32), expected[is_number].view(np.uint32))
 
 
 class QemuLink:

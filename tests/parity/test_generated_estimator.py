@@ -31,6 +31,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "barometer": fusion.fuse_baro,
     "range": fusion.fuse_range,
     "field": fusion.fuse_field,
+    "drag": fusion.fuse_drag,
     "rest": fusion.fuse_rest_velocity,
     "rate at rest": fusion.fuse_rest_rate,
     "held position": fusion.fuse_hold,

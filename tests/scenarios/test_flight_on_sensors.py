@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from flightstack.core.errors import ConfigError
+from flightstack.estimation.error_state import WIND
 from flightstack.testing import World
 from tests.support.estimate_errors import Watch
 
@@ -20,6 +22,28 @@ def test_square_on_sensors_is_completed_within_the_limits_of_gnss() -> None:
     assert errors.velocity_m_s < 0.15
     assert errors.horizontal_m < 0.7
     assert errors.landing_m < 1.5
+
+
+DRAG = {"EKF2_DRAG_CTRL": 1, "EKF2_DRAG_NOISE": 0.1, "EKF2_MCOEF": 0.2, "EKF2_BCOEF_X": 0, "EKF2_BCOEF_Y": 0}
+"""The drag of x_quad: 0.3 N s/m and 1.5 kg."""
+
+
+def test_wind_is_estimated_from_drag() -> None:
+    winds = {}
+    for params in (DRAG, {}):
+        with World(vehicle="x_quad", state="estimated", wind=(4.0, -2.0), params=params) as world:
+            world.wait_until_ready()
+            world.arm()
+            world.takeoff()
+            world.run_for(20.0)
+            estimator = world.engine.stack.estimation.estimator
+            winds[bool(params)] = estimator.memory["nominal"][0, 22:24], estimator.deviations()[WIND]
+    wind, deviation = winds[True]
+    assert np.abs(wind - [4.0, -2.0]).max() < 1.0
+    assert deviation < 0.7
+    wind, deviation = winds[False]
+    assert (wind == 0.0).all()
+    assert deviation >= 5.0  # and so not told as known
 
 
 def test_flights_on_sensors_of_one_seed_are_equal_to_the_byte() -> None:

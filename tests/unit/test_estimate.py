@@ -18,6 +18,7 @@ from flightstack.estimation.sensor_samples import GnssSample
 from gcs_cli.__main__ import main
 from gcs_cli.errors import USAGE
 from gcs_cli.estimate.log_samples import params_of, pressure_altitude_m, samples_of
+from gcs_cli.estimate.result import estimate_log
 from gcs_cli.estimate.track import differences, flight_span, logged_track, summary_of
 from gcs_cli.logs.reader import read_log
 from tests.support import flown_sensors as flown
@@ -156,3 +157,23 @@ def test_noises_of_a_log_of_px4_are_not_those_of_this_filter(log: Path) -> None:
     assert params.gnss_delay_s == pytest.approx(0.2)
     own = replace(foreign, info={"sys_name": "flightstack"})
     assert params_of(own)[0].gnss_velocity_noise_m_s == pytest.approx(0.5)
+
+
+def test_consistency_counts_each_measurement_once_and_errors_against_truth(
+    log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["estimate", str(log), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["consistency"]
+    for sensor in ("gnss_velocity", "gnss_position", "mag", "baro"):
+        assert 0.05 < found[f"{sensor}_nis"] < 1.5  # measured 0.13 to 0.47: noises begin large
+        assert found[f"{sensor}_refused_share"] == 0.0
+    for part in ("attitude", "velocity", "position"):
+        assert 0.02 < found[f"{part}_nees"] < 1.5  # measured 0.05 to 0.3
+
+
+def test_consistency_without_truth_has_no_errors(tmp_path: Path) -> None:
+    path = tmp_path / "flight.ulg"
+    path.write_bytes(sensor_log(3.0))
+    blind = read_log(path)
+    blind = replace(blind, topics=[topic for topic in blind.topics if "groundtruth" not in topic.name])
+    assert estimate_log(blind).summary["consistency"]["attitude_nees"] is None

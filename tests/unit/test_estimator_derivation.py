@@ -91,6 +91,28 @@ def test_field_jacobian_is_the_derivative_of_the_field(axis: int) -> None:
     assert h == pytest.approx(numeric, abs=1e-9)
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_drag_jacobian_is_the_derivative_of_the_drag(axis: int) -> None:
+    rate = 0.3
+
+    def drag(n: Nominal) -> float:
+        v = n.velocity_ned_m_s
+        relative = rotate(conjugate(n.attitude), Vector3(v.x - n.wind_north_m_s, v.y - n.wind_east_m_s, v.z))
+        return float(n.accel_bias_m_s2[axis] - rate * relative[axis])
+
+    n, h = nominal(), np.zeros(ERROR_STATES)
+    jacobian = getattr(derived, f"drag_{'xy'[axis]}_jacobian")
+    predicted = jacobian(
+        n.attitude, n.velocity_ned_m_s, n.accel_bias_m_s2, n.wind_north_m_s, n.wind_east_m_s, rate, h
+    )
+    numeric = [
+        (drag(perturbed(n, i, STEP)) - drag(perturbed(n, i, -STEP))) / (2.0 * STEP)
+        for i in range(ERROR_STATES)
+    ]
+    assert predicted == pytest.approx(drag(n), abs=1e-14)
+    assert h == pytest.approx(numeric, abs=1e-9)
+
+
 def test_nominal_state_survives_its_array_form() -> None:
     n, x = nominal(), np.zeros(NOMINAL_SIZE)
     write_nominal(x, n)

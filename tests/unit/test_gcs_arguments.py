@@ -7,6 +7,7 @@ import json
 import math
 import re
 import socket
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from flightstack.__main__ import run as flightstack_run
 from flightstack.core.geodesy import GeoPoint
 from flightstack.testing.instances import free_instance
 from gcs_cli.__main__ import main
-from gcs_cli.errors import DONE, USAGE, CliError
+from gcs_cli.errors import DONE, FAILED, USAGE, CliError
 from gcs_cli.fly.fly_flags import NOT_PASSED, TO_SIMULATOR, TO_STACK, FlyOptions, flag_of
 from gcs_cli.fly.fly_options import (
     check_ports,
@@ -369,3 +370,15 @@ def test_unknown_word_of_a_choice_is_named_without_the_words_of_a_library(capsys
     error = capsys.readouterr().err
     assert "'sqare' is not one of 'square'" in error
     assert "Value error" not in error
+
+
+def test_interrupt_during_the_imports_is_one_sentence(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Interrupted:
+        def __getattr__(self, name: str) -> object:
+            raise KeyboardInterrupt
+
+    monkeypatch.setitem(sys.modules, "gcs_cli.program", Interrupted())
+    assert main(["status"]) == FAILED
+    assert capsys.readouterr().err == "gcs: interrupted\n"

@@ -126,6 +126,7 @@ NOT_FLIGHT = (
     "sim_bridge/multibody/",  # MuJoCo's own arithmetic: docs/explanation/decisions.md
     "sim_bridge/render/",  # pictures
     "flightstack/services/telemetry/motion.py",  # what ground stations are shown
+    "flightstack/estimation/motion_covariance.py",  # the same
     "flightstack/core/geometry_bulk.py",  # reports
     "flightstack/firmware/generator/",  # before a flight
     "flightstack/flight_log/poses_file.py",  # pictures

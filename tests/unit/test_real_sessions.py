@@ -16,6 +16,8 @@ import pytest
 
 from flightstack.mavlink.link import Link
 from gcs_cli.actions.conditions import is_ready, parse_condition
+from gcs_cli.actions.on_vehicle import find_mode, mode_choices
+from gcs_cli.actions.run import refusal_reason
 from gcs_cli.link.tlog import decode_records
 from gcs_cli.vehicle.vehicle_view import update
 from gcs_cli.vehicle.view_types import VehicleView
@@ -74,6 +76,26 @@ def test_arducopter_can_arm_once_its_filter_has_a_position(arducopter: list[Vehi
     assert values(arducopter, lambda view: view.can_arm) == [None, False, True, False, True]
     at_first_refusal = next(view for view in arducopter if any("Need Pos" in t.text for t in view.texts))
     assert not at_first_refusal.can_arm
+
+
+def test_arducopter_takes_off_to_an_altitude_above_home(arducopter: list[VehicleView]) -> None:
+    """The recorded NAV_TAKEOFF asks for 6 m; home is 488 m above the sea."""
+    climb = [view.geo for view in arducopter if view.mode == "GUIDED" and view.armed and view.geo]
+    assert climb[-1].relative_altitude_m == pytest.approx(6.0, abs=0.1)  # measured: 5.98
+    assert climb[-1].altitude_m == pytest.approx(494.0, abs=0.5)
+
+
+def test_arducopter_says_why_it_refuses_to_arm(arducopter: list[VehicleView]) -> None:
+    last = next(view for view in reversed(arducopter) if view.texts and "Arm: Need" in view.texts[-1].text)
+    assert refusal_reason(last, 0) == "Need Position Estimate"
+
+
+def test_px4_lists_its_modes_under_the_names_of_other_clients() -> None:
+    view = views("px4_sih_start")[-1]
+    assert len(view.modes) == view.mode_total == 25
+    assert {"HOLD", "POSITION", "ORBIT"} <= set(mode_choices(view))
+    assert find_mode(view, "auto.loiter") == find_mode(view, "hold")
+    assert find_mode(view, "posctl") == find_mode(view, "position")
 
 
 def test_px4_reports_its_state() -> None:

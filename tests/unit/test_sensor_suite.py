@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
 import pytest
 
 from flightstack.core.geodesy import GeoPoint, LocalFrame
@@ -173,59 +172,12 @@ def test_second_imu_fails_alone() -> None:
     assert {(m.id, m.fields_updated & (ACCEL | GYRO)) for m in since} == {(0, ACCEL | GYRO), (1, 0)}
 
 
-def test_biased_sensor_is_off_by_its_bias() -> None:
-    _, since = after("sensor:gyro:bias=1,-2,3", "HIL_SENSOR")
-    rates = (since[-1].xgyro, since[-1].ygyro, since[-1].zgyro)
-    assert rates == pytest.approx(np.radians([1.0, -2.0, 3.0]), abs=1e-6)
-    _, since = after("sensor:accel:bias=0.5,0,0", "HIL_SENSOR")
-    assert since[-1].xacc == pytest.approx(0.5, abs=1e-6)
-    before, since = after("sensor:baro:bias=-1.2", "HIL_SENSOR")
-    assert since[-1].abs_pressure - before[-1].abs_pressure == pytest.approx(-1.2, abs=1e-3)
-
-
-def test_gnss_jumps_and_is_spoofed_slowly() -> None:
-    def north_m(fix: Any) -> float:
-        return LocalFrame(HOME).to_ned(GeoPoint(fix.lat * 1e-7, fix.lon * 1e-7, fix.alt * 1e-3)).x
-
-    before, since = after("sensor:gnss:bias=30,0,0", "HIL_GPS")
-    assert north_m(before[-1]) == pytest.approx(0.0, abs=0.02)
-    assert [north_m(fix) for fix in since] == pytest.approx([30.0] * len(since), abs=0.02)
-    _, since = after("sensor:gnss:drift=0.5,0,0", "HIL_GPS", seconds=5.0)
-    assert north_m(since[-1]) == pytest.approx(0.5 * 3.9, abs=0.06)
-    assert since[-1].vn == 50  # a spoofer that is consistent
-
-
 def test_drift_begins_when_it_is_injected() -> None:
     bench = Bench()
     before = of_type(bench.run(1.0), "HIL_SENSOR")[0]
     bench.simulator.inject(parse_fault("sensor:baro:drift=1", 4))
     first = [m for m in of_type(bench.run(0.1), "HIL_SENSOR") if m.fields_updated & BARO][-1]
     assert 0.0 < first.abs_pressure - before.abs_pressure < 0.11
-
-
-def test_frozen_sensor_repeats_its_last_measurement() -> None:
-    noisy = with_sensors("consumer")
-    before, since = after("sensor:mag:freeze", "HIL_SENSOR", noisy)
-    assert len({m.xmag for m in before}) > 5
-    assert len({(m.xmag, m.ymag, m.zmag) for m in since}) == 1
-    assert sum(m.fields_updated & MAG == MAG for m in since) == 100
-    _, since = after("sensor:accel:freeze", "HIL_SENSOR", noisy)
-    assert len({m.xacc for m in since}) == 1
-    assert len({m.xgyro for m in since}) > 5
-
-
-def test_noise_of_a_fault_has_its_spread() -> None:
-    _, since = after("sensor:accel:noise=2", "HIL_SENSOR", seconds=5.0)
-    assert np.std([m.yacc for m in since]) == pytest.approx(2.0, rel=4.0 / math.sqrt(2.0 * 2000))
-
-
-def test_late_sensor_is_older_by_the_delay() -> None:
-    """A baro that drifts by 1 hPa/s and is late by 0.3 s."""
-    bench = Bench(IDEAL, "sensor:baro:drift=1@1", "sensor:baro:late=0.3@1")
-    last = [m for m in of_type(bench.run(3.0), "HIL_SENSOR") if m.fields_updated & BARO][-1]
-    still = of_type(Bench().run(0.1), "HIL_SENSOR")[0]
-    since_s = last.time_usec * 1e-6 - 1.0
-    assert last.abs_pressure - still.abs_pressure == pytest.approx(since_s - 0.3, abs=2e-3)
 
 
 @pytest.mark.parametrize(("late_s", "exact_s"), [(0.004, 0.004), (0.025, 0.026)])
@@ -271,35 +223,6 @@ def test_losses_of_a_sensor_do_not_depend_on_another_sensor() -> None:
         return [bool(m.fields_updated & GYRO) for m in sent]
 
     assert received() == received("sensor:mag:loss=0.5", "sensor:accel:loss=0.5")
-
-
-def test_share_of_measurements_is_lost() -> None:
-    _, since = after("sensor:gyro:loss=0.25", "HIL_SENSOR", seconds=5.0)
-    lost = sum(not m.fields_updated & GYRO for m in since) / len(since)
-    assert lost == pytest.approx(0.25, abs=4.0 * math.sqrt(0.25 * 0.75 / 2000))
-
-
-def test_jammed_gnss_ends_without_fix() -> None:
-    before, since = after("sensor:gnss:jam=0.9", "HIL_GPS")
-    assert before[-1].fix_type == mavlink.GPS_FIX_TYPE_3D_FIX
-    assert since[-1].fix_type == mavlink.GPS_FIX_TYPE_NO_FIX
-
-
-def test_turned_magnetometer_measures_the_turned_field() -> None:
-    before, since = after("sensor:mag:turn=90", "HIL_SENSOR")
-    assert (since[-1].xmag, since[-1].ymag) == pytest.approx((before[-1].ymag, -before[-1].xmag), abs=1e-6)
-    assert since[-1].zmag == before[-1].zmag
-
-
-def test_vibration_fault_scales_the_shaking_of_the_rotors() -> None:
-    def shaking(spec: str) -> float:
-        vehicle = with_sensors("ideal", imu={"rotor_imbalance_g_mm": 1.0})
-        exchanges = Bench(vehicle, spec).run(1.0, 600.0)
-        return float(np.std([m.xacc for m in of_type(exchanges[250:], "HIL_SENSOR")]))
-
-    assert shaking("sensor:imu:vibration=10") / shaking("sensor:imu:vibration=1") == pytest.approx(
-        10.0, rel=1e-4
-    )
 
 
 def test_sensor_recovers_at_the_end_of_a_fault() -> None:
@@ -370,23 +293,6 @@ def test_client_turns_a_sensor_off_and_on() -> None:
         for failure, is_sent in ((off, False), (ok, True)):
             assert inject_failure(bench.simulator, unit, failure, 1) == ACCEPTED
             assert bool(of_type(bench.run(0.4)[1:], name)) == is_sent
-
-
-@pytest.mark.parametrize(
-    "failure",
-    [
-        mavlink.FAILURE_TYPE_STUCK,
-        mavlink.FAILURE_TYPE_GARBAGE,
-        mavlink.FAILURE_TYPE_WRONG,
-        mavlink.FAILURE_TYPE_DELAYED,
-        mavlink.FAILURE_TYPE_INTERMITTENT,
-    ],
-)
-def test_client_injects_each_type_of_failure(failure: int) -> None:
-    bench = Bench()
-    assert inject_failure(bench.simulator, mavlink.FAILURE_UNIT_SENSOR_BARO, failure, 0) == ACCEPTED
-    (fault,) = bench.simulator.faults
-    assert fault.sensor == "baro"
 
 
 def test_injected_failure_without_effect_is_answered() -> None:

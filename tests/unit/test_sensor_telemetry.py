@@ -74,7 +74,7 @@ def test_report_of_a_good_flight_has_good_flags() -> None:
         | ControlFlags.TILT_ALIGN | ControlFlags.YAW_ALIGN | ControlFlags.IN_AIR | ControlFlags.GNSS_HEIGHT
     )  # fmt: skip
     assert report.control == in_use
-    assert report.rejected == RejectionFlags(0)
+    assert report.rejected == 0
     assert report.range is None
     assert 0.0 < report.velocity_ratio < 1.0
     assert report.resets.position == report.resets.velocity == 0
@@ -82,8 +82,8 @@ def test_report_of_a_good_flight_has_good_flags() -> None:
 
 def test_report_before_alignment_claims_nothing() -> None:
     report = Sensed(Estimator().memory[0], NewestSamples()).report
-    assert report.solution == SolutionFlags(0)
-    assert report.control == ControlFlags(0)
+    assert report.solution == 0
+    assert report.control == 0
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ def test_report_before_alignment_claims_nothing() -> None:
     [(2.0, GOOD), (8.0, SolutionFlags.ATTITUDE | SolutionFlags.VELOCITY_VERTICAL | SolutionFlags.HEIGHT_ABSOLUTE
                   | SolutionFlags.CONSTANT_POSITION)],
 )  # fmt: skip
-def test_position_is_invalid_after_five_seconds_without_gnss(without_s: float, flags: SolutionFlags) -> None:
+def test_position_is_invalid_after_five_seconds_without_gnss(without_s: float, flags: int) -> None:
     faults = Faults(no_gnss_s=(SECONDS - without_s, math.inf))
     report = sensed_after(SECONDS, faults)[0].report
     assert report.solution == flags
@@ -307,6 +307,18 @@ def test_messages_of_absurd_measurements_are_sent(values: list[float]) -> None:
     for message_id in SENSOR_STREAMED:
         for message in told.messages(message_id):
             assert Link(1, 1).encode(message)
+
+
+def test_places_on_earth_are_not_sent_before_the_first_fix() -> None:
+    memory, samples = sensed_after(SECONDS)[1].memory[0], sensed_after(SECONDS)[0].samples
+    for message_id in (
+        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        mavlink.MAVLINK_MSG_ID_HOME_POSITION,
+        mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
+    ):
+        assert sent(message_id, Sensed(memory, samples, has_origin=False)) == []
+        assert len(sent(message_id, Sensed(memory, samples))) == 1
+    assert sent(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, Sensed(memory, samples, has_origin=False))
 
 
 # ---------------------------------------------------------------------- streams

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 
 from flightstack.core.errors import ConfigError
 from flightstack.mavlink.dialect import mavlink
-from flightstack.params.vehicle import GRAVITY_M_S2
+from flightstack.params.vehicle import GRAVITY_M_S2, load_vehicle
 from flightstack.testing import Setup, World, load_scenario, run_scenario
 from flightstack.testing.link import PERFECT
 from flightstack.testing.properties import Signals, Window, always
@@ -104,6 +105,45 @@ def test_events_go_on_while_a_request_waits_for_its_answer(tmp_path: Path) -> No
     verdict = run_scenario(scenario)
     times = {event.name: event.time_s for event in verdict.flight.caused}
     assert times["link_restore"] == pytest.approx(1.2, abs=0.02)
+
+
+def test_scenario_has_a_slope_or_a_boat(tmp_path: Path) -> None:
+    path = tmp_path / "ground.toml"
+    for text, slope_rad, boat in (
+        ("slope_deg = 10", math.radians(10.0), (0.0, 0.0, 0.0)),
+        ("boat_m_s = [1, -0.5]", 0.0, (1.0, -0.5, 0.0)),
+    ):
+        path.write_text(f"duration_s = 1\n{text}\n[expect]")
+        _, options = load_scenario(path).setup(1).plant_options(load_vehicle("x_quad"))
+        assert (options.slope_rad, options.boat_ned_m_s) == (slope_rad, boat)
+    path.write_text('duration_s = 1\nslope_deg = 10\nplant = "paper"\n[expect]')
+    with pytest.raises(ConfigError, match="slope_deg: the ground of the paper plant is level"):
+        load_scenario(path).setup(1).check()
+
+
+def test_sensor_fault_of_a_scenario_is_flown(tmp_path: Path) -> None:
+    path = tmp_path / "sensor.toml"
+    path.write_text(
+        """
+        duration_s = 1
+        vehicle = "x_quad"
+        state = "estimated"
+        [[event]]
+        at_s = 0.5
+        fault = "sensor baro bias 12"
+        [expect]
+        outcome = "any"
+        """
+    )
+    with World(load_scenario(path).setup(1)) as world:
+        world.run_for(0.6)
+        before_hpa = world.engine.stack.estimation.samples.baro.pressure_hpa
+        world.fault("sensor baro bias 12")
+        world.run_for(0.4)
+        assert world.engine.stack.estimation.samples.baro.pressure_hpa - before_hpa == pytest.approx(
+            12.0, abs=0.1
+        )
+    assert [event.name for event in run_scenario(load_scenario(path)).flight.caused] == ["fault"]
 
 
 @pytest.mark.parametrize(

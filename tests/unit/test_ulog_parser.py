@@ -55,6 +55,14 @@ def test_only_wanted_topics_are_given(log: bytes) -> None:
     assert found == ULog(LogBytes(log), ["vehicle_attitude"]).data_list
 
 
+@pytest.mark.parametrize("topic", ["loop_timing", "vehicle_attitude", "vehicle_status"])
+def test_last_time_is_that_of_the_wanted_topics(log: bytes, topic: str) -> None:
+    """The newest row of the log may be of another topic; it does not count."""
+    ours, theirs = parse_ulog(log, "log", [topic]).log, ULog(LogBytes(log), [topic])
+    assert ours.last_timestamp == theirs.last_timestamp
+    assert ours.changed_parameters == theirs.changed_parameters
+
+
 @pytest.mark.parametrize("size", [-1, -7, -100])
 def test_cut_log_is_damaged_and_parsed_as_pyulog_does(log: bytes, size: int) -> None:
     assert parse_ulog(log[:size], "log").damaged

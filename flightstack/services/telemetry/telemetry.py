@@ -48,6 +48,14 @@ STREAMED = frozenset({*MAKERS, FS_LOOP_TIMING_ID})
 """Messages that can be sent at a rate."""
 SENSOR_STREAMED = STREAMED | SENSED.keys()
 """The same for a vehicle that flies on its sensors."""
+_GLOBAL = frozenset(
+    {
+        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
+        mavlink.MAVLINK_MSG_ID_HOME_POSITION,
+    }
+)
+"""Messages of places on earth, which a vehicle on its sensors does not know before its first fix."""
 _REQUESTED = frozenset({mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES, mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED})
 """Further messages on request."""
 
@@ -127,8 +135,11 @@ class Telemetry:
 
     def _make(self, message_id: int) -> tuple[Message, ...]:
         sensed = self.status.sensed
-        if sensed is not None and (sensor_maker := SENSED.get(message_id)) is not None:
-            return sensor_maker(self.status, sensed)
+        if sensed is not None:
+            if (sensor_maker := SENSED.get(message_id)) is not None:
+                return sensor_maker(self.status, sensed)
+            if message_id in _GLOBAL and not sensed.has_origin:
+                return ()
         maker = MAKERS.get(message_id)
         if maker is None:
             return (self._loop_timing(),)
