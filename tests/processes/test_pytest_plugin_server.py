@@ -40,7 +40,7 @@ FLYING = """
         with Connection(parse_endpoint(server.gcs_url)) as connection:
             connection.wait_for_vehicle(60.0)
             connection.command(calls.ARM, "arming")
-            Path("told").write_text(json.dumps([server.instance, str(server.log), server._guard.pid]))
+            Path("told").write_text(json.dumps([server.instance, str(server.log), server.guard.pid]))
             while True:
                 connection.step(connection.now_s + 1.0)
 """
@@ -125,11 +125,11 @@ def test_servers_end_with_their_fixture(outside: pytest.Pytester) -> None:
             return sitl_server(vehicle="x_quad", speed=10.0)
 
         def test_first(vehicle):
-            Path("first").write_text(f"{vehicle.instance} {vehicle._guard.pid}")
+            Path("first").write_text(f"{vehicle.instance} {vehicle.guard.pid}")
 
         def test_second(vehicle):
-            assert Path("first").read_text() == f"{vehicle.instance} {vehicle._guard.pid}"
-            assert vehicle._guard.poll() is None
+            assert Path("first").read_text() == f"{vehicle.instance} {vehicle.guard.pid}"
+            assert vehicle.guard.poll() is None
     """)
     run(outside).assert_outcomes(passed=2)
     instance, guard = map(int, Path("first").read_text().split())

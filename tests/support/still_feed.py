@@ -33,7 +33,7 @@ class StillFeed(Feed):
         self.others: list[VehicleView] = []
         self.error = None
         self._stopping = threading.Event()
-        self._rates_hz = {}
+        self.rates_hz = {}
         self.shown = view
         self.time_s = now_s
         self.jobs: list[tuple[Callable[[Connection], Any], Future[Any]]] = []
