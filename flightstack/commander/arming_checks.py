@@ -54,7 +54,7 @@ def arming_refusals(facts: ArmingFacts, behaviour: Behaviour) -> tuple[str, ...]
     flies_sticks = facts.mode in (Mode.POSITION, Mode.ALTITUDE)
     would_climb = flies_sticks and facts.manual_fresh and facts.throttle > THROTTLE_CENTRED
     gcs = "the ground station is lost" if facts.gcs_heard else "no ground station was heard"
-    estimate = estimate_refusals(facts.health)
+    estimate = estimate_refusals(facts.health, behaviour)
     checks = (
         (facts.state_is_valid or bool(estimate), Need.STATE.value),
         (facts.state_is_fresh or not facts.state_is_valid, "the state is frozen or missing"),

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from flightstack.commander.failsafe import Failsafe
+from flightstack.commander.failsafe import RULES, Action, Failsafe, action_of
 from flightstack.estimation.health import EstimateHealth
 from flightstack.params.behaviour import Behaviour
 
@@ -24,7 +24,6 @@ REFUSED_S = 1.0
 """Time of refused GNSS positions after which spoofing is suspected."""
 
 PREFLIGHT: tuple[tuple[str, Callable[[EstimateHealth], bool]], ...] = (
-    ("the inertial sensor is missing", lambda h: h.imu_age_s < MISSING_S and not h.imu_is_stuck),
     ("the compass is missing", lambda h: h.mag_age_s < MISSING_S),
     ("the barometer is missing", lambda h: h.baro_age_s < MISSING_S),
     ("GNSS has no fix", lambda h: h.fix_age_s < MISSING_S),
@@ -40,9 +39,21 @@ PREFLIGHT: tuple[tuple[str, Callable[[EstimateHealth], bool]], ...] = (
 """Reasons not to arm, each with the condition under which it does not apply."""
 
 
-def estimate_refusals(health: EstimateHealth | None) -> tuple[str, ...]:
-    """Return every reason not to arm; none for a vehicle that flies on the simulator's state."""
-    return () if health is None else tuple(text for text, passes in PREFLIGHT if not passes(health))
+def estimate_refusals(health: EstimateHealth | None, behaviour: Behaviour) -> tuple[str, ...]:
+    """Return every reason not to arm; none for a vehicle that flies on the simulator's state.
+
+    A condition that acts in the air also prevents arming.
+    """
+    if health is None:
+        return ()
+    conditions = estimate_failsafes(health, behaviour) if health.has_origin else frozenset()
+    acting = (
+        rule
+        for rule in RULES
+        if rule.failsafe in conditions and action_of(rule.failsafe, behaviour) > Action.WARN
+    )
+    reasons = [text for text, passes in PREFLIGHT if not passes(health)]
+    return (*reasons, *(f"{rule.begins[0].lower()}{rule.begins[1:]}" for rule in acting))
 
 
 def estimate_failsafes(health: EstimateHealth | None, behaviour: Behaviour) -> frozenset[Failsafe]:

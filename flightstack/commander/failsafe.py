@@ -180,7 +180,7 @@ RULES = (
          "gcs_loss_action", LINK_ACTIONS, DELAYED, USER, LANDING_GOES_ON),
     Rule(F.BATTERY_LOW, "Battery level is low", "Battery level is no longer low",
          "", WARN_ONLY, NOW, USER, FLIGHT),
-    Rule(F.GNSS_REFUSED, "GNSS contradicts the estimate, spoofing suspected", "GNSS agrees with the estimate again",
+    Rule(F.GNSS_REFUSED, "Spoofing suspected: GNSS contradicts the estimate", "GNSS agrees with the estimate again",
          "gnss_doubt_action", FAULT_ACTIONS, NOW, USER, FLIGHT),
 )
 # fmt: on

@@ -76,8 +76,9 @@ def _rows(dwarf: Any) -> Iterator[tuple[str, int, int]]:
 
 
 def _names(header: Any) -> Iterator[str]:
+    """Yield folder and name of each file; compilers split a path anywhere between the two columns of the table."""
     is_new = header["version"] >= _DWARF_5
     for entry in header["file_entry"]:
         index = entry.dir_index if is_new else entry.dir_index - 1
         folder = header["include_directory"][index].decode() if index >= 0 else ""
-        yield f"{PurePosixPath(folder).name}/{PurePosixPath(entry.name.decode()).name}"
+        yield "/".join(PurePosixPath(folder, entry.name.decode()).parts[-2:])

@@ -227,13 +227,6 @@ def _adopt(m: Record, attitude: Quaternion, out: FloatArray) -> None:
     store_wrenches(last, demanded, achieved)
 
 
-@compiled
-def _keep(memory: tuple[float, ...], size: int, kept: FloatArray) -> None:
-    """Store the memory of a law, which may have no fields."""
-    for index in range(size):
-        kept[index] = memory[index]
-
-
 def stages_kernel(
     inputs: FloatArray, flags: _Flags, outputs: FloatArray, memory: RecordArray, expected: FloatArray
 ) -> None:
@@ -262,7 +255,7 @@ def stages_kernel(
             _law_inputs(vehicle, _reported_reference(out), m["last"], mixer.spin),
             ControllerParams(*as_tuple(m["attitude_params"], CONTROLLER_PARAMS_SIZE)), m["dt_s"],
         )  # fmt: skip
-        _keep(advanced, CONTROLLER_MEMORY_SIZE, m["attitude"])
+        store(m["attitude"], advanced)
         wanted[THRUST_AT] = m["target"][4]
         store(wanted[THRUST_AT + 1 :], torque)
         demanded = _reported_wrench(out)
@@ -271,7 +264,7 @@ def stages_kernel(
             MixerParams(*as_tuple(m["mixer_params"], MIXER_PARAMS_SIZE)), m["dt_s"],
             wanted[COMMAND_AT:STATUS_AT], m["work"],
         )  # fmt: skip
-        _keep(mixed, MIXER_MEMORY_SIZE, m["mixer"])
+        store(m["mixer"], mixed)
         _store_mixed(demanded, achieved, mixer.spin.size, wanted)
         _adopt(m, vehicle.attitude, out)
 

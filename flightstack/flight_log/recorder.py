@@ -29,7 +29,7 @@ from flightstack.flight_log.topics import (
     Group,
     outer_heading,
 )
-from flightstack.guidance.navigator import MissionProgress
+from flightstack.guidance.mission import MissionProgress
 
 if TYPE_CHECKING:
     from flightstack.simulator_link.endpoint import Battery

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,6 +42,9 @@ from flightstack.params.vehicle import GRAVITY_M_S2
 
 DESCEND, DESCEND_LEVEL = 64, 65
 """Numbers of the mode LAND without a position: the vehicle brakes, or without a velocity stays level and drifts."""
+_NUMBERS = {mode: int(mode) for mode in Mode}
+_WITHOUT_POSITION = _NUMBERS | {Mode.LAND: DESCEND, Mode.POSITION: int(Mode.ALTITUDE)}
+_WITHOUT_VELOCITY = _WITHOUT_POSITION | {Mode.LAND: DESCEND_LEVEL}
 MISSION, OFFBOARD, POSITION = int(Mode.MISSION), int(Mode.OFFBOARD), int(Mode.POSITION)
 
 _STOP = Vector3(0.0, 0.0, 0.0)
@@ -51,6 +56,20 @@ LEAD_M = 0.5
 PRESS_1_S, PRESSED_LIFT = 7.0, 0.45
 """Downward acceleration setpoint of such a vehicle per missing sink rate, until the lift is this share of the weight.
 It reduces the thrust independently of the gains: a vehicle in the air then sinks."""
+
+
+class GuidanceMemory(NamedTuple):
+    """State of guidance: reference, mission, goal of the other modes, land detector."""
+
+    trajectory: FloatArray
+    mission: RecordArray
+    mode_target: RecordArray
+    land: FloatArray
+
+
+def mode_numbers(position: bool, velocity: bool) -> Mapping[Mode, int]:
+    """Return the numbers of the modes for the kernels, with or without a known position and velocity."""
+    return _NUMBERS if position else _WITHOUT_POSITION if velocity else _WITHOUT_VELOCITY
 
 
 @compiled

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -82,6 +83,15 @@ def mission_start(m: Record, current: int, reference: Trajectory, params: Guidan
     m["x"], m["y"], m["z"], m["yaw"] = reference.x, reference.y, reference.z, reference.yaw_rad
     m["yaw_is_set"], m["yaw_is_counted"] = False, False
     m["yaw_rate"], m["speed"] = params.yaw_rate_rad_s, params.cruise_speed_m_s
+
+
+class MissionProgress(NamedTuple):
+    """Progress of the mission."""
+
+    current: int
+    reached: int
+    finished: bool
+    wants_return: bool
 
 
 @compiled

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -21,15 +21,15 @@ from flightstack.core.contract import (
 from flightstack.core.enums import STREAM_MODES, Mode
 from flightstack.core.portable_math import atan2, distance
 from flightstack.guidance.kernels import (
-    DESCEND,
-    DESCEND_LEVEL,
     TRAJECTORY_SIZE,
+    GuidanceMemory,
     goal_kernel,
     levelling_kernel,
+    mode_numbers,
     rest_kernel,
     stream_kernel,
 )
-from flightstack.guidance.land_detector import CLIMB_M, CONTACT_M_S, LEVELLING_LIFT, REST_M_S, LandMemory
+from flightstack.guidance.land_detector import CONTACT_M_S, LEVELLING_LIFT, REST_M_S, LandMemory
 from flightstack.guidance.manual import TAKEOFF_STICK, shaped
 from flightstack.guidance.mission import (
     CONDITION_YAW,
@@ -37,14 +37,15 @@ from flightstack.guidance.mission import (
     MISSION,
     NAV_DELAY,
     PLAN_ITEM,
+    MissionProgress,
     mission_start,
 )
 from flightstack.guidance.mission import LAND as LAND_ITEM
 from flightstack.guidance.mode_target import CLIMBING, MODE_TARGET
+from flightstack.guidance.offboard import wants_to_rise
 from flightstack.guidance.params import GuidanceParams, SpeedOverrides
 from flightstack.guidance.setpoints import (
     ATTITUDE,
-    POINT,
     OffboardSetpoint,
     Sticks,
     empty_stream,
@@ -58,29 +59,8 @@ ARRIVED_M = 0.5
 """Distance from a commanded position at which the vehicle has arrived."""
 # looking up a member of an enumeration takes seven times as long as looking up a name or a key
 _OFFBOARD = Mode.OFFBOARD
-_NUMBER = {mode: int(mode) for mode in Mode}
 _YAW_AT = 9  # of trajectory and setpoint
-_NUMBER_WITHOUT_POSITION = _NUMBER | {Mode.LAND: DESCEND, Mode.POSITION: int(Mode.ALTITUDE)}
-_NUMBER_WITHOUT_VELOCITY = _NUMBER_WITHOUT_POSITION | {Mode.LAND: DESCEND_LEVEL}
 _STREAM_NUMBERS = frozenset(int(mode) for mode in STREAM_MODES)
-
-
-class MissionProgress(NamedTuple):
-    """Progress of the mission."""
-
-    current: int
-    reached: int
-    finished: bool
-    wants_return: bool
-
-
-class GuidanceMemory(NamedTuple):
-    """State of guidance: reference, mission, goal of the other modes, land detector."""
-
-    trajectory: FloatArray
-    mission: RecordArray
-    mode_target: RecordArray
-    land: FloatArray
 
 
 class Navigator:
@@ -98,7 +78,7 @@ class Navigator:
         views = (self._mission[name].data for name in MissionProgress._fields)
         self._current, self._reached, self._finished, self._wants_return = views
         self._reported = 0
-        self._numbers = _NUMBER
+        self._numbers = mode_numbers(position=True, velocity=True)
         self._is_repositioning = False
         self._mode_target: RecordArray = np.zeros(1, MODE_TARGET)
         self._land = np.array(LandMemory(1.0, 0.0, 0.0, 0.0))
@@ -267,7 +247,7 @@ class Navigator:
         Without a position, LAND descends where the vehicle is, and POSITION holds the altitude alone. A landing goes on
         where the position is known again.
         """
-        numbers = _NUMBER if position else _NUMBER_WITHOUT_POSITION if velocity else _NUMBER_WITHOUT_VELOCITY
+        numbers = mode_numbers(position, velocity)
         if numbers is self._numbers:
             return False
         self._numbers = numbers
@@ -276,13 +256,10 @@ class Navigator:
 
     def shift(self, position_m: Vector3, velocity_m_s: Vector3, yaw_rad: float) -> None:
         """Shift the reference by a reset of the estimate, so that the vehicle does not move; goals keep their place."""
-        t = self._trajectory
-        t[0:3] += position_m
-        t[3:6] += velocity_m_s
-        self.setpoint[0:3] += position_m
-        self.setpoint[3:6] += velocity_m_s
-        t[_YAW_AT] += yaw_rad
-        self.setpoint[_YAW_AT] += yaw_rad
+        for x in (self._trajectory, self.setpoint):
+            x[0:3] += position_m
+            x[3:6] += velocity_m_s
+            x[_YAW_AT] += yaw_rad
 
     def enter(self, mode: Mode, takeoff_altitude_m: float = 0.0) -> None:
         """Set the target of ``mode``, from the present reference."""
@@ -385,14 +362,7 @@ class Navigator:
         s, p = self._stream[0], self.params
         if mode is not Mode.OFFBOARD:
             return shaped(s["sticks"][2], p.stick_deadzone, p.stick_z_expo) > TAKEOFF_STICK
-        if s["kind"] >= ATTITUDE:
-            return bool(s["thrust"] > 0.5 * p.weight_n)
-        if s["kind"] != POINT:
-            return False
-        z, vz, az = (float(s[name][2]) for name in ("position", "velocity", "acceleration"))
-        if math.isfinite(z):
-            return z < down_m - CLIMB_M
-        return vz < 0.0 if math.isfinite(vz) else az < 0.0
+        return wants_to_rise(s, down_m, p.weight_n)
 
     # ------------------------------------------------------------------ ticks
 

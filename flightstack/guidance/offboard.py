@@ -17,6 +17,7 @@ from flightstack.core.geometry import (
     rotation_vector,
 )
 from flightstack.guidance.follow import follow_heading, follow_horizontally, follow_vertically, leashed
+from flightstack.guidance.land_detector import CLIMB_M
 from flightstack.guidance.params import GuidanceParams
 from flightstack.guidance.setpoints import ATTITUDE, POINT
 from flightstack.guidance.trajectory import Trajectory, TrajectoryLimits, approach_speed, clipped
@@ -28,6 +29,19 @@ SPEED_LAG_S = 0.5
 """Delay of reference and vehicle in a descent that slows down, caused by limits of acceleration and jerk."""
 RATE_LEAD_RAD = 0.5
 """Largest angle between the vehicle and an attitude integrated from body rates, so that the vehicle can follow."""
+
+
+def wants_to_rise(stream: Record, down_m: float, weight_n: float) -> bool:
+    """Return True if the newest setpoint commands a takeoff of a vehicle landed at ``down_m``; not compiled."""
+    s = stream
+    if s["kind"] >= ATTITUDE:
+        return bool(s["thrust"] > 0.5 * weight_n)
+    if s["kind"] != POINT:
+        return False
+    z, vz, az = (float(s[name][2]) for name in ("position", "velocity", "acceleration"))
+    if math.isfinite(z):
+        return z < down_m - CLIMB_M
+    return vz < 0.0 if math.isfinite(vz) else az < 0.0
 
 
 @compiled

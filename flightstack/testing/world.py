@@ -1,12 +1,4 @@
-"""A vehicle in a simulated world, with a ground station: one process, simulated time, no ports.
-
-world = World(vehicle="x_quad", wind=(4.0, 0.0))
-world.upload("square.plan")
-world.arm()
-world.start_mission()
-world.run_until(lambda s: not s.armed, timeout_s=120)
-assert world.flight().max_error_m < 0.5
-"""
+"""A vehicle in a simulated world, with a ground station: one process, simulated time, no ports."""
 
 from __future__ import annotations
 
@@ -193,11 +185,7 @@ class World:
         )
 
     def wait_until_ready(self, timeout_s: float = 60.0) -> None:
-        """Run until the vehicle may fly on its state: at once on the simulator's, after seconds on sensors.
-
-        Raise ConditionTimeoutError after ``timeout_s`` of simulated time.
-        """
-        __tracebackhide__ = True
+        """Run until the vehicle may fly on its state, as one on sensors does after seconds."""
         self.run_until(lambda _: self.engine.stack.is_ready, timeout_s)
 
     def watch(self, callback: Callable[[], None]) -> None:
@@ -259,8 +247,7 @@ class World:
 
     def request(self, what: str, command: calls.Command, client: Client | None = None) -> None:
         """Send a MAV_CMD with its parameters; ``what`` names it in the RefusedError."""
-        sender = self._connected(client)
-        self.wait_for(sender.command(*command, self.time_s), what)
+        self.wait_for(self._connected(client).command(*command, self.time_s), what)
 
     def _connected(self, client: Client | None = None) -> Client:
         """Return a client, by default ``sender``, once it knows the vehicle."""
@@ -288,8 +275,7 @@ class World:
 
     def download(self, kind: MissionType = MissionType.MISSION) -> tuple[MissionItem, ...]:
         """Download a plan of one kind; raise RefusedError."""
-        call = self._connected().download(kind)
-        self.wait_for(call, f"the {kind.name.lower()}")
+        self.wait_for(call := self._connected().download(kind), f"the {kind.name.lower()}")
         answer = call.answer(self.time_s)
         assert answer is not None
         return answer.items
@@ -322,9 +308,8 @@ class World:
 
     def goto_command(self, north_m: float, east_m: float, alt_m: float = math.nan) -> calls.Command:
         """Return the command to fly to a position relative to home at the start."""
-        stack = self.engine.stack
         place = LocalFrame(self.setup.home).to_geo(Vector3(north_m, east_m, 0.0))
-        amsl_m = stack.area.home.altitude_m + alt_m
+        amsl_m = self.engine.stack.area.home.altitude_m + alt_m
         return calls.goto_command(place.latitude_deg, place.longitude_deg, amsl_m)
 
     def land(self) -> None:

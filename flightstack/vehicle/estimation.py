@@ -116,7 +116,7 @@ class Estimation:
 
     def is_ready(self) -> bool:
         """Return True if the vehicle may take off on the estimate."""
-        return self._now.has_state and not estimate_refusals(self.health)
+        return self._now.has_state and not estimate_refusals(self.health, self._now.behaviour)
 
     def update(self, time_us: int) -> None:
         """Take the measurements since the last call; once per tick, at the time of the tick."""

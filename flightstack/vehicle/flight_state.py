@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from flightstack.commander.transitions import Status
 from flightstack.core.contract import FloatArray
-from flightstack.guidance.navigator import MissionProgress
+from flightstack.guidance.mission import MissionProgress
 from flightstack.params.behaviour import Behaviour
 
 DISARMED = Status()

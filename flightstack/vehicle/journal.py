@@ -10,7 +10,7 @@ from flightstack.core.contract import Vector3
 from flightstack.core.enums import Severity
 from flightstack.core.geodesy import GeoPoint
 from flightstack.flight_log.recorder import FlightRecorder
-from flightstack.guidance.navigator import MissionProgress
+from flightstack.guidance.mission import MissionProgress
 from flightstack.vehicle.flight_state import FlightState
 
 

@@ -11,7 +11,7 @@ from flightstack.commander.fence_monitor import FenceBreaches
 from flightstack.core.enums import Mode
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.estimation.sensed import Sensed
-from flightstack.guidance.navigator import MissionProgress
+from flightstack.guidance.mission import MissionProgress
 from flightstack.params.vehicle import Vehicle
 from flightstack.simulator_link.endpoint import Battery
 from flightstack.vehicle.assembly import VehicleParts

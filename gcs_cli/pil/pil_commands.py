@@ -191,7 +191,7 @@ def _code_lines(result: dict[str, Any]) -> Iterator[str]:
     if load is not None:
         percent = f"mean {load['mean_percent']:.3g} %, max {load['max_percent']:.3g} %"
         yield f"load     {percent} of {load['period_us']:g} µs at {load['clock_hz'] / 1e6:g} MHz"
-    if coverage is not None:
+    if coverage is not None and coverage["lines"]:
         yield f"coverage {coverage['percent']:.1f} % of {coverage['lines']} lines of core"
     if usage is not None:
         yield f"stack    {usage['total']} bytes on the deepest path, {usage['compiler']}"

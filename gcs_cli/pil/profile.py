@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flightstack.core.contract import FloatArray
+from flightstack.core.contract import FloatArray, LoopStatus
+from gcs_cli.pil.target_record import StatusArray
 
 STAGES = ("outer", "inner", "mixer", "whole")
 STAGE_TITLES = {"outer": "outer loop", "inner": "inner loop", "mixer": "mixer", "whole": "whole step"}
@@ -62,6 +63,37 @@ def stage_profiles(costs: FloatArray) -> list[StageProfile]:
         for stage, column in zip(STAGES, columns, strict=True)
         if np.any(column > 0)
     ]
+
+
+_TORQUE = LoopStatus.ROLL_SATURATED | LoopStatus.PITCH_SATURATED | LoopStatus.YAW_SATURATED
+_LIMITS = {
+    "nothing limited": (_TORQUE | LoopStatus.THRUST_SATURATED, False),
+    "torque limited": (_TORQUE, True),
+    "thrust limited": (LoopStatus.THRUST_SATURATED, True),
+    "input not finite": (LoopStatus.INPUT_NOT_FINITE, True),
+    "output not finite": (LoopStatus.OUTPUT_NOT_FINITE, True),
+}
+"""Bits of ``LoopStatus`` by branch, and whether one of them is set in it."""
+
+
+def branch_costs(costs: FloatArray, statuses: StatusArray) -> dict[str, dict[str, float]]:
+    """Return ``count``, ``mean`` and ``max`` of the whole step's cost in each branch of the loops that was taken.
+
+    ``costs`` is (steps, 4), as of ``stage_profiles``; ``statuses`` has FS_PIL_REPORT.status of each step.
+    """
+    is_outer = costs[:, STAGES.index("outer")] > 0
+    taken = {"outer loop due": is_outer, "inner loop alone": ~is_outer}
+    taken |= {name: ((statuses & bits) != 0) == is_set for name, (bits, is_set) in _LIMITS.items()}
+    whole = costs[:, STAGES.index("whole")]
+    return {
+        name: {
+            "count": int(rows.sum()),
+            "mean": round(float(whole[rows].mean()), 3),
+            "max": float(whole[rows].max()),
+        }
+        for name, rows in taken.items()
+        if rows.any()
+    }
 
 
 class Load(NamedTuple):

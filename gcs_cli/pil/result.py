@@ -16,7 +16,7 @@ from gcs_cli.pil.compare import (
     ticks_apart,
 )
 from gcs_cli.pil.flight_samples import FlightSamples
-from gcs_cli.pil.profile import StageProfile, cpu_load, stage_profiles
+from gcs_cli.pil.profile import StageProfile, branch_costs, cpu_load, stage_profiles
 from gcs_cli.pil.report_charts import DeviationChart
 from gcs_cli.pil.signals import BY_NAME
 from gcs_cli.pil.target_record import TargetRecord
@@ -233,6 +233,7 @@ def _profile(record: TargetRecord | None) -> dict[str, Any] | None:
         "unit": record.unit,
         "about": _ABOUT_UNIT.get(record.unit, ""),
         "stages": {profile.stage: profile.as_json() for profile in profiles_of(record)},
+        "branches": branch_costs(record.costs, record.statuses) if record.unit else {},
     }
 
 

@@ -16,6 +16,7 @@ from flightstack.firmware.pil_record import COST_UNITS, LINK_FILE, STEPS_FILE
 from flightstack.firmware.pil_steps import BAD_INPUT, OVERRUN
 
 StatusArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
+NO_STATUSES: StatusArray = np.zeros(0, np.int64)
 NO_COUNTERS = ("time_boot_ms", "stack_size", "stack_high_water", "state")
 """Fields of FS_PIL_STATUS that are not counters."""
 SAFE, RESTARTED = "safe state", "restarted by its watchdog"
@@ -43,6 +44,8 @@ class TargetRecord(NamedTuple):
     """The reason of an early end, or None."""
     trace: Mapping[str, Any] | None = None
     """``image`` and ``executed`` addresses of an emulated target."""
+    statuses: StatusArray = NO_STATUSES
+    """FS_PIL_REPORT.status of each step."""
 
     @property
     def counted(self) -> dict[str, int]:
@@ -114,4 +117,5 @@ def record_of(content: Mapping[str, Any], costs: FloatArray, statuses: StatusArr
         bad_inputs,
         content["ending"],
         content.get("trace"),
+        statuses,
     )

@@ -175,8 +175,8 @@ class Feed:
         self.traffic.record(message, now_s, casts_parameters=view.autopilot.casts_parameters)
         if view.identity is not None and view.identity.system_id == message.get_srcSystem():
             request = self.traffic.own_address_request(message, now_s)
-            if request is not None and not self._connection.is_recording:
-                self._connection.send(request)
+            if request is not None and not self.connection.is_recording:
+                self.connection.send(request)
 
     def _run(self) -> None:
         try:
@@ -191,7 +191,7 @@ class Feed:
                 self._jobs.popleft().future.cancel()
 
     def _pause_s(self) -> float:
-        return 0.0 if self._connection.session.awaits_round_trip(self.now_s) else GATHER_S
+        return 0.0 if self.connection.session.awaits_round_trip(self.now_s) else GATHER_S
 
     def _serve(self) -> None:
         """Begin the actions, and follow the messages and the effects; after every step of the link, in jobs too.

@@ -81,7 +81,7 @@ def test_what_the_simulator_cannot_do_is_refused(
 
 
 def test_a_failure_of_what_the_simulator_has_not_is_unsupported() -> None:
-    with refused(UNSUPPORTED):
+    with refused(UNSUPPORTED, "sends no such sensor"):
         fail(World(params=ALLOWED), GPS, OFF)
 
 

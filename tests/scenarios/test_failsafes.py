@@ -18,8 +18,10 @@ from tests.support.failsafe_faults import (
     blow_away,
     breach_fence,
     inject,
+    jump_gnss,
     lose_states,
     nothing,
+    set_param,
     stop_heartbeats,
     stop_stream,
     tip_over,
@@ -40,6 +42,7 @@ class Case(NamedTuple):
     fault: Callable[[World], None]
     says: str
     refusal: str
+    state: str = "truth"
 
 
 CASES: dict[Failsafe, Case] = {
@@ -91,6 +94,33 @@ CASES: dict[Failsafe, Case] = {
         lose_states,
         "State is frozen or missing",
         "the state is frozen or missing",
+    ),
+    F.IMU_FAULT: Case(
+        {"FS_BLIND_T": 0.3},
+        nothing,
+        inject("sensor:imu:off"),
+        "Inertial sensor is missing or stuck",
+        "inertial sensor is missing or stuck",
+        "estimated",
+    ),
+    F.ATTITUDE_DOUBTFUL: Case(
+        {},
+        nothing,
+        set_param("FS_TILT_DEV", 0.01),
+        "Attitude estimate is doubtful",
+        "attitude estimate is doubtful",
+        "estimated",
+    ),
+    F.POSITION_LOST: Case(
+        {"COM_POSCTL_NAVL": 1},
+        nothing,
+        set_param("COM_POS_FS_EPH", 0.01),
+        "Position is lost",
+        "position is lost",
+        "estimated",
+    ),
+    F.GNSS_REFUSED: Case(
+        {"FS_GNSS_ACT": 2}, nothing, jump_gnss, "GNSS contradicts the estimate", "estimate", "estimated"
     ),
     F.NOT_FINITE: Case(
         {"FS_BLIND_T": 0.3},
@@ -192,10 +222,13 @@ PHASES = (
 TABLE = {
     #                     disarmed standing takeoff  mission  hold     goto     manual   offboard return   land
     F.NOT_FINITE:        (refused, disarms, ends,    ends,    ends,    ends,    ends,    ends,    ends,    ends),
+    F.IMU_FAULT:         (refused, disarms, ends,    ends,    ends,    ends,    ends,    ends,    ends,    ends),
     F.STATE_STALE:       (refused, disarms, ends,    ends,    ends,    ends,    ends,    ends,    ends,    ends),
     F.ATTITUDE:          (refused, disarms, ends,    ends,    ends,    ends,    ends,    ends,    ends,    ends),
+    F.ATTITUDE_DOUBTFUL: (refused, disarms, lands,   lands,   lands,   lands,   lands,   lands,   lands,   warns),
     F.ROTOR:             (arms,    disarms, ends,    ends,    ends,    ends,    ends,    ends,    ends,    ends),
     F.BATTERY_EMERGENCY: (refused, disarms, lands,   lands,   lands,   lands,   lands,   lands,   lands,   warns),
+    F.POSITION_LOST:     (refused, disarms, lands,   lands,   lands,   lands,   lands,   lands,   lands,   warns),
     F.FENCE:             (refused, disarms, lands,   returns, returns, returns, returns, returns, warns,   warns),
     F.POSITION_ERROR:    (arms,    goes_on, lands,   lands,   lands,   lands,   goes_on, lands,   lands,   warns),
     F.BATTERY_CRITICAL:  (refused, disarms, returns, returns, returns, returns, returns, returns, warns,   warns),
@@ -203,6 +236,7 @@ TABLE = {
     F.OFFBOARD_LOST:     (refused, disarms, goes_on, goes_on, goes_on, goes_on, goes_on, lands,   goes_on, goes_on),
     F.GCS_LOST:          (refused, disarms, returns, returns, returns, returns, returns, returns, warns,   goes_on),
     F.BATTERY_LOW:       (refused, warns,   warns,   warns,   warns,   warns,   warns,   warns,   warns,   warns),
+    F.GNSS_REFUSED:      (refused, disarms, lands,   lands,   lands,   lands,   lands,   lands,   lands,   warns),
 }
 # fmt: on
 
@@ -217,7 +251,8 @@ def test_the_table_has_every_failsafe_in_every_phase() -> None:
 @pytest.mark.parametrize("failsafe", list(TABLE), ids=lambda failsafe: failsafe.name.lower())
 def test_each_failsafe_in_each_phase(failsafe: Failsafe, phase: Phase) -> None:
     case = CASES[failsafe]
-    world = World(vehicle="x_quad", params={**QUICK, **case.params})
+    world = World(vehicle="x_quad", params={**QUICK, **case.params}, state=case.state)
+    world.wait_until_ready()
     ENTER[phase](world, lambda: case.before(world))
     case.fault(world)
     TABLE[failsafe][PHASES.index(phase)](world, case, phase)

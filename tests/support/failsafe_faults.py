@@ -84,6 +84,19 @@ def blow_away(world: World) -> None:
     world.engine.simulator.plant.memory[0]["body"][1] += 30.0  # type: ignore[attr-defined]
 
 
+def set_param(name: str, value: float) -> Callable[[World], None]:
+    def begin(world: World) -> None:
+        world.param_set(name, value)
+        world.run_for(0.2)
+
+    return begin
+
+
+def jump_gnss(world: World) -> None:
+    world.fault("sensor:gnss:bias=30,0,0")
+    world.run_for(0.4)
+
+
 def inject(fault: str) -> Callable[[World], None]:
     def begin(world: World) -> None:
         world.fault(fault)

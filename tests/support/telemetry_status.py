@@ -12,7 +12,7 @@ from flightstack.commander.fence_monitor import FenceBreaches
 from flightstack.core.contract import LoopRow
 from flightstack.core.enums import Mode
 from flightstack.core.geodesy import GeoPoint, LocalFrame
-from flightstack.guidance.navigator import MissionProgress
+from flightstack.guidance.mission import MissionProgress
 from flightstack.mavlink.dialect import FsLoopTiming
 from flightstack.mavlink.link import Message
 from flightstack.services.telemetry.telemetry import Telemetry

@@ -132,6 +132,20 @@ def test_an_injected_failure_needs_permission(world: World) -> None:
     assert perform(world, on_vehicle.inject_failure("gps", "off")).outcome is Outcome.REFUSED
 
 
+def test_an_accepted_failure_ends_without_a_claim_about_its_effect() -> None:
+    with World(telemetry=True, params={"SYS_FAILURE_EN": 1}) as world:
+        world.run_for(2.0)
+        assert perform(world, on_vehicle.inject_failure("motor", "off", 2))[:2] == (
+            Outcome.ACKNOWLEDGED,
+            "accepted: failure of motor 2: off; the vehicle does not report its effect",
+        )
+        refused = perform(world, on_vehicle.inject_failure("gps", "off"))
+        assert refused[:2] == (
+            Outcome.REFUSED,
+            "failure injection refused: the simulator does not support this failure, or sends no such sensor",
+        )
+
+
 def test_ready_follows_the_pre_arm_check(world: World) -> None:
     ready = parse_condition("ready")
     world.run_until(lambda _state: ready.holds(seen(world)), timeout_s=30.0)

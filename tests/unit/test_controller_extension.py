@@ -9,6 +9,7 @@ import sys
 import tomllib
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_are
@@ -21,11 +22,17 @@ from flightstack.control.controller_loading import (
     load_controller,
 )
 from flightstack.control.mixer import mix
+from flightstack.core import kernel_cache
+from flightstack.core.compiled import specialised
 from flightstack.core.contract import LoopRow
 from flightstack.core.errors import ConfigError
+from flightstack.core.kernel_cache import is_own
+from flightstack.firmware.c_loops import INPUT_SIZE, OUTPUT_SIZE, LoopsSetup
+from flightstack.firmware.stages import StageModel
 from flightstack.params.config import StackConfig
-from flightstack.params.gains_file import BUILT_IN
+from flightstack.params.gains_file import BUILT_IN, open_gains
 from flightstack.params.tunable import Tunable, undeclared
+from flightstack.params.vehicle import load_vehicle
 from flightstack.process.assembly import build
 from flightstack.testing import World
 from tests.support.commands import flightstack_command
@@ -287,10 +294,20 @@ def test_the_command_takes_an_installed_controller_and_lists_them_for_an_unknown
 def test_a_controller_that_is_gone_leaves_the_others_compilable(installed: Path) -> None:
     """Our functions' caches name no type of a user's package: Numba would import it to read any of them."""
     build(StackConfig(controller="lqr"), lambda: None)
-    digests = Path(mix.stats.cache_path).parents[1]  # a directory for each state of sources
-    indices = list(digests.rglob("*.nbi"))
-    kernels = [path for path in indices if "inner_kernel__lqr" in path.name]
-    assert kernels
+    vehicle, gains = load_vehicle("paper_quad"), open_gains("tuned")
+    model = StageModel(LoopsSetup(vehicle, load_controller("lqr"), gains, 0.6, 500.0, 100.0, 5))
+    model.expected(np.zeros((1, INPUT_SIZE)), np.zeros(1, np.int64), np.zeros((1, OUTPUT_SIZE)))
+    top, base = Path(kernel_cache.__file__).parents[2], Path(mix.stats.cache_path).parents[1]
+    digests = {kernel_cache.digest(top, [name], numba.__version__) for name in sys.modules if is_own(name)}
+    folders = {base / digest for digest in digests} | {
+        Path(kernel.stats.cache_path).parent for kernel in specialised.values()
+    }
+    indices = [path for folder in folders for path in folder.rglob("*.nbi")]
+    kernels = [path for path in indices if "kernel__lqr" in path.name]
+    assert {path.name.partition("__lqr")[0] for path in kernels} >= {
+        "loop_kernels.inner_kernel",
+        "stages.stages_kernel",
+    }
     for path in indices:
         if path not in kernels:
             assert b"lqr_controller" not in path.read_bytes(), path.name

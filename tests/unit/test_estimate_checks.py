@@ -19,13 +19,11 @@ GOOD = EstimateHealth(
 
 
 def test_good_estimate_has_no_refusal_and_no_failsafe() -> None:
-    assert estimate_refusals(GOOD) == estimate_refusals(None) == ()
+    assert estimate_refusals(GOOD, Behaviour()) == estimate_refusals(None, Behaviour()) == ()
     assert estimate_failsafes(GOOD, Behaviour()) == estimate_failsafes(None, Behaviour()) == frozenset()
 
 
 REFUSED = [
-    ({"imu_age_s": 2.0}, "the inertial sensor is missing"),
-    ({"imu_is_stuck": True}, "the inertial sensor is missing"),
     ({"mag_age_s": math.inf}, "the compass is missing"),
     ({"baro_age_s": 1.5}, "the barometer is missing"),
     ({"fix_age_s": 3.0}, "GNSS has no fix"),
@@ -42,16 +40,24 @@ REFUSED = [
 
 @pytest.mark.parametrize(("change", "reason"), REFUSED)
 def test_each_fault_of_the_estimate_is_a_reason_not_to_arm(change: dict, reason: str) -> None:
-    assert estimate_refusals(GOOD._replace(**change)) == (reason,)
+    assert estimate_refusals(GOOD._replace(**change), Behaviour()) == (reason,)
 
 
 def test_every_preflight_check_of_the_estimate_is_tested() -> None:
     assert {reason for _, reason in REFUSED} == {text for text, _ in PREFLIGHT}
 
 
+def test_condition_that_acts_in_the_air_prevents_arming() -> None:
+    refused = GOOD._replace(refused_s=2.0)
+    assert estimate_refusals(refused, Behaviour()) == ()  # a warning
+    reasons = ("spoofing suspected: GNSS contradicts the estimate",)
+    assert estimate_refusals(refused, Behaviour(gnss_doubt_action=2)) == reasons
+    assert estimate_refusals(GOOD._replace(tilt_rad=0.2), Behaviour()) == ("attitude estimate is doubtful",)
+
+
 def test_estimate_before_the_first_measurement_is_refused() -> None:
-    assert "GNSS has no fix" in estimate_refusals(NO_HEALTH)
-    assert "the attitude is not aligned yet" in estimate_refusals(NO_HEALTH)
+    assert "GNSS has no fix" in estimate_refusals(NO_HEALTH, Behaviour())
+    assert "the attitude is not aligned yet" in estimate_refusals(NO_HEALTH, Behaviour())
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega
 
 from flightstack.core.enums import Mode, Severity
 from flightstack.core.port_numbers import GROUND
-from flightstack.guidance.navigator import MissionProgress
+from flightstack.guidance.mission import MissionProgress
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, mavlink
 from flightstack.mavlink.link import Link
 from flightstack.services.routing.hub import MAX_PEERS

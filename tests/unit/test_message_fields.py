@@ -17,7 +17,7 @@ from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.flight_log.flight_log import FlightLog
 from flightstack.flight_log.topics import EVENT_TOPICS
 from flightstack.guidance.fence import FenceBreach
-from flightstack.guidance.navigator import MissionProgress
+from flightstack.guidance.mission import MissionProgress
 from flightstack.mavlink.dialect import FsLoopTiming, mavlink
 from flightstack.mavlink.fields import fitted
 from flightstack.mavlink.link import Link

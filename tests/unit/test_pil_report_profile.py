@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gcs_cli.pil.profile import StageProfile, stage_profiles
+from gcs_cli.pil.profile import StageProfile, branch_costs, stage_profiles
 
 costs = st.lists(st.integers(1, 2**32 - 1), min_size=1, max_size=300)
 
@@ -57,3 +57,15 @@ def test_a_stage_counts_the_steps_in_which_it_ran() -> None:
 def test_a_target_that_counts_nothing_has_no_profile() -> None:
     assert stage_profiles(np.zeros((5, 4))) == []
     assert stage_profiles(np.zeros((0, 4))) == []
+
+
+def test_costs_of_branches_are_those_of_the_steps_that_took_them() -> None:
+    steps = np.array([[800, 900, 700, 2400], [0, 900, 710, 1620], [0, 910, 700, 1640]], np.float64)
+    overrun, roll, thrust = 1 << 18, 2, 16
+    assert branch_costs(steps, np.array([overrun, roll | thrust, 0])) == {
+        "outer loop due": {"count": 1, "mean": 2400.0, "max": 2400.0},
+        "inner loop alone": {"count": 2, "mean": 1630.0, "max": 1640.0},
+        "nothing limited": {"count": 2, "mean": 2020.0, "max": 2400.0},
+        "torque limited": {"count": 1, "mean": 1620.0, "max": 1620.0},
+        "thrust limited": {"count": 1, "mean": 1620.0, "max": 1620.0},
+    }

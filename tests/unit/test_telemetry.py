@@ -16,7 +16,7 @@ from flightstack.core.contract import LoopRow
 from flightstack.core.enums import CUSTOM_MODE, Mode
 from flightstack.core.geodesy import GeoPoint
 from flightstack.guidance.fence import FenceBreach
-from flightstack.guidance.navigator import MissionProgress
+from flightstack.guidance.mission import MissionProgress
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
 from flightstack.mavlink.link import Link
 from flightstack.services.telemetry.telemetry import STREAMED

@@ -197,7 +197,7 @@ class CommandService:
         self._report(answer, "Command refused")
 
     def _report(self, answer: Answer, what: str) -> None:
-        if answer.result not in (ACCEPTED, UNSUPPORTED) and answer.reason:
+        if answer.result != ACCEPTED and answer.reason:
             self._vehicle.journal.say(Severity.WARNING, f"{what}: {answer.reason}")
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:

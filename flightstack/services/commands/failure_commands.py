@@ -21,7 +21,7 @@ LONGEST_WAIT_S = 1.5
 _HIGHEST = 255.0
 _REASONS = {
     DENIED: "the simulator has no such motor, battery or sensor",
-    UNSUPPORTED: "the simulator cannot do this failure",
+    UNSUPPORTED: "the simulator does not support this failure, or sends no such sensor",
 }
 
 

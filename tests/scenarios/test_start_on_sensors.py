@@ -1,0 +1,55 @@
+"""Starts of a vehicle on its sensors: on a slope, on a boat, and at any place on Earth."""
+
+from __future__ import annotations
+
+import pytest
+
+from flightstack.core.geodesy import GeoPoint
+from flightstack.testing import World
+from tests.support.estimate_errors import Errors, Watch
+
+PLACES = {
+    "arctic": GeoPoint(89.5, 20.0, 0.0),
+    "antarctic": GeoPoint(-89.0, -120.0, 2800.0),
+    "date line": GeoPoint(-17.0, 179.99999, 10.0),
+    "equator": GeoPoint(0.0, 0.0, 0.0),
+    "high plateau": GeoPoint(-16.5, -68.15, 4000.0),
+}
+
+
+LIMITS = Errors(tilt_deg=0.5, yaw_deg=2.5, velocity_m_s=0.1, horizontal_m=0.4, vertical_m=0.4, landing_m=0.6)
+"""Measured: 0.35°, 1.81°, 0.05 m/s, 0.13 m, 0.20 m, 0.24 m."""
+
+
+def hop(**conditions: object) -> Errors:
+    """Take off, hold for 5 s and land; return the errors of the estimate."""
+    with World(vehicle="x_quad", state="estimated", **conditions) as world:
+        watch = Watch(world)
+        world.wait_until_ready()
+        world.takeoff(4.0)
+        world.run_for(5.0)
+        world.land()
+        world.run_until("not armed")
+        return watch.errors()
+
+
+def assert_within(limits: Errors, errors: Errors) -> None:
+    for name, limit, error in zip(Errors._fields, limits, errors, strict=True):
+        assert error < limit, name
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_vehicle_starts_and_lands_at_any_place(name: str) -> None:
+    """Near the magnetic pole the level field is 0.02 gauss, and iron of 0.006 gauss turns the heading: 13.7°."""
+    assert_within(LIMITS._replace(yaw_deg=20.0) if name == "arctic" else LIMITS, hop(home=PLACES[name]))
+
+
+@pytest.mark.parametrize("slope_deg", [10.0, -10.0])
+def test_vehicle_starts_from_a_slope(slope_deg: float) -> None:
+    assert_within(LIMITS, hop(slope_deg=slope_deg))
+
+
+def test_vehicle_starts_from_a_boat_that_moves_slowly() -> None:
+    """The filter takes a landed vehicle for still: its velocity is off by that of the boat, 0.5 m/s, at first."""
+    slow = Errors(1.5, 2.5, 0.4, 1.5, 0.4, 2.0)  # measured: 0.80°, 1.01°, 0.24 m/s, 0.89 m, 0.18 m, 1.14 m
+    assert_within(slow, hop(boat=(0.4, -0.3)))
