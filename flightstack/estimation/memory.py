@@ -33,8 +33,9 @@ POSITION_RESET, VELOCITY_RESET, YAW_RESET, RESETS = 0, 4, 8, 10
 """Counter of each kind of reset, with the last change behind it."""
 GAP_PENDING_S, GAP_S, GAPS = 0, 1, 2
 """Columns of ``imu_gap``: time without samples in the step at hand, in all, and the number of such gaps."""
-YAW_TURN, YAW_VARIANCE, YAW_UPDATES = 0, 1, 2
-"""Columns of ``yaw_fix``: turn from the filter's yaw to that of GNSS velocity [rad], its variance, and updates."""
+YAW_TURN, YAW_VARIANCE, YAW_UPDATES, YAW_WRONG_S = 0, 1, 2, 3
+"""Columns of ``yaw_fix``: turn from the filter's yaw to that of GNSS velocity [rad], its variance, updates, and the
+time since which they contradict each other, 0 if they do not."""
 
 MEMORY = np.dtype(
     [
@@ -72,7 +73,7 @@ MEMORY = np.dtype(
         ("flags", "i8", (FLAGS,)),
         ("resets", "f8", (RESETS,)),
         ("yaw_models", "f8", (MODELS, MODEL_SIZE)),
-        ("yaw_fix", "f8", (3,)),
+        ("yaw_fix", "f8", (4,)),
     ]
 )
 

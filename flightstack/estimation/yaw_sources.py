@@ -27,6 +27,7 @@ from flightstack.estimation.memory import (
     YAW_TURN,
     YAW_UPDATES,
     YAW_VARIANCE,
+    YAW_WRONG_S,
 )
 from flightstack.estimation.prediction import DeltaSample, less_bias
 from flightstack.estimation.resets import count_yaw_reset, reset_position, reset_velocity
@@ -48,7 +49,9 @@ _COUNTED_TURN_RAD = 0.01
 _CONVERGED_RAD = 0.262
 """Deviation of the models' yaw at which it is used: 15 degrees, as in PX4."""
 _WRONG_YAW_RAD = 0.436
-"""Difference at which the filter's yaw is wrong if GNSS velocities are refused too: 25 degrees, as in PX4."""
+"""Least difference at which the filter's yaw is wrong: 25 degrees, as in PX4."""
+_CERTAIN_SQUARE = 16.0
+"""Square of the difference by its variance from which it is certain."""
 _REFUSED_S = 1.0
 
 
@@ -145,14 +148,29 @@ def take_velocity(m: Record, f: Filter, row: FloatArray) -> None:
         return
     if flags[HAS_YAW] == 0:
         _reset_to_models(m, f, row)
-    elif max(m["refused_s"][0], m["refused_s"][1]) > _REFUSED_S and abs(fix[YAW_TURN]) > _WRONG_YAW_RAD:
+    elif _is_wrong(m, row[0]):
         flags[MAG_FAULT] = flags[HAS_MAG]
         _reset_to_models(m, f, row)
 
 
 @compiled
+def _is_wrong(m: Record, time_s: float) -> bool:
+    """Return True if the models have contradicted the yaw for a second, or do while GNSS velocities are refused."""
+    fix, refused = m["yaw_fix"], m["refused_s"]
+    differs = abs(fix[YAW_TURN]) > _WRONG_YAW_RAD
+    if not (differs and fix[YAW_TURN] * fix[YAW_TURN] > _CERTAIN_SQUARE * fix[YAW_VARIANCE]):
+        fix[YAW_WRONG_S] = 0.0
+    elif fix[YAW_WRONG_S] == 0.0:
+        fix[YAW_WRONG_S] = time_s
+    lasts: bool = fix[YAW_WRONG_S] > 0.0 and time_s - fix[YAW_WRONG_S] > _REFUSED_S
+    is_refused: bool = max(refused[0], refused[1]) > _REFUSED_S
+    return lasts or (differs and is_refused)
+
+
+@compiled
 def _reset_to_models(m: Record, f: Filter, row: FloatArray) -> None:
     """Take tilt and yaw from the models, velocity and position from GNSS."""
+    m["yaw_fix"][YAW_WRONG_S] = 0.0
     models, before = m["yaw_models"], read_nominal(f.nominal).attitude
     best = likeliest(models)
     q = attitude_of(models, best)

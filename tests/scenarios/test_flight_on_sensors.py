@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
+from flightstack.core.contract import Quaternion
 from flightstack.core.errors import ConfigError
-from flightstack.estimation.error_state import WIND
+from flightstack.estimation.error_state import WIND, turn_between
+from flightstack.estimation.memory import MAG_FAULT
 from flightstack.testing import World
 from tests.support.estimate_errors import Watch
 
@@ -45,6 +49,19 @@ def test_wind_is_estimated_from_drag() -> None:
     wind, deviation = winds[False]
     assert (wind == 0.0).all()
     assert deviation >= 5.0  # and so not told as known
+
+
+def test_magnetometer_turned_at_boot_is_replaced_by_gnss_velocity() -> None:
+    with World(vehicle="x_quad", state="estimated") as world:
+        world.fault("sensor:mag:turn=90")
+        world.wait_until_ready()
+        world.arm()
+        world.takeoff(8.0)
+        world.run_for(8.0)
+        estimator, truth = world.engine.stack.estimation.estimator, world.engine.simulator.frame.state
+        assert estimator.memory["flags"][0, MAG_FAULT] == 1
+        error = turn_between(Quaternion(*truth[6:10].tolist()), estimator.state().attitude)
+        assert abs(math.degrees(error)) < 8.0  # measured 2; 50 if the filter follows alone
 
 
 def test_flights_on_sensors_of_one_seed_are_equal_to_the_byte() -> None:
