@@ -76,7 +76,7 @@ class StateEstimator(Protocol):
 class SampleRecorder(Protocol):
     """Records the samples that an estimator takes."""
 
-    def imu(self, row: FloatArray) -> None:
+    def imu(self, time_us: int, dt_us: int, row: FloatArray) -> None:
         """Record a sample of the inertial sensor in its array form, shape (8,)."""
         ...
 
@@ -88,7 +88,7 @@ class SampleRecorder(Protocol):
 class NoRecorder:
     """Records nothing."""
 
-    def imu(self, row: FloatArray) -> None:
+    def imu(self, time_us: int, dt_us: int, row: FloatArray) -> None:
         """Leave out a sample of the inertial sensor."""
 
     def sample(self, sample: Sample) -> None:
@@ -165,7 +165,7 @@ class SensorFeed:
         for time_us, content in reports:
             if isinstance(content, HilReport):
                 if content.number == 0:
-                    self._take_hil(time_us * 1e-6, content)
+                    self._take_hil(time_us, content)
             elif not isinstance(content, HilGps) or content.number == 0:
                 self._take(sample_of(time_us * 1e-6, content))
         estimator = self._estimator
@@ -174,13 +174,14 @@ class SensorFeed:
         estimator.write_state(self._state)
         return estimator.frame is not None
 
-    def _take_hil(self, time_s: float, report: HilReport) -> None:
+    def _take_hil(self, time_us: int, report: HilReport) -> None:
         """Take a HIL_SENSOR. The first one has no step, and its inertial measurement no duration: it is left out."""
-        fields, values = report.fields, report.values
-        if fields & _IMU == _IMU and report.step_us > 0:
-            row = self.newest.imu_track.take(time_s, report.step_us * 1e-6, values[GYRO_AT], values[ACCEL_AT])
+        _, fields, values, step_us = report
+        time_s = time_us * 1e-6
+        if fields & _IMU == _IMU and step_us > 0:
+            row = self.newest.imu_track.take(time_s, step_us * 1e-6, values[GYRO_AT], values[ACCEL_AT])
             self._estimator.imu_row(row)
-            self._recorder.imu(row)
+            self._recorder.imu(time_us, step_us, row)
         if fields & ~_IMU:
             for sample in slow_samples(time_s, report):
                 self._take(sample)

@@ -65,11 +65,11 @@ class SensorRecorder:
                 self._truth_us = self._global_us = self._estimator_us = 0
                 log.information(ESTIMATOR_START, estimator())
 
-    def imu(self, row: FloatArray) -> None:
+    def imu(self, time_us: int, dt_us: int, row: FloatArray) -> None:
         """Record a sample of the inertial sensor that the estimator takes, in its array form."""
         log = self._log
         if log is not None:
-            fill_imu(log.sampled[IMU_GROUP.name].append(round(row[0] * 1e6)), row)
+            fill_imu(log.sampled[IMU_GROUP.name].append(time_us), dt_us, row)
 
     def sample(self, sample: Sample) -> None:
         """Record a sample of another sensor that the estimator takes."""

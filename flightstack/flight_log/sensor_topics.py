@@ -130,10 +130,10 @@ RANGE_GROUP = Group(
 )
 
 
-def fill_imu(row: FloatArray, sample: FloatArray) -> None:
+def fill_imu(row: FloatArray, dt_us: int, sample: FloatArray) -> None:
     """Fill a row of ``IMU_GROUP`` from the array form of a sample."""
-    row[0] = round(sample[1] * 1e6)
-    row[1:] = sample[2:]
+    row[:] = sample[1:]
+    row[0] = dt_us
 
 
 def fill_mag(row: FloatArray, sample: MagSample) -> None:
