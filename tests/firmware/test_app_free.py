@@ -261,6 +261,7 @@ def test_stopping_ends_the_ticks(target: Target) -> None:
     assert at(target, 10 * PERIOD_US, state(2, RESET)) == []
     target.poll(1_000)
     assert "FS_PIL_TIMING" not in kinds(target.heard())
+    assert free_run(target, 1, 1) == ACCEPTED  # although the flight had not ended
 
 
 def test_stopping_does_not_end_the_safe_state(target: Target) -> None:

@@ -30,6 +30,7 @@ TESTS = {
     "core": [
         *(
             "tests/parity/test_c_laws.py",
+            "tests/parity/test_c_mixer.py",
             "tests/firmware/test_core_loops.py",
             "tests/firmware/test_core_math.py",
         ),
@@ -86,10 +87,10 @@ def _helpers() -> tuple[ModuleType, ModuleType, ModuleType]:
 
 def _shrink_samples() -> None:
     from tests.firmware import test_core_math  # noqa: PLC0415
-    from tests.parity import test_c_laws  # noqa: PLC0415
+    from tests.parity import test_c_laws, test_c_mixer  # noqa: PLC0415
 
-    test_c_laws.COUNT = test_core_math.COUNT = COUNT
-    test_c_laws.mixed.__defaults__ = (COUNT // 5,)
+    test_c_laws.COUNT = test_c_mixer.COUNT = test_core_math.COUNT = COUNT
+    test_c_mixer.mixed.__defaults__ = (COUNT // 5,)
 
 
 def _compile_with(compiler: CachedCompiler) -> None:

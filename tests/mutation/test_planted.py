@@ -20,7 +20,7 @@ from tests.firmware import (
     test_static_cppcheck,
 )
 from tests.mutation.mutants import mutants, one_more, one_ulp_more
-from tests.parity import test_c_laws
+from tests.parity import test_c_laws, test_c_mixer
 
 ROOT = Path(__file__).resolve().parents[2]
 PARAM_VALUE = 22
@@ -30,7 +30,8 @@ Plant = Callable[[str, str, str], Path]
 @pytest.fixture
 def plant(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Plant]:
     """Return a function that lets the tests compile sources with one passage written otherwise."""
-    monkeypatch.setattr(test_c_laws, "COUNT", 20_000)
+    for tests in (test_c_laws, test_c_mixer):
+        monkeypatch.setattr(tests, "COUNT", 20_000)
     _forget()
 
     def planted(file: str, right: str, wrong: str) -> Path:
@@ -54,7 +55,7 @@ def plant(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Plant]:
 
 def _forget() -> None:
     """Drop what the tests keep of a build."""
-    for module in (core_support, test_c_laws, test_core_builds, test_core_loops):
+    for module in (core_support, test_c_laws, test_c_mixer, test_core_builds, test_core_loops):
         for name, thing in vars(module).items():
             if isinstance(thing, functools._lru_cache_wrapper) and name != "flight":
                 thing.cache_clear()
@@ -72,7 +73,7 @@ def caught(test: Callable[..., None], *arguments: object) -> bool:
 def test_a_sign_in_the_mixer(plant: Plant) -> None:
     right = "lift[i] = base[i] + mixer->allocation[i][0]"
     plant("core/fs_mixer.c", right, right.replace(" + ", " - "))
-    assert caught(test_c_laws.test_mixer_in_double_has_pythons_bits, "cross")
+    assert caught(test_c_mixer.test_mixer_in_double_has_pythons_bits, "cross")
 
 
 def test_a_gain_that_is_off_by_its_last_bit(plant: Plant) -> None:
@@ -107,11 +108,11 @@ def test_a_short_way_that_is_allowed_by_thrust_alone(plant: Plant) -> None:
     """Of effectiveness times allocation the first row is looked at: nothing that flies today has another one wrong."""
     right = "for (row = 0U; row < 4U; row++) {"
     plant("core/fs_mixer_limits.c", right, right.replace("4U", "1U"))
-    assert not caught(test_c_laws.test_the_mixer_knows_which_short_ways_it_may_go, "cross", "double")
+    assert not caught(test_c_mixer.test_the_mixer_knows_which_short_ways_it_may_go, "cross", "double")
     assert caught(
-        test_c_laws.test_each_number_of_effectiveness_times_allocation_is_looked_at, "double", 1e-12
+        test_c_mixer.test_each_number_of_effectiveness_times_allocation_is_looked_at, "double", 1e-12
     )
-    assert caught(test_c_laws.test_what_allocation_does_beside_the_demand_is_told_as_achieved)
+    assert caught(test_c_mixer.test_what_allocation_does_beside_the_demand_is_told_as_achieved)
 
 
 def test_swapped_fields_of_a_message(plant: Plant, tmp_path: Path) -> None:
