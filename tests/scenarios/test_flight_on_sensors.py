@@ -89,12 +89,13 @@ def test_source_of_the_state_is_checked(conditions: dict, text: str) -> None:
         World(**conditions)
 
 
-def test_vehicle_does_not_tilt_for_a_reset_of_its_position() -> None:
+@pytest.mark.parametrize("bias", ["15,-10,0", "15,-10,10"])
+def test_vehicle_does_not_tilt_for_a_reset_of_its_position(bias: str) -> None:
     with World(vehicle="x_quad", state="estimated") as world:
         world.wait_until_ready()
         world.takeoff(5.0)
         world.run_until("mode == 'HOLD'")
-        world.fault("sensor:gnss:bias=15,-10,0")
+        world.fault(f"sensor:gnss:bias={bias}")
         world.run_until(lambda _: any("Estimate reset by" in text for text in world.texts), 30.0)
         tilts = []
         for _ in range(20):
