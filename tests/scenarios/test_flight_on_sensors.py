@@ -106,6 +106,18 @@ def test_vehicle_does_not_tilt_for_a_reset_of_its_position(bias: str) -> None:
         assert max(abs(error_m)) < 0.5
 
 
+def test_gnss_that_comes_back_is_not_suspected_of_spoofing() -> None:
+    params = {"FS_GNSS_ACT": 2, "EKF2_BARO_DELAY": 200}
+    with World(vehicle="x_quad", state="estimated", params=params) as world:
+        world.wait_until_ready()
+        world.takeoff(5.0)
+        world.run_until("mode == 'HOLD'")
+        world.fault("sensor:gnss:off", for_s=3.0)
+        world.run_for(5.0)
+        assert world.state.mode == "HOLD"
+        assert not [text for text in world.texts if "Spoofed" in text]
+
+
 @pytest.mark.parametrize(
     ("begin_s", "fault", "tilt_deg", "yaw_deg"),
     [
