@@ -62,14 +62,14 @@ def estimate_failsafes(health: EstimateHealth | None, behaviour: Behaviour) -> f
     """Return the conditions of failsafes in flight."""
     if health is None:
         return frozenset()
-    b, limit_m = behaviour, behaviour.position_accuracy_m
-    is_far_off = 0.0 < limit_m < health.horizontal_m
+    b = behaviour
+    is_off = health.is_inaccurate or health.lag_s > LATE_S
     conditions = (
         (Failsafe.IMU_FAULT, health.imu_age_s > IMU_MISSING_S or health.imu_is_stuck),
         (Failsafe.ATTITUDE_DOUBTFUL, health.tilt_rad > math.radians(b.tilt_accuracy_deg) > 0.0),
         (
             Failsafe.POSITION_LOST,
-            health.unaided_s > b.dead_reckoning_s or is_far_off or health.lag_s > LATE_S,
+            health.unaided_s > b.dead_reckoning_s or is_off,
         ),
         (Failsafe.GNSS_REFUSED, health.refused_s > REFUSED_S),
     )

@@ -168,7 +168,8 @@ class Estimation:
     def _update_health(self, time_us: int) -> None:
         now, users = self._now, self._users
         self._health_due_us = time_us + HEALTH_US
-        self.health = self._monitor.update(self._feed.newest, now.has_state, time_us * 1e-6)
+        limit_m = now.behaviour.position_accuracy_m
+        self.health = self._monitor.update(self._feed.newest, now.has_state, limit_m, time_us * 1e-6)
         users.failsafes.take_health(self.health)
         failsafes = users.failsafes
         changed = users.navigator.set_known(failsafes.position_is_known, failsafes.velocity_is_known)
