@@ -13,7 +13,7 @@ from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.portable_math import atan2
 from flightstack.estimation.delayed_filter import field_kernel, imu_kernel, push_kernel
 from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits
-from flightstack.estimation.fusion import GNSS_SIZE
+from flightstack.estimation.fusion import GNSS_SIZE, UNKNOWN_M, UNKNOWN_M_S, UNKNOWN_VERTICAL_M
 from flightstack.estimation.imu_track import IMU_SIZE
 from flightstack.estimation.memory import ALIGNED, LANDED, MEMORY
 from flightstack.estimation.rings import BARO_RING, GNSS_RING, MAG_RING, RANGE_RING
@@ -123,9 +123,9 @@ class Estimator:
         limits = self.limits
         return (
             sample.satellites >= limits.satellites
-            and not sample.eph_m > limits.eph_m
-            and not sample.epv_m > limits.epv_m
-            and not sample.speed_accuracy_m_s > limits.speed_accuracy_m_s
+            and _is_within(sample.eph_m, UNKNOWN_M, limits.eph_m)
+            and _is_within(sample.epv_m, UNKNOWN_VERTICAL_M, limits.epv_m)
+            and _is_within(sample.speed_accuracy_m_s, UNKNOWN_M_S, limits.speed_accuracy_m_s)
         )
 
     def state(self) -> VehicleState:
@@ -140,3 +140,8 @@ class Estimator:
     def deviations(self) -> FloatArray:
         """Return the standard deviation of each error state, shape (27,)."""
         return np.sqrt(np.diag(self._record["covariance"]))
+
+
+def _is_within(accuracy: float, unknown: float, limit: float) -> bool:
+    """Return True if an accuracy is within its limit; one that is not stated counts as ``unknown``."""
+    return (accuracy if 0.0 <= accuracy < math.inf else unknown) <= limit

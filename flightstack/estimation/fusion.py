@@ -47,7 +47,7 @@ from flightstack.estimation.kalman import (
 GNSS_SIZE = 10
 """Array form of a GNSS measurement: time, position NED, velocity NED, eph, epv, speed accuracy."""
 _CONFIRMATION, _LEAST_SHARE = 0.02, 0.01
-_UNKNOWN_M, _UNKNOWN_VERTICAL_M, _UNKNOWN_M_S = 5.0, 8.0, 0.5
+UNKNOWN_M, UNKNOWN_VERTICAL_M, UNKNOWN_M_S = 5.0, 8.0, 0.5
 """Accuracies of a GNSS receiver that states none."""
 _AIR_KG_M3, _DRAG_GATE = 1.225, 5.0
 _AIDED_S = 1.0
@@ -67,19 +67,19 @@ def _stated(accuracy: float, unknown: float) -> float:
 @compiled
 def horizontal_accuracy(row: GnssRow) -> float:
     """Return the accuracy [m] of the horizontal position of a GNSS measurement."""
-    return _stated(row[7], _UNKNOWN_M)
+    return _stated(row[7], UNKNOWN_M)
 
 
 @compiled
 def vertical_accuracy(row: GnssRow) -> float:
     """Return the accuracy [m] of the altitude of a GNSS measurement."""
-    return _stated(row[8], _UNKNOWN_VERTICAL_M)
+    return _stated(row[8], UNKNOWN_VERTICAL_M)
 
 
 @compiled
 def speed_accuracy(row: GnssRow) -> float:
     """Return the accuracy [m/s] of the velocity of a GNSS measurement."""
-    return _stated(row[9], _UNKNOWN_M_S)
+    return _stated(row[9], UNKNOWN_M_S)
 
 
 @compiled

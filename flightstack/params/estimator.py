@@ -78,10 +78,12 @@ ESTIMATOR_PARAMS = (
     _param("EKF2_MAG_NOISE", 0.005, 0.001, 1.0, "gauss", "Least noise of the magnetometer", "mag_noise_gauss"),
     _param("EKF2_MAG_GATE", 3.0, 1.0, 100.0, "SD", "Gate of the magnetometer", "mag_gate", 1.0, 1),
     # first fix
-    _param("EKF2_REQ_EPH", 3.0, 2.0, 100.0, "m", "Horizontal accuracy that the first fix needs", "eph_m", 1.0, 1),
-    _param("EKF2_REQ_EPV", 5.0, 2.0, 100.0, "m", "Vertical accuracy that the first fix needs", "epv_m", 1.0, 1),
-    _param("EKF2_REQ_SACC", 0.5, 0.1, 5.0, "m/s", "Accuracy of speed that the first fix needs", "speed_accuracy_m_s",
-           1.0, 2),
+    _param("EKF2_REQ_EPH", 3.0, 2.0, 100.0, "m", "Horizontal accuracy that the first fix needs; unknown counts as 5",
+           "eph_m", 1.0, 1),
+    _param("EKF2_REQ_EPV", 5.0, 2.0, 100.0, "m", "Vertical accuracy that the first fix needs; unknown counts as 8",
+           "epv_m", 1.0, 1),
+    _param("EKF2_REQ_SACC", 0.5, 0.1, 5.0, "m/s", "Accuracy of speed that the first fix needs; an unknown one,"
+           " as of HIL_GPS, counts as 0.5", "speed_accuracy_m_s", 1.0, 2),
     _param("EKF2_REQ_NSATS", 6, 4, 12, "", "Satellites that the first fix needs", "satellites", integer=True),
 )  # fmt: skip
 

@@ -14,7 +14,7 @@ from flightstack.core.contract import Quaternion, Vector3
 from flightstack.core.geometry import conjugate, quaternion_product, rotate
 from flightstack.estimation.error_state import POSITION, VELOCITY, turn_between
 from flightstack.estimation.estimator import Estimator
-from flightstack.estimation.estimator_params import EstimatorParams, tuning_of
+from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits, tuning_of
 from flightstack.estimation.kalman import FUSED, GNSS_POSITION, GNSS_VELOCITY, MAG, RANGE, REFUSED
 from flightstack.estimation.memory import (
     GAP_S,
@@ -44,9 +44,11 @@ STEPPED, _ = tuning_of({"EKF2_PREDICT_US": 1000.0, "EKF2_GPS_DELAY": 300.0})
 Change = Callable[[Any], Any]
 
 
-def fly(seconds: float, faults: Faults, change: Change = lambda sample: sample) -> Estimator:
+def fly(
+    seconds: float, faults: Faults, change: Change = lambda sample: sample, limits: GnssLimits | None = None
+) -> Estimator:
     """Fly with samples that ``change`` may replace, or drop by None."""
-    estimator = Estimator(PARAMS)
+    estimator = Estimator(PARAMS, limits)
     estimator.set_earth_field(flown.EARTH)
     for sample in flown.samples(seconds, faults):
         changed = change(sample)
@@ -165,11 +167,25 @@ def test_reset_to_gnss_of_unknown_accuracy_stays_finite(accuracy: float) -> None
             return sample._replace(eph_m=accuracy, epv_m=accuracy, speed_accuracy_m_s=accuracy)
         return sample
 
-    estimator = fly(30.0, Faults(jump_s=(12.0, math.inf), jump_m=60.0, vertical_jump_m_s=6.0), unknown)
+    faults = Faults(jump_s=(12.0, math.inf), jump_m=60.0, vertical_jump_m_s=6.0)
+    estimator = fly(30.0, faults, unknown, GnssLimits(eph_m=5.0, epv_m=8.0))
     assert resets(estimator, POSITION_RESET) >= 1.0
     assert resets(estimator, VELOCITY_RESET) >= 1.0
     assert np.isfinite(estimator.memory["covariance"]).all()
     assert np.isfinite(estimator.memory["nominal"]).all()
+
+
+@pytest.mark.parametrize("unknown", [math.nan, math.inf, -1.0])
+@pytest.mark.parametrize(("field", "assumed"), [("eph_m", 5.0), ("epv_m", 8.0), ("speed_accuracy_m_s", 0.5)])
+def test_first_fix_of_unknown_accuracy_is_judged_by_the_assumed_one(
+    field: str, assumed: float, unknown: float
+) -> None:
+    def change(sample: Any) -> Any:
+        return sample._replace(**{field: unknown}) if isinstance(sample, GnssSample) else sample
+
+    for limit, starts in ((0.9 * assumed, False), (assumed, True)):
+        estimator = fly(1.5, Faults(), change, GnssLimits()._replace(**{field: limit}))
+        assert (estimator.frame is not None) is starts
 
 
 def test_ideal_gnss_with_zero_accuracies_is_trusted() -> None:
