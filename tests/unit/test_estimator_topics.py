@@ -5,20 +5,27 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Iterator
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
+import numpy as np
 import pytest
 from pyulog import ULog
 
+from flightstack.core.contract import FloatArray
+from flightstack.core.geodesy import LocalFrame
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples
 from flightstack.estimation.sensor_samples import BaroSample, RangeSample
+from flightstack.estimation.snapshot import snapshot
 from flightstack.flight_log.estimator_topics import ESTIMATOR, fill_estimator
 from flightstack.flight_log.flight_log import FlightLog
+from flightstack.flight_log.recorder import FlightRecorder
+from flightstack.flight_log.sensor_recorder import SENSOR_GROUPS, SensorRecorder
 from tests.support import flown_sensors as flown
 from tests.support.flown_sensors import Faults
-from tests.support.sensed_flight import PARAMS
+from tests.support.sensed_flight import PARAMS, sensed_after
 
 SECONDS, WRONG_S = 20.0, 19.5
 TOO_LARGE = Faults(
@@ -35,6 +42,30 @@ def topics(sensed: Sensed) -> dict[str, Any]:
     fill_estimator(log.sampled[ESTIMATOR.name].append(1), sensed)
     log.flush()
     return {data.name: data.data for data in ULog(io.BytesIO(file.getvalue())).data_list}
+
+
+def test_log_without_a_true_state_has_no_groundtruth() -> None:
+    file = io.BytesIO()
+    log = FlightLog(file, 4)
+    log.start(0, {}, {}, flown.HOME, SENSOR_GROUPS)
+    recorder = SensorRecorder(
+        cast(FlightRecorder, SimpleNamespace(log=log)), LocalFrame(flown.HOME), flown.HOME
+    )
+    sensed, estimator = sensed_after(SECONDS)
+    recorder.begin(lambda: snapshot(estimator))
+
+    def topics_after(truth: FloatArray | None, time_us: int) -> set[str]:
+        recorder.state(time_us, lambda: truth, lambda: sensed)
+        log.flush()
+        return {data.name for data in ULog(io.BytesIO(file.getvalue())).data_list}
+
+    before = topics_after(None, 1)
+    assert "estimator_status" in before
+    assert not [name for name in before if name.endswith("_groundtruth")]
+    assert topics_after(np.zeros(13), 100_000) - before == {
+        f"vehicle_{name}_groundtruth"
+        for name in ("attitude", "angular_velocity", "local_position", "global_position")
+    }
 
 
 def too_large_measurements() -> Iterator[Any]:
