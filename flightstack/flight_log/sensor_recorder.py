@@ -63,7 +63,7 @@ class SensorRecorder:
             if log is not None:
                 self._offset_m = self._frame.to_ned(self._true_frame.origin)
                 self._truth_us = self._global_us = self._estimator_us = 0
-                log.information(ESTIMATOR_START, estimator())
+                log.binary_information(ESTIMATOR_START, estimator())
 
     def imu(self, time_us: int, dt_us: int, row: FloatArray) -> None:
         """Record a sample of the inertial sensor that the estimator takes, in its array form."""
