@@ -280,8 +280,8 @@ ON_SENSORS = """
 
 Only a vehicle that flies on its sensors (`--state estimated`) writes these topics: measurements as they arrive, the
 estimator's twice a second, the truth a hundred times. PX4's `Tools/ecl_ekf`, `gcs estimate` and PlotJuggler's layouts
-for PX4 read them. The information `estimator_start` holds the estimator's memory at the start of the log, so that
-`gcs estimate` repeats the flown estimate.
+for PX4 read them. The multi-information message `estimator_start` holds the estimator's memory at the start of the
+log, so that `gcs estimate` repeats the flown estimate.
 """
 
 
