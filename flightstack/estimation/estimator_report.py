@@ -14,6 +14,7 @@ import numpy as np
 
 from flightstack.core.contract import Quaternion, Record, Vector3
 from flightstack.estimation.error_state import ATTITUDE, POSITION, WIND, Nominal
+from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import (
     BARO,
     FUSED_S,
@@ -43,6 +44,7 @@ AIDED_S = 1.0
 """Time after its last accepted measurement during which a sensor counts as fused."""
 DEAD_RECKONING_S = 5.0
 """Time without an accepted measurement until a position or velocity is invalid, PX4's EKF2_NOAID_TOUT."""
+_DELAY = EstimatorParams._fields.index("delay_s")
 _TILT_RAD, _YAW_RAD = math.radians(10.0), math.radians(15.0)
 """Deviations above which tilt and yaw are not aligned."""
 _WIND_VARIANCE = 0.5
@@ -175,20 +177,24 @@ class EstimatorReport(NamedTuple):
         return bool(self.control & ControlFlags.WIND)
 
 
-def estimator_report(memory: Record) -> EstimatorReport:
-    """Return the report of a record of the estimator's ``MEMORY``."""
+def estimator_report(memory: Record, time_s: float, imu_has_failed: bool) -> EstimatorReport:
+    """Return the report of a record of the estimator's ``MEMORY`` at ``time_s`` of the sensors.
+
+    The flags compare with the time at which the horizon is if no sample is late: without samples the horizon stays.
+    """
     rows = [_observation(row) for row in memory["observations"].tolist()]
     variances = tuple(np.diagonal(memory["covariance"]).tolist())
-    now_s, flags = float(memory["clock"][0]), memory["flags"].tolist()
+    now_s, flags = time_s - float(memory["params"][_DELAY]), memory["flags"].tolist()
     velocity, position = rows[GNSS_VELOCITY : GNSS_VELOCITY + 3], rows[GNSS_POSITION : GNSS_POSITION + 3]
     field, height = rows[MAG : MAG + 3], rows[BARO]
     range_finder = rows[RANGE] if flags[HAS_RANGE] else None
     control = _control(now_s, flags, rows, variances)
     rejected = _rejected(velocity, position, height, field, range_finder)
+    solution = _solution(now_s, flags, rows, control, rejected)
     return EstimatorReport(
         time_s=float(memory["output"][0]),
-        horizon_s=now_s,
-        solution=_solution(now_s, flags, rows, control, rejected),
+        horizon_s=float(memory["clock"][0]),
+        solution=solution & ~SolutionFlags.ATTITUDE if imu_has_failed else solution,
         control=control,
         rejected=rejected,
         nominal=nominal_of(memory),

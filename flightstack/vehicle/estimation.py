@@ -86,6 +86,7 @@ class Estimation:
         self._monitor = HealthMonitor(self.estimator.memory)
         self._landed = False
         self._health_due_us = 0
+        self._time_us = 0  # of the newest message of the sensors
         # as memory: a number of an array takes four times as long to read
         self._resets = self.estimator.memory["resets"][0].data
         self._seen = (0.0, 0.0, 0.0)
@@ -97,7 +98,7 @@ class Estimation:
 
     def sensed(self) -> Sensed:
         """Return what the estimator and its sensors know now; valid until the next update."""
-        return Sensed(self.estimator.memory[0], self._feed.newest, self._now.has_state)
+        return Sensed(self.estimator.memory[0], self._feed.newest, self._now.has_state, self._time_us * 1e-6)
 
     def _on_parameter(self, name: str, value: float) -> None:
         if name in ESTIMATOR_SPECS:
@@ -126,14 +127,16 @@ class Estimation:
             self._landed = now.landed
             self.estimator.set_landed(now.landed)
         reports = self._sensors.take()
+        if reports:
+            self._time_us = reports[-1].time_us
         is_known = self._feed.update(reports)
         if is_known and not now.has_state:
             self._find_origin()
         self._recorder.state(time_us, self._truth, self.sensed)
         if (resets[POSITION_RESET], resets[VELOCITY_RESET], resets[YAW_RESET]) != self._seen:
             self._follow_resets()
-        if reports and reports[-1].time_us >= self._health_due_us:
-            self._update_health(reports[-1].time_us)
+        if reports and self._time_us >= self._health_due_us:
+            self._update_health(self._time_us)
 
     def _find_origin(self) -> None:
         frame = self.estimator.frame

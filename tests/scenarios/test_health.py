@@ -63,6 +63,19 @@ def test_a_simulator_that_is_silent_is_ill_on_the_ground_too() -> None:
     assert not seems_healthy(world)
 
 
+@pytest.mark.parametrize("fault", ["off", "freeze"])
+def test_dead_imu_is_unhealthy_in_sys_status(fault: str) -> None:
+    imu = mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
+    bits = imu | mavlink.MAV_SYS_STATUS_AHRS
+    with World(vehicle="x_quad", state="estimated") as world:
+        world.run_for(6.0)
+        assert asked(world, SYS_STATUS).onboard_control_sensors_health & bits == bits
+        world.fault(f"sensor:imu:{fault}")
+        world.run_for(1.0)
+        assert not asked(world, SYS_STATUS).onboard_control_sensors_health & bits
+        assert not asked(world, ESTIMATOR_STATUS).flags & mavlink.ESTIMATOR_ATTITUDE
+
+
 def test_each_breach_of_the_fence_is_told_with_its_kind_and_time() -> None:
     world = flying(GF_ACTION=1, GF_PREDICT=0, GF_MAX_VER_DIST=3.5)
     before = asked(world, FENCE_STATUS)
