@@ -35,6 +35,7 @@ from flightstack.estimation.memory import (
     HAS_RANGE,
     LANDED,
     POSITION_RESET,
+    RESET_CHANGE,
     VELOCITY_RESET,
     YAW_RESET,
 )
@@ -110,7 +111,7 @@ class Observation(NamedTuple):
 
 
 class Resets(NamedTuple):
-    """Numbers of resets, and the last change of each."""
+    """Numbers of resets, and the change of each in the last step of the filter with one."""
 
     position: int
     position_change_m: Vector3
@@ -228,10 +229,11 @@ def nominal_of(memory: Record) -> Nominal:
 
 
 def _resets(x: Sequence[float]) -> Resets:
-    position, velocity = x[POSITION_RESET : POSITION_RESET + 4], x[VELOCITY_RESET : VELOCITY_RESET + 4]
-    return Resets(
-        int(position[0]), Vector3(*position[1:]), int(velocity[0]), Vector3(*velocity[1:]), int(x[YAW_RESET])
+    position, velocity = (
+        Vector3(*x[kind + RESET_CHANGE : kind + RESET_CHANGE + 3])
+        for kind in (POSITION_RESET, VELOCITY_RESET)
     )
+    return Resets(int(x[POSITION_RESET]), position, int(x[VELOCITY_RESET]), velocity, int(x[YAW_RESET]))
 
 
 def _is_recent(rows: Sequence[Observation], now_s: float, limit_s: float) -> bool:

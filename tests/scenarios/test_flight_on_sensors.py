@@ -89,12 +89,13 @@ def test_source_of_the_state_is_checked(conditions: dict, text: str) -> None:
         World(**conditions)
 
 
-def test_vehicle_does_not_tilt_for_a_reset_of_its_position() -> None:
+@pytest.mark.parametrize("bias", ["15,-10,0", "15,-10,10"])
+def test_vehicle_does_not_tilt_for_a_reset_of_its_position(bias: str) -> None:
     with World(vehicle="x_quad", state="estimated") as world:
         world.wait_until_ready()
         world.takeoff(5.0)
         world.run_until("mode == 'HOLD'")
-        world.fault("sensor:gnss:bias=15,-10,0")
+        world.fault(f"sensor:gnss:bias={bias}")
         world.run_until(lambda _: any("Estimate reset by" in text for text in world.texts), 30.0)
         tilts = []
         for _ in range(20):
@@ -103,6 +104,18 @@ def test_vehicle_does_not_tilt_for_a_reset_of_its_position() -> None:
         assert max(tilts) < 15.0  # 12.0, on the way back to the goal; 45 without the shift
         error_m = world.engine.stack.now.setpoint[:2] - world.engine.stack.now.state[:2]
         assert max(abs(error_m)) < 0.5
+
+
+def test_gnss_that_comes_back_is_not_suspected_of_spoofing() -> None:
+    params = {"FS_GNSS_ACT": 2, "EKF2_BARO_DELAY": 200}
+    with World(vehicle="x_quad", state="estimated", params=params) as world:
+        world.wait_until_ready()
+        world.takeoff(5.0)
+        world.run_until("mode == 'HOLD'")
+        world.fault("sensor:gnss:off", for_s=3.0)
+        world.run_for(5.0)
+        assert world.state.mode == "HOLD"
+        assert not [text for text in world.texts if "Spoofed" in text]
 
 
 @pytest.mark.parametrize(
