@@ -32,7 +32,7 @@ WATCHED = {
     "IMU_FAULT": "no measurement of the inertial sensor for 0.04 s, or 100 equal ones",
     "ATTITUDE_DOUBTFUL": "standard deviation of the estimated tilt above `FS_TILT_DEV`",
     "POSITION_LOST": "dead reckoning for `FS_DEAD_RECK_T`, or standard deviation of the estimated position above "
-    "`COM_POS_FS_EPH`",
+    "`COM_POS_FS_EPH`, or a filter that is late by 0.5 s",
     "GNSS_REFUSED": "positions of GNSS are refused for 1 s",
     "FENCE": "outside the geofence, `GF_MAX_HOR_DIST` or `GF_MAX_VER_DIST`",
     "POSITION_ERROR": "the position differs from its setpoint by `FS_POS_ERR` for `FS_POS_ERR_T`",
@@ -212,7 +212,8 @@ empty.
 {sensors}
 `gyro2`, `accel2` and `imu2` are those of the second inertial sensor, a name without a number those of all. A fault of a
 sensor acts on what the simulator sends as HIL_SENSOR, HIL_GPS, DISTANCE_SENSOR and HIL_OPTICAL_FLOW
-([Sensors](sensors.md)), and not on a vehicle that flies on the true state.
+([Sensors](sensors.md)). It is refused on a vehicle that flies on the true state, a fault of the state on a vehicle that
+flies on its sensors.
 
 *Clock*: in lockstep a vehicle notices a stalled clock after 1 s of the machine's clock, not of simulated time
 ([Clocks of other simulators](simulator.md#clocks-of-other-simulators)).

@@ -1,4 +1,4 @@
-"""What the estimator knows of itself: flags, accuracies, innovations and resets, read from its memory on demand.
+"""Report of the estimator: flags, accuracies, innovations and resets, read from its memory on demand.
 
 Flags have the bits of PX4: ``SolutionFlags`` are ESTIMATOR_STATUS_FLAGS, ``ControlFlags`` and ``RejectionFlags`` those
 of the topic ``estimator_status_flags``.
@@ -122,7 +122,7 @@ class Resets(NamedTuple):
 
 
 class EstimatorReport(NamedTuple):
-    """The estimator's knowledge at one time. Deviations are 1σ."""
+    """State and quality of the estimate at one time. Deviations are 1σ."""
 
     time_s: float
     """Time of the output, that of the newest IMU sample."""

@@ -15,7 +15,7 @@ from flightstack.estimation.vibration import Vibration, vibration_of
 
 
 class Sensed:
-    """What a vehicle that flies on its sensors knows at one time."""
+    """Estimate and measurements of a vehicle that flies on its sensors, at one time."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Topics of the estimator's knowledge, with PX4's names and fields, so that PX4's tools for its estimator read them."""
+"""Topics of the estimator, with PX4's names and fields, so that PX4's tools for its estimator read them."""
 
 from __future__ import annotations
 

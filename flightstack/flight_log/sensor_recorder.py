@@ -1,4 +1,4 @@
-"""Record measurements, the estimator's knowledge and the truth in the flight log of a vehicle on its sensors."""
+"""Record measurements, estimate and truth in the flight log of a vehicle on its sensors."""
 
 from __future__ import annotations
 

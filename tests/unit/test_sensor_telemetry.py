@@ -24,8 +24,6 @@ from flightstack.estimation.vibration import vibration_of
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 from flightstack.services.telemetry.streams import (
-    SENSOR_API_RATES_HZ,
-    SENSOR_GROUND_RATES_HZ,
     Streams,
     default_rates_hz,
 )
@@ -81,7 +79,7 @@ def test_report_of_a_good_flight_has_good_flags() -> None:
     assert report.resets.position == report.resets.velocity == 0
 
 
-def test_report_before_alignment_claims_nothing() -> None:
+def test_report_before_alignment_has_no_flags() -> None:
     report = Sensed(Estimator().memory[0], NewestSamples()).report
     assert report.solution == 0
     assert report.control == 0
@@ -378,7 +376,14 @@ def test_sensor_messages_are_available_only_on_sensors() -> None:
         assert Streams({}, SENSOR_STREAMED).set_interval(message_id, 1e5)
 
 
-@pytest.mark.parametrize("rates", [SENSOR_GROUND_RATES_HZ, SENSOR_API_RATES_HZ], ids=["ground", "api"])
-def test_every_stream_of_sensors_is_available(rates: dict[int, float]) -> None:
-    assert rates.keys() <= SENSOR_STREAMED
-    assert rates in (default_rates_hz(False, True), default_rates_hz(True, True))
+@pytest.mark.parametrize("is_api", [False, True], ids=["ground", "api"])
+def test_every_stream_of_sensors_is_available(is_api: bool) -> None:
+    rates_hz = default_rates_hz(is_api, has_sensors=True)
+    assert rates_hz.keys() <= SENSOR_STREAMED
+    assert rates_hz.keys() > default_rates_hz(is_api, has_sensors=False).keys()
+
+
+def test_only_companions_get_raw_imu_samples_by_default() -> None:
+    raw = mavlink.MAVLINK_MSG_ID_HIGHRES_IMU
+    assert default_rates_hz(is_api=True, has_sensors=True)[raw] == 50.0
+    assert raw not in default_rates_hz(is_api=False, has_sensors=True)
