@@ -34,6 +34,7 @@ from flightstack.estimation.memory import (
     HAS_GNSS,
     HAS_RANGE,
     LANDED,
+    MAG_FAULT,
     POSITION_RESET,
     RESET_CHANGE,
     VELOCITY_RESET,
@@ -81,6 +82,7 @@ class ControlFlags:
     BARO_HEIGHT = 1 << 9
     RANGE_HEIGHT = 1 << 10
     GNSS_HEIGHT = 1 << 11
+    MAG_FAULT = 1 << 18
     VEHICLE_AT_REST = 1 << 26
     INERTIAL_DEAD_RECKONING = 1 << 29
     FAKE_POSITION = 1 << 32
@@ -263,6 +265,7 @@ def _control(
         (ControlFlags.BARO_HEIGHT, bool(flags[HAS_BARO]) and fused(BARO)),
         (ControlFlags.RANGE_HEIGHT, bool(flags[HAS_RANGE]) and fused(RANGE)),
         (ControlFlags.GNSS_HEIGHT, has_gnss and fused(GNSS_POSITION + 2)),
+        (ControlFlags.MAG_FAULT, bool(flags[MAG_FAULT])),
         (ControlFlags.VEHICLE_AT_REST, at_rest),
         (ControlFlags.INERTIAL_DEAD_RECKONING, not (has_position or has_velocity or at_rest)),
         (ControlFlags.FAKE_POSITION, fused(HOLD_POSITION, 2)),

@@ -69,6 +69,7 @@ _CONTROL: dict[str, int | None] = {
     "cs_ev_pos": None,
     "cs_ev_yaw": None,
     "cs_ev_hgt": None,
+    "cs_mag_fault": ControlFlags.MAG_FAULT,
     "cs_vehicle_at_rest": ControlFlags.VEHICLE_AT_REST,
     "cs_inertial_dead_reckoning": ControlFlags.INERTIAL_DEAD_RECKONING,
     "cs_fake_pos": ControlFlags.FAKE_POSITION,

@@ -16,7 +16,14 @@ from flightstack.core.portable_math import distance
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits, tuning_of
 from flightstack.estimation.health import NO_HEALTH, HealthMonitor
-from flightstack.estimation.memory import POSITION_RESET, RESET_SUM, VELOCITY_RESET, YAW_RESET, YAW_RESET_SUM
+from flightstack.estimation.memory import (
+    MAG_FAULT,
+    POSITION_RESET,
+    RESET_SUM,
+    VELOCITY_RESET,
+    YAW_RESET,
+    YAW_RESET_SUM,
+)
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed
 from flightstack.estimation.sensor_samples import BaroSample, ImuSample
@@ -90,6 +97,8 @@ class Estimation:
         # as memory: a number of an array takes four times as long to read
         self._resets = self.estimator.memory["resets"][0].data
         self._seen, self._counts = self._resets.tolist(), (0.0, 0.0, 0.0)
+        self._flags = self.estimator.memory["flags"][0].data
+        self._mag_has_failed = False
 
     @property
     def samples(self) -> NewestSamples:
@@ -174,6 +183,9 @@ class Estimation:
         limit_m = now.behaviour.position_accuracy_m
         self.health = self._monitor.update(self._feed.newest, now.has_state, limit_m, time_us * 1e-6)
         users.failsafes.take_health(self.health)
+        if self._flags[MAG_FAULT] and not self._mag_has_failed:
+            self._mag_has_failed = True
+            users.journal.say(Severity.WARNING, "Compass disagrees with GNSS and is no longer used")
         failsafes = users.failsafes
         changed = users.navigator.set_known(failsafes.position_is_known, failsafes.velocity_is_known)
         if changed and now.flying:  # reference and integrators hold what followed from the position
