@@ -32,7 +32,7 @@ WATCHED = {
     "IMU_FAULT": "no measurement of the inertial sensor for 0.04 s, or 100 equal ones",
     "ATTITUDE_DOUBTFUL": "standard deviation of the estimated tilt above `FS_TILT_DEV`",
     "POSITION_LOST": "dead reckoning for `FS_DEAD_RECK_T`, or standard deviation of the estimated position above "
-    "`COM_POS_FS_EPH`",
+    "`COM_POS_FS_EPH`, or a filter that is late by 0.5 s",
     "GNSS_REFUSED": "positions of GNSS are refused for 1 s",
     "FENCE": "outside the geofence, `GF_MAX_HOR_DIST` or `GF_MAX_VER_DIST`",
     "POSITION_ERROR": "the position differs from its setpoint by `FS_POS_ERR` for `FS_POS_ERR_T`",
@@ -280,8 +280,8 @@ ON_SENSORS = """
 
 Only a vehicle that flies on its sensors (`--state estimated`) writes these topics: measurements as they arrive, the
 estimator's twice a second, the truth a hundred times. PX4's `Tools/ecl_ekf`, `gcs estimate` and PlotJuggler's layouts
-for PX4 read them. The information `estimator_start` holds the estimator's memory at the start of the log, so that
-`gcs estimate` repeats the flown estimate.
+for PX4 read them. The multi-information message `estimator_start` holds the estimator's memory at the start of the
+log, so that `gcs estimate` repeats the flown estimate.
 """
 
 

@@ -149,6 +149,8 @@ def imu_kernel(memory: RecordArray, sample: FloatArray) -> None:
     write_motion(output, time_s, moved(start, angle, dv, dt_s, params.gravity_m_s2))
     if sums[0] >= params.period_s - 0.25 * dt_s:
         step = take_step(sums, time_s)
+        if r.cursors[IMU_RING, 1] >= IMU_ROWS:  # move early, so that the filter integrates every step
+            _advance(m, f, r, time_s, params)
         slot = push(r, IMU_RING, IMU_ROWS)
         write_step(r.imu[slot], step)
         write_row(r.track, slot, output)

@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from flightstack.estimation.rings import IMU_ROWS
 from flightstack.params.estimator import estimator_default, fields_of, horizon_s
+
+_IMU_SPARE_ROWS = 16
+"""Rows for the steps at both ends of the delay, and for steps up to a fifth shorter than their period."""
 
 
 class EstimatorParams(NamedTuple):
@@ -97,7 +101,10 @@ class GnssLimits(NamedTuple):
 
 
 def tuning_of(values: Mapping[str, float]) -> tuple[EstimatorParams, GnssLimits]:
-    """Return the filter's parameters and GNSS limits from parameters by name (EKF2_…); the others have defaults."""
+    """Return the filter's parameters and GNSS limits from parameters by name (EKF2_…); the others have defaults.
+
+    The period is extended where the steps within the longest delay would not fit into the filter's memory.
+    """
     given: dict[str, Any] = fields_of(values)
     limits = GnssLimits()._replace(
         **{name: value for name, value in given.items() if name in GnssLimits._fields}
@@ -105,5 +112,6 @@ def tuning_of(values: Mapping[str, float]) -> tuple[EstimatorParams, GnssLimits]
     params = EstimatorParams()._replace(
         **{name: value for name, value in given.items() if name in EstimatorParams._fields}
     )
-    delays_s = (params.gnss_delay_s, params.baro_delay_s, params.range_delay_s, params.mag_delay_s)
-    return params._replace(delay_s=horizon_s(*delays_s)), limits
+    delay_s = horizon_s(params.gnss_delay_s, params.baro_delay_s, params.range_delay_s, params.mag_delay_s)
+    period_s = max(params.period_s, delay_s / (IMU_ROWS - _IMU_SPARE_ROWS))
+    return params._replace(delay_s=delay_s, period_s=period_s), limits

@@ -37,6 +37,8 @@ class EstimateHealth(NamedTuple):
     """Time since the newest accepted horizontal position or velocity: that of dead reckoning."""
     refused_s: float
     """Time for which horizontal positions of GNSS have arrived and were refused."""
+    lag_s: float
+    """Time from the filter's state to the newest IMU sample."""
     horizontal_m: float
     velocity_m_s: float
     """Horizontal."""
@@ -50,12 +52,12 @@ class EstimateHealth(NamedTuple):
 
 
 NO_HEALTH = EstimateHealth(
-    False, False, math.inf, False, math.inf, math.inf, math.inf, math.inf, 0.0, math.inf, math.inf,
-    math.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    False, False, math.inf, False, math.inf, math.inf, math.inf, math.inf, 0.0, 0.0, math.inf,
+    math.inf, math.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
 )  # fmt: skip
-_KNOWN, _SUMMARY_SIZE = 3, 12
-"""Columns of the summary: time of the filter, times of the last accepted horizontal position and velocity, and from
-``_KNOWN`` on the fields of ``EstimateHealth`` from ``horizontal_m`` on."""
+_LAG, _SUMMARY_SIZE = 2, 12
+"""Columns of the summary: time without accepted positions and velocities, time of refused positions, and from ``_LAG``
+on the fields of ``EstimateHealth`` from ``lag_s`` on."""
 
 
 @compiled
@@ -78,9 +80,11 @@ def health_kernel(memory: RecordArray, summary: FloatArray) -> None:
     """Write the summary of an estimator's record, shape (12,); it holds the mean ratios of the last call."""
     m = memory[0]
     p, o, x = m["covariance"], m["observations"], m["nominal"]
-    summary[0] = m["clock"][0]
-    for i, row in ((1, GNSS_POSITION), (2, GNSS_VELOCITY)):
-        summary[i] = min(o[row, FUSED_S], o[row + 1, FUSED_S])
+    position_s = min(o[GNSS_POSITION, FUSED_S], o[GNSS_POSITION + 1, FUSED_S])
+    velocity_s = min(o[GNSS_VELOCITY, FUSED_S], o[GNSS_VELOCITY + 1, FUSED_S])
+    summary[0] = m["clock"][0] - max(position_s, velocity_s)
+    summary[1] = max(m["refused_s"][3], m["refused_s"][4])
+    summary[2] = m["output"][0] - m["clock"][0]
     for i, at in ((3, POSITION), (4, VELOCITY)):
         summary[i] = math.sqrt(p[at, at] + p[at + 1, at + 1])
     summary[5] = math.sqrt(max(p[ATTITUDE, ATTITUDE], p[ATTITUDE + 1, ATTITUDE + 1]))
@@ -105,7 +109,7 @@ class HealthMonitor:
         """Return the health at ``time_s``."""
         self._summarise(self._memory, self._summary)
         summary = self._summary.tolist()
-        horizon_s, position_s, velocity_s = summary[:_KNOWN]
+        unaided_s, refused_s = summary[:_LAG]
         fix_age_s, imu = _fix_age_s(samples, time_s), samples.imu
         return EstimateHealth(
             bool(self._aligned[ALIGNED]),
@@ -115,9 +119,9 @@ class HealthMonitor:
             math.inf if samples.mag is None else time_s - samples.mag.time_s,
             math.inf if samples.baro is None else time_s - samples.baro.time_s,
             fix_age_s,
-            horizon_s - max(position_s, velocity_s) if has_origin else math.inf,
-            horizon_s - position_s if has_origin and fix_age_s < MISSING_FIX_S else 0.0,
-            *summary[_KNOWN:],
+            unaided_s if has_origin else math.inf,
+            refused_s if has_origin and fix_age_s < MISSING_FIX_S else 0.0,
+            *summary[_LAG:],
         )
 
 

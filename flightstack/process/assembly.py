@@ -235,7 +235,9 @@ def _on_sensors(
         return parts.autopilot, None
     users = Users(parts.area, parts.failsafes, parts.navigator, parts.backend, parts.journal)
     sensor_recorder = SensorRecorder(recorder, parts.places.frame, home)
-    estimation = Estimation(simulator.sensors, parts.now, users, params, sensor_recorder, simulator.truth)
+    estimation = Estimation(
+        simulator.sensors, parts.now, users, params, sensor_recorder, simulator.known_truth
+    )
     estimation.warm_up()
     return SensorAutopilot(parts.autopilot, estimation), estimation
 

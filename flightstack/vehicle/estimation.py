@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from flightstack.commander.estimate_checks import estimate_refusals
@@ -67,9 +67,9 @@ class Estimation:
         users: Users,
         params: ParamStore,
         recorder: SensorRecorder,
-        truth: FloatArray,
+        truth: Callable[[], FloatArray | None],
     ) -> None:
-        """``now.state`` is written in place. ``truth`` is the simulator's state, which only ``recorder`` reads.
+        """``now.state`` is written in place. ``truth`` returns the simulator's state or None, for ``recorder``.
 
         ``params`` has the parameters of the estimator (EKF2_…).
         """

@@ -13,7 +13,7 @@ from flightstack.params.behaviour import Behaviour
 
 GOOD = EstimateHealth(
     aligned=True, has_origin=True, imu_age_s=0.0, imu_is_stuck=False, mag_age_s=0.01, baro_age_s=0.02, fix_age_s=0.1,
-    unaided_s=0.1, refused_s=0.0, horizontal_m=0.5, velocity_m_s=0.1, tilt_rad=0.005, gyro_bias_rad_s=0.005,
+    unaided_s=0.1, refused_s=0.0, lag_s=0.13, horizontal_m=0.5, velocity_m_s=0.1, tilt_rad=0.005, gyro_bias_rad_s=0.005,
     accel_bias_m_s2=0.05, velocity_ratio=0.2, position_ratio=0.2, height_ratio=0.2, heading_ratio=0.3,
 )  # fmt: skip
 
@@ -53,6 +53,7 @@ CONDITIONS = [
     ({"tilt_rad": 0.2}, Failsafe.ATTITUDE_DOUBTFUL, "attitude estimate is doubtful"),
     ({"unaided_s": 5.1}, Failsafe.POSITION_LOST, "position is lost"),
     ({"horizontal_m": 5.1}, Failsafe.POSITION_LOST, "position is lost"),
+    ({"lag_s": 0.6}, Failsafe.POSITION_LOST, "position is lost"),
     ({"refused_s": 1.1}, Failsafe.GNSS_REFUSED, "spoofed GNSS suspected"),
 ]
 

@@ -14,7 +14,7 @@ from flightstack.core.contract import Quaternion, Vector3
 from flightstack.core.geometry import conjugate, quaternion_product, rotate
 from flightstack.estimation.error_state import POSITION, VELOCITY, turn_between
 from flightstack.estimation.estimator import Estimator
-from flightstack.estimation.estimator_params import EstimatorParams
+from flightstack.estimation.estimator_params import EstimatorParams, tuning_of
 from flightstack.estimation.kalman import FUSED, GNSS_POSITION, GNSS_VELOCITY, MAG, RANGE, REFUSED
 from flightstack.estimation.memory import (
     GAP_S,
@@ -38,6 +38,7 @@ from tests.support.flown_sensors import Faults
 PARAMS = EstimatorParams()._replace(gnss_delay_s=flown.GNSS_DELAY_S, delay_s=flown.GNSS_DELAY_S + 0.012)
 GRAVITY = Vector3(0.0, 0.0, -PARAMS.gravity_m_s2)
 STILL = Vector3(0.0, 0.0, 0.0)
+STEPPED, _ = tuning_of({"EKF2_PREDICT_US": 1000.0, "EKF2_GPS_DELAY": 300.0})
 Change = Callable[[Any], Any]
 
 
@@ -220,6 +221,15 @@ def test_fast_gnss_does_not_displace_samples_that_wait() -> None:
     estimator = fly(14.0, Faults(gnss_period=3))  # 83 Hz
     assert estimator.memory["observations"][0, GNSS_VELOCITY, FUSED] > 250.0
     assert abs(estimator.memory["last_gnss_s"][0, 0] - (14.0 - flown.GNSS_DELAY_S)) < 0.05
+
+
+@pytest.mark.parametrize("params", [PARAMS._replace(period_s=0.001, delay_s=0.312), STEPPED])
+def test_filter_moves_with_many_steps_in_its_delay(params: EstimatorParams) -> None:
+    estimator = Estimator(params)
+    for tick in range(1, 3000):
+        estimator.imu(ImuSample(0.001 * tick, 0.001, STILL, GRAVITY))
+    lag_s = estimator.memory["output"][0, 0] - estimator.memory["clock"][0, 0]
+    assert min(params.delay_s, 0.063) <= lag_s < params.delay_s + 0.01
 
 
 def test_imu_gap_is_bridged_in_real_time_and_counted() -> None:
