@@ -20,7 +20,7 @@ MOST_GYRO_BIAS_RAD_S, MOST_ACCEL_BIAS_M_S2 = 0.1125, 0.3
 MOST_RATIO, MOST_HEIGHT_RATIO = 0.5, 1.0
 """Largest mean test ratios: PX4's defaults of COM_ARM_EKF_VEL, _POS, _YAW and _HGT."""
 LATE_S = 0.5
-"""Time from the filter's state to the newest IMU sample at which the filter has stopped; the longest delay is 0.33 s."""
+"""Age of the filter's state at which the filter has stopped; the longest delay is 0.33 s."""
 REFUSED_S = 1.0
 """Time of refused GNSS positions after which spoofing is suspected."""
 
