@@ -212,7 +212,8 @@ empty.
 {sensors}
 `gyro2`, `accel2` and `imu2` are those of the second inertial sensor, a name without a number those of all. A fault of a
 sensor acts on what the simulator sends as HIL_SENSOR, HIL_GPS, DISTANCE_SENSOR and HIL_OPTICAL_FLOW
-([Sensors](sensors.md)), and not on a vehicle that flies on the true state.
+([Sensors](sensors.md)). It is refused on a vehicle that flies on the true state, a fault of the state on a vehicle that
+flies on its sensors.
 
 *Clock*: in lockstep a vehicle notices a stalled clock after 1 s of the machine's clock, not of simulated time
 ([Clocks of other simulators](simulator.md#clocks-of-other-simulators)).
@@ -279,8 +280,8 @@ ON_SENSORS = """
 
 Only a vehicle that flies on its sensors (`--state estimated`) writes these topics: measurements as they arrive, the
 estimator's twice a second, the truth a hundred times. PX4's `Tools/ecl_ekf`, `gcs estimate` and PlotJuggler's layouts
-for PX4 read them. The information `estimator_start` holds the estimator's memory at the start of the log, so that
-`gcs estimate` repeats the flown estimate.
+for PX4 read them. The multi-information message `estimator_start` holds the estimator's memory at the start of the
+log, so that `gcs estimate` repeats the flown estimate.
 """
 
 

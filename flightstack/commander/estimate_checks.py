@@ -10,12 +10,11 @@ from collections.abc import Callable
 
 from flightstack.commander.failsafe import RULES, Action, Failsafe, action_of
 from flightstack.estimation.health import EstimateHealth
+from flightstack.estimation.imu_track import IMU_MISSING_S
 from flightstack.params.behaviour import Behaviour
 
 MISSING_S = 1.0
 """Age of the newest measurement at which a sensor is missing."""
-IMU_MISSING_S = 0.04
-"""The same of the inertial sensor; before it, the rotor speeds are not yet held."""
 MOST_GYRO_BIAS_RAD_S, MOST_ACCEL_BIAS_M_S2 = 0.1125, 0.3
 """Three quarters of the limits that PX4 sets to the biases, EKF2_GYR_B_LIM and EKF2_ABL_LIM."""
 MOST_RATIO, MOST_HEIGHT_RATIO = 0.5, 1.0

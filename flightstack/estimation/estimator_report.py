@@ -1,4 +1,4 @@
-"""What the estimator knows of itself: flags, accuracies, innovations and resets, read from its memory on demand.
+"""Report of the estimator: flags, accuracies, innovations and resets, read from its memory on demand.
 
 Flags have the bits of PX4: ``SolutionFlags`` are ESTIMATOR_STATUS_FLAGS, ``ControlFlags`` and ``RejectionFlags`` those
 of the topic ``estimator_status_flags``.
@@ -14,6 +14,7 @@ import numpy as np
 
 from flightstack.core.contract import Quaternion, Record, Vector3
 from flightstack.estimation.error_state import ATTITUDE, POSITION, WIND, Nominal
+from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import (
     BARO,
     FUSED_S,
@@ -33,6 +34,7 @@ from flightstack.estimation.memory import (
     HAS_GNSS,
     HAS_RANGE,
     LANDED,
+    MAG_FAULT,
     POSITION_RESET,
     RESET_CHANGE,
     VELOCITY_RESET,
@@ -44,6 +46,7 @@ AIDED_S = 1.0
 """Time after its last accepted measurement during which a sensor counts as fused."""
 DEAD_RECKONING_S = 5.0
 """Time without an accepted measurement until a position or velocity is invalid, PX4's EKF2_NOAID_TOUT."""
+_DELAY = EstimatorParams._fields.index("delay_s")
 _TILT_RAD, _YAW_RAD = math.radians(10.0), math.radians(15.0)
 """Deviations above which tilt and yaw are not aligned."""
 _WIND_VARIANCE = 0.5
@@ -79,6 +82,7 @@ class ControlFlags:
     BARO_HEIGHT = 1 << 9
     RANGE_HEIGHT = 1 << 10
     GNSS_HEIGHT = 1 << 11
+    MAG_FAULT = 1 << 18
     VEHICLE_AT_REST = 1 << 26
     INERTIAL_DEAD_RECKONING = 1 << 29
     FAKE_POSITION = 1 << 32
@@ -119,7 +123,7 @@ class Resets(NamedTuple):
 
 
 class EstimatorReport(NamedTuple):
-    """The estimator's knowledge at one time. Deviations are 1σ."""
+    """State and quality of the estimate at one time. Deviations are 1σ."""
 
     time_s: float
     """Time of the output, that of the newest IMU sample."""
@@ -176,20 +180,24 @@ class EstimatorReport(NamedTuple):
         return bool(self.control & ControlFlags.WIND)
 
 
-def estimator_report(memory: Record) -> EstimatorReport:
-    """Return the report of a record of the estimator's ``MEMORY``."""
+def estimator_report(memory: Record, time_s: float, imu_has_failed: bool) -> EstimatorReport:
+    """Return the report of a record of the estimator's ``MEMORY`` at ``time_s`` of the sensors.
+
+    The flags compare with the time at which the horizon is if no sample is late: without samples the horizon stays.
+    """
     rows = [_observation(row) for row in memory["observations"].tolist()]
     variances = tuple(np.diagonal(memory["covariance"]).tolist())
-    now_s, flags = float(memory["clock"][0]), memory["flags"].tolist()
+    now_s, flags = time_s - float(memory["params"][_DELAY]), memory["flags"].tolist()
     velocity, position = rows[GNSS_VELOCITY : GNSS_VELOCITY + 3], rows[GNSS_POSITION : GNSS_POSITION + 3]
     field, height = rows[MAG : MAG + 3], rows[BARO]
     range_finder = rows[RANGE] if flags[HAS_RANGE] else None
     control = _control(now_s, flags, rows, variances)
     rejected = _rejected(velocity, position, height, field, range_finder)
+    solution = _solution(now_s, flags, rows, control, rejected)
     return EstimatorReport(
         time_s=float(memory["output"][0]),
-        horizon_s=now_s,
-        solution=_solution(now_s, flags, rows, control, rejected),
+        horizon_s=float(memory["clock"][0]),
+        solution=solution & ~SolutionFlags.ATTITUDE if imu_has_failed else solution,
         control=control,
         rejected=rejected,
         nominal=nominal_of(memory),
@@ -257,6 +265,7 @@ def _control(
         (ControlFlags.BARO_HEIGHT, bool(flags[HAS_BARO]) and fused(BARO)),
         (ControlFlags.RANGE_HEIGHT, bool(flags[HAS_RANGE]) and fused(RANGE)),
         (ControlFlags.GNSS_HEIGHT, has_gnss and fused(GNSS_POSITION + 2)),
+        (ControlFlags.MAG_FAULT, bool(flags[MAG_FAULT])),
         (ControlFlags.VEHICLE_AT_REST, at_rest),
         (ControlFlags.INERTIAL_DEAD_RECKONING, not (has_position or has_velocity or at_rest)),
         (ControlFlags.FAKE_POSITION, fused(HOLD_POSITION, 2)),

@@ -13,6 +13,8 @@ IMU_SIZE = 8
 """Array form of an IMU sample: time, duration, rate (3), specific force (3)."""
 WINDOW = 100
 """Samples that are kept, of which the vibration is computed; the length of PX4's filter."""
+IMU_MISSING_S = 0.04
+"""Age of the newest sample at which the sensor is missing; before it, the rotor speeds are not yet held."""
 _pack = struct.Struct(f"={IMU_SIZE}d").pack_into
 
 

@@ -76,7 +76,7 @@ def pop(rings: Rings, ring: int, size: int) -> None:
 @compiled
 def take_mean(mean: FloatArray, row: FloatArray, period_s: float) -> bool:
     """Add a sample to a mean; return True, with the mean in ``row``, if ``period_s`` passed since the last one."""
-    if row[0] - mean[_LAST_S] > period_s:  # a gap: older samples say nothing about the present
+    if row[0] - mean[_LAST_S] > period_s:  # a gap: the older samples are outdated
         for i in range(_PUSHED_S):
             mean[i] = 0.0
     mean[_LAST_S] = row[0]

@@ -7,37 +7,49 @@ from functools import cached_property
 from flightstack.core.contract import FloatArray, Quaternion, Record, Vector3
 from flightstack.estimation.error_state import Nominal
 from flightstack.estimation.estimator_report import EstimatorReport, estimator_report, nominal_of
+from flightstack.estimation.health import STUCK_SAMPLES
+from flightstack.estimation.imu_track import IMU_MISSING_S
 from flightstack.estimation.motion_covariance import motion_covariance, pose_covariance, twist_covariance
 from flightstack.estimation.sensor_feed import NewestSamples
 from flightstack.estimation.vibration import Vibration, vibration_of
 
 
 class Sensed:
-    """What a vehicle that flies on its sensors knows at one time."""
+    """Estimate and measurements of a vehicle that flies on its sensors, at one time."""
 
-    def __init__(self, memory: Record, samples: NewestSamples, has_origin: bool = True) -> None:
+    def __init__(
+        self,
+        memory: Record,
+        samples: NewestSamples,
+        has_origin: bool = True,
+        time_s: float | None = None,
+    ) -> None:
         """``memory`` is the estimator's record; both change with time, so read this before the next sample.
 
-        ``has_origin``: the vehicle knows where it is on earth, since its first fix.
+        ``has_origin`` is True after the first fix. ``time_s`` is the time of the newest message of sensors, which
+        advances without samples; None means the time of the newest sample of the inertial sensor.
         """
         self.memory = memory
         self.samples = samples
         self.has_origin = has_origin
+        self.time_s = float(memory["output"][0]) if time_s is None else time_s
+        """Time of the sensors."""
 
     @cached_property
     def report(self) -> EstimatorReport:
-        """The estimator's knowledge of itself."""
-        return estimator_report(self.memory)
+        """Flags, accuracies, innovations and resets of the estimator."""
+        return estimator_report(self.memory, self.time_s, self.imu_has_failed)
+
+    @cached_property
+    def imu_has_failed(self) -> bool:
+        """True if the inertial sensor is missing, or repeats its measurement."""
+        imu, track = self.samples.imu, self.samples.imu_track
+        return imu is None or self.time_s - imu.time_s > IMU_MISSING_S or track.repeats >= STUCK_SAMPLES
 
     @cached_property
     def nominal(self) -> Nominal:
         """State at the delayed horizon."""
         return nominal_of(self.memory)
-
-    @property
-    def time_s(self) -> float:
-        """Time of the newest sample of the inertial sensor."""
-        return float(self.memory["output"][0])
 
     @cached_property
     def vibration(self) -> Vibration:

@@ -1,4 +1,4 @@
-"""Topics of the estimator's knowledge, with PX4's names and fields, so that PX4's tools for its estimator read them."""
+"""Topics of the estimator, with PX4's names and fields, so that PX4's tools for its estimator read them."""
 
 from __future__ import annotations
 
@@ -69,6 +69,7 @@ _CONTROL: dict[str, int | None] = {
     "cs_ev_pos": None,
     "cs_ev_yaw": None,
     "cs_ev_hgt": None,
+    "cs_mag_fault": ControlFlags.MAG_FAULT,
     "cs_vehicle_at_rest": ControlFlags.VEHICLE_AT_REST,
     "cs_inertial_dead_reckoning": ControlFlags.INERTIAL_DEAD_RECKONING,
     "cs_fake_pos": ControlFlags.FAKE_POSITION,
@@ -101,28 +102,41 @@ def _flag_fields(column: int, flags: Mapping[str, int | None]) -> list[Field]:
 _SAMPLE = Field("uint64_t", "timestamp_sample", 0, AT.horizon_us)
 
 
-def _innovation_topic(name: str, first: int, default: float) -> Topic:
-    """Return a topic of PX4's ``estimator_innovations`` kind, of values by row of the filter's observations."""
+def _negated(at: int, length: int) -> Derived:
+    """Return a function of the rows: the values from a column on, with the opposite sign."""
+    columns = slice(at, at + length) if length else at
+    return lambda rows: -rows[:, columns]
+
+
+def _innovation_topic(name: str, first: int, default: float, is_signed: bool = False) -> Topic:
+    """Return a topic of PX4's ``estimator_innovations`` kind, of values by row of the filter's observations.
+
+    With ``is_signed``, innovations have PX4's sign: the prediction less the measurement, in the axis of the field,
+    down for heights. The filter's are the measurement less the prediction, upwards for barometer and range.
+    """
 
     def missing(field: str, length: int = 0) -> Field:
         return Field("float", field, length, default=default)
+
+    def opposite(field: str, length: int, row: int) -> Field:
+        return Field("float", field, length, _negated(first + row, length) if is_signed else first + row)
 
     return Topic(
         name,
         (
             _SAMPLE,
-            Field("float", "gps_hvel", 2, first + GNSS_VELOCITY),
-            Field("float", "gps_vvel", 0, first + GNSS_VELOCITY + 2),
-            Field("float", "gps_hpos", 2, first + GNSS_POSITION),
-            Field("float", "gps_vpos", 0, first + GNSS_POSITION + 2),
+            opposite("gps_hvel", 2, GNSS_VELOCITY),
+            opposite("gps_vvel", 0, GNSS_VELOCITY + 2),
+            opposite("gps_hpos", 2, GNSS_POSITION),
+            opposite("gps_vpos", 0, GNSS_POSITION + 2),
             missing("ev_hvel", 2), missing("ev_vvel"), missing("ev_hpos", 2), missing("ev_vpos"),
             Field("float", "rng_vpos", 0, first + RANGE),
             Field("float", "baro_vpos", 0, first + BARO),
             missing("aux_hvel", 2), missing("aux_vvel"), missing("flow", 2), missing("terr_flow", 2),
             missing("heading"),
-            Field("float", "mag_field", 3, first + MAG),
+            opposite("mag_field", 3, MAG),
             missing("drag", 2), missing("airspeed"), missing("beta"),
-            Field("float", "hagl", 0, first + RANGE),
+            opposite("hagl", 0, RANGE),
             missing("hagl_rate"),
         ),
     )  # fmt: skip
@@ -206,7 +220,7 @@ ESTIMATOR = Group(
                 Field("float", "delta_angle_coning_metric", 0, AT.vibration),
             ),
         ),
-        _innovation_topic("estimator_innovations", AT.innovations, math.nan),
+        _innovation_topic("estimator_innovations", AT.innovations, math.nan, is_signed=True),
         _innovation_topic("estimator_innovation_variances", AT.innovation_variances, math.nan),
         _innovation_topic("estimator_innovation_test_ratios", AT.squared_ratios, math.nan),
     ),

@@ -177,10 +177,10 @@ class FlightLog:
         self.flush()
         self._write(ulog.logged_string(time_us, level, text))
 
-    def information(self, key: str, value: bytes) -> None:
-        """Write an information message after the buffered rows."""
+    def binary_information(self, key: str, value: bytes) -> None:
+        """Write bytes as a multi-information message after the buffered rows."""
         self.flush()
-        self._write(ulog.information(key, value))
+        self._write(ulog.binary_information(key, value))
 
     def parameter(self, name: str, value: float) -> None:
         """Write a changed parameter after the buffered rows."""

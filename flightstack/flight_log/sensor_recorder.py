@@ -1,4 +1,4 @@
-"""Record measurements, the estimator's knowledge and the truth in the flight log of a vehicle on its sensors."""
+"""Record measurements, estimate and truth in the flight log of a vehicle on its sensors."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class SensorRecorder:
             if log is not None:
                 self._offset_m = self._frame.to_ned(self._true_frame.origin)
                 self._truth_us = self._global_us = self._estimator_us = 0
-                log.information(ESTIMATOR_START, estimator())
+                log.binary_information(ESTIMATOR_START, estimator())
 
     def imu(self, time_us: int, dt_us: int, row: FloatArray) -> None:
         """Record a sample of the inertial sensor that the estimator takes, in its array form."""
@@ -78,12 +78,28 @@ class SensorRecorder:
             group, fill = known
             fill(log.sampled[group.name].append(round(sample.time_s * 1e6)), sample)
 
-    def state(self, time_us: int, truth: FloatArray, sense: Callable[[], Sensed]) -> None:
-        """Record the true state, shape (13,), and what ``sense`` returns, if they are due."""
+    def state(
+        self, time_us: int, truth: Callable[[], FloatArray | None], sense: Callable[[], Sensed]
+    ) -> None:
+        """Record the true state, shape (13,), and the estimator from ``sense``, if they are due.
+
+        ``truth`` returns None before the first true state.
+        """
         log = self._log
         if log is None or time_us < self._truth_us:
             return
         self._truth_us = time_us + TRUTH_INTERVAL_US
+        state = truth()
+        if state is not None:
+            self._record_truth(log, time_us, state)
+        if time_us >= self._estimator_us:
+            self._estimator_us = time_us + ESTIMATOR_INTERVAL_US
+            sensed = sense()
+            fill_estimator(log.sampled[ESTIMATOR.name].append(time_us), sensed)
+            if sensed.report.wind_is_observed:
+                fill_wind(log.sampled[WIND_GROUP.name].append(time_us), sensed)
+
+    def _record_truth(self, log: FlightLog, time_us: int, truth: FloatArray) -> None:
         row = log.sampled[TRUTH_GROUP.name].append(time_us)
         row[:] = truth
         row[:3] += self._offset_m
@@ -91,9 +107,3 @@ class SensorRecorder:
             self._global_us = time_us + GLOBAL_INTERVAL_US
             place = self._true_frame.to_geo(Vector3(*truth[:3].tolist()))
             log.sampled[TRUTH_GLOBAL_GROUP.name].append(time_us)[:] = place
-        if time_us >= self._estimator_us:
-            self._estimator_us = time_us + ESTIMATOR_INTERVAL_US
-            sensed = sense()
-            fill_estimator(log.sampled[ESTIMATOR.name].append(time_us), sensed)
-            if sensed.report.wind_is_observed:
-                fill_wind(log.sampled[WIND_GROUP.name].append(time_us), sensed)

@@ -63,10 +63,14 @@ def _keyed(kind: str, key: str, value: bytes) -> bytes:
     return _message(kind, bytes([len(name)]) + name + value)
 
 
-def information(key: str, value: str | int | float | bytes) -> bytes:
+def binary_information(key: str, value: bytes) -> bytes:
+    """Return a multi-information message of one part: tools do not print its value, as they do an information's."""
+    name = f"uint8_t[{len(value)}] {key}".encode()
+    return _message("M", bytes([0, len(name)]) + name + value)
+
+
+def information(key: str, value: str | int | float) -> bytes:
     """Return an information message; an int is stored as int32_t if it fits, else int64_t, a float as double."""
-    if isinstance(value, bytes):
-        return _keyed("I", f"uint8_t[{len(value)}] {key}", value)
     if isinstance(value, str):
         text = value.encode()
         return _keyed("I", f"char[{len(text)}] {key}", text)

@@ -68,12 +68,17 @@ class SafePlaces:
         self.set_rally(self._rally_items)
         return None
 
-    def move_origin(self, origin: GeoPoint) -> None:
-        """Move the origin of the local frame, and home with it unless a user has set home; keep all other places."""
+    def move_origin(self, origin: GeoPoint) -> str | None:
+        """Move the origin of the local frame, and home with it unless a user has set home; keep all other places.
+
+        Return the reason if the home of the user is refused and moves with the origin, or None.
+        """
         self.frame.move_to(origin)
         self.set_fence(self._fence_items)
-        if not self.home_is_chosen or self.set_home(self.home_point, chosen=True) is not None:
+        refusal = self.set_home(self.home_point, chosen=True) if self.home_is_chosen else None
+        if refusal is not None or not self.home_is_chosen:
             self.set_home(origin, chosen=False)
+        return refusal
 
     def has_left_home(self, position_ned_m: Vector3) -> bool:
         """Return True if a position differs from home by more than ``HOME_SPREAD_M``."""

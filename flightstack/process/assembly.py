@@ -235,7 +235,9 @@ def _on_sensors(
         return parts.autopilot, None
     users = Users(parts.area, parts.failsafes, parts.navigator, parts.backend, parts.journal)
     sensor_recorder = SensorRecorder(recorder, parts.places.frame, home)
-    estimation = Estimation(simulator.sensors, parts.now, users, params, sensor_recorder, simulator.truth)
+    estimation = Estimation(
+        simulator.sensors, parts.now, users, params, sensor_recorder, simulator.known_truth
+    )
     estimation.warm_up()
     return SensorAutopilot(parts.autopilot, estimation), estimation
 
@@ -271,13 +273,16 @@ def reboot_config(stack: Stack, config: StackConfig) -> StackConfig:
 
 
 def transfer_state(old: Stack, new: Stack) -> None:
-    """Copy peers, plans, home and the newest state to the new stack at a reboot. An estimator begins anew.
+    """Copy peers, plans, home and the newest state to the new stack at a reboot. The estimator restarts.
 
+    Until the first fix, a stack with an estimator has the origin of the old one, near which home was checked.
     Vehicle clock, modes, failsafes, sequence numbers, transfers, counters and timing restart. The process keeps signing
     timestamps, the number of the next log, and the parameter file for all stacks.
     """
     for address, permanent in old.ground.addresses():
         new.ground.add_peer(address, permanent)
+    if new.estimation is not None:
+        new.area.move_origin(old.places.frame.origin)
     new.area.set_home(old.area.home, old.places.home_is_chosen)
     new.ground.adopt_plans(old.ground)
     new.ground.last_heard_s = old.ground.last_heard_s

@@ -87,6 +87,7 @@ class SimulatorEndpoint:
         self.sensors = SensorInbox() if uses_sensors else None
         """Messages of the sensors, of a vehicle that flies on them."""
         self._uses_hil = uses_sensors  # until the simulator sends FS_PLANT_STATE
+        self._has_hil_state = False  # a HIL_STATE_QUATERNION arrived
         self.truth: FloatArray = self._plant.state
         """True state, shape (13,)."""
         self.truth[6] = 1.0
@@ -117,6 +118,11 @@ class SimulatorEndpoint:
         self.rotor_speed_rad_s[:] = other.rotor_speed_rad_s
         self._state_us = other._state_us  # the vehicle clock restarts
         self.battery, self.has_state, self._uses_hil = other.battery, other.has_state, other._uses_hil
+        self._has_hil_state = other._has_hil_state
+
+    def known_truth(self) -> FloatArray | None:
+        """Return the true state of a vehicle on sensors, shape (13,); None if the simulator did not send it yet."""
+        return None if self._uses_hil and not self._has_hil_state else self.truth
 
     def initial_requests(self, interval_us: int) -> bytes:
         """Return the messages to send after connecting: a heartbeat and requests for FS_PLANT_STATE and sensors."""
@@ -324,6 +330,7 @@ class SimulatorEndpoint:
 
     def _take_hil(self, m: Message) -> None:
         self._uses_hil = True if self.sensors is None else self._uses_hil
+        self._has_hil_state = True
         position = self._frame.to_ned(GeoPoint(m.lat / 1e7, m.lon / 1e7, m.alt / 1e3))
         velocity = (m.vx / 100.0, m.vy / 100.0, m.vz / 100.0)
         rates = (m.rollspeed, m.pitchspeed, m.yawspeed)

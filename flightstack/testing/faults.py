@@ -11,7 +11,7 @@ from flightstack.core.errors import ConfigError
 from flightstack.testing.link import Channel
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.plant.fault_schedule import parse_fault
-from sim_bridge.plant.fault_table import Fault, Kind
+from sim_bridge.plant.fault_table import STATE_KINDS, Fault, Kind
 
 if TYPE_CHECKING:
     from flightstack.testing.world import World
@@ -73,6 +73,12 @@ def _parsed(text: str, rotors: int) -> Fault:
 def _simulator_fault(world: World, text: str, for_s: float | None) -> None:
     simulator = world.engine.simulator
     fault = _parsed(text, len(world.engine.stack.vehicle.rotors))
+    if fault.kind in STATE_KINDS and simulator.sensors is not None:
+        raise ConfigError(
+            "fault",
+            text,
+            'cannot act: the vehicle flies on its sensors; name a sensor, or set state to "truth"',
+        )
     if fault.kind is Kind.STATE_DROP:
         raise ConfigError("fault", text, "is impossible in lockstep: both sides would wait for each other")
     if fault.sensor and simulator.sensors is None:

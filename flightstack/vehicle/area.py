@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from flightstack.commander.fence_monitor import FenceMonitor
 from flightstack.core.contract import Vector3
-from flightstack.core.enums import Mode
+from flightstack.core.enums import Mode, Severity
 from flightstack.core.geodesy import GeoPoint
 from flightstack.core.portable_math import distance
 from flightstack.guidance.navigator import Navigator
@@ -74,8 +74,10 @@ class FlightArea:
         return self.set_home(self._places.frame.to_geo(self._here()), chosen=False)
 
     def move_origin(self, origin: GeoPoint) -> None:
-        """Move the origin of the local frame to the position at which the vehicle knows where it is."""
-        self._places.move_origin(origin)
+        """Move the origin of the local frame, as at the first fix; announce a chosen home that cannot stay."""
+        refusal = self._places.move_origin(origin)
+        if refusal is not None:
+            self._journal.say(Severity.WARNING, f"Home moved to the origin: {refusal}")
         self._journal.origin(origin)
         self.fence.set_fence(self._places.fence)
         self._home_moved()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from flightstack.commander.estimate_checks import estimate_refusals
@@ -16,7 +16,14 @@ from flightstack.core.portable_math import distance
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits, tuning_of
 from flightstack.estimation.health import NO_HEALTH, HealthMonitor
-from flightstack.estimation.memory import POSITION_RESET, RESET_SUM, VELOCITY_RESET, YAW_RESET, YAW_RESET_SUM
+from flightstack.estimation.memory import (
+    MAG_FAULT,
+    POSITION_RESET,
+    RESET_SUM,
+    VELOCITY_RESET,
+    YAW_RESET,
+    YAW_RESET_SUM,
+)
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed
 from flightstack.estimation.sensor_samples import BaroSample, ImuSample
@@ -67,9 +74,9 @@ class Estimation:
         users: Users,
         params: ParamStore,
         recorder: SensorRecorder,
-        truth: FloatArray,
+        truth: Callable[[], FloatArray | None],
     ) -> None:
-        """``now.state`` is written in place. ``truth`` is the simulator's state, which only ``recorder`` reads.
+        """``now.state`` is written in place. ``truth`` returns the simulator's state or None, for ``recorder``.
 
         ``params`` has the parameters of the estimator (EKF2_…).
         """
@@ -86,9 +93,12 @@ class Estimation:
         self._monitor = HealthMonitor(self.estimator.memory)
         self._landed = False
         self._health_due_us = 0
+        self._time_us = 0  # of the newest message of the sensors
         # as memory: a number of an array takes four times as long to read
         self._resets = self.estimator.memory["resets"][0].data
         self._seen, self._counts = self._resets.tolist(), (0.0, 0.0, 0.0)
+        self._flags = self.estimator.memory["flags"][0].data
+        self._mag_has_failed = False
 
     @property
     def samples(self) -> NewestSamples:
@@ -97,7 +107,7 @@ class Estimation:
 
     def sensed(self) -> Sensed:
         """Return what the estimator and its sensors know now; valid until the next update."""
-        return Sensed(self.estimator.memory[0], self._feed.newest, self._now.has_state)
+        return Sensed(self.estimator.memory[0], self._feed.newest, self._now.has_state, self._time_us * 1e-6)
 
     def _on_parameter(self, name: str, value: float) -> None:
         if name in ESTIMATOR_SPECS:
@@ -126,14 +136,16 @@ class Estimation:
             self._landed = now.landed
             self.estimator.set_landed(now.landed)
         reports = self._sensors.take()
+        if reports:
+            self._time_us = reports[-1].time_us
         is_known = self._feed.update(reports)
         if is_known and not now.has_state:
             self._find_origin()
         self._recorder.state(time_us, self._truth, self.sensed)
         if (resets[POSITION_RESET], resets[VELOCITY_RESET], resets[YAW_RESET]) != self._counts:
             self._follow_resets()
-        if reports and reports[-1].time_us >= self._health_due_us:
-            self._update_health(reports[-1].time_us)
+        if reports and self._time_us >= self._health_due_us:
+            self._update_health(self._time_us)
 
     def _find_origin(self) -> None:
         frame = self.estimator.frame
@@ -171,6 +183,9 @@ class Estimation:
         limit_m = now.behaviour.position_accuracy_m
         self.health = self._monitor.update(self._feed.newest, now.has_state, limit_m, time_us * 1e-6)
         users.failsafes.take_health(self.health)
+        if self._flags[MAG_FAULT] and not self._mag_has_failed:
+            self._mag_has_failed = True
+            users.journal.say(Severity.WARNING, "Compass disagrees with GNSS and is no longer used")
         failsafes = users.failsafes
         changed = users.navigator.set_known(failsafes.position_is_known, failsafes.velocity_is_known)
         if changed and now.flying:  # reference and integrators hold what followed from the position

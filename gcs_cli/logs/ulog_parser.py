@@ -20,7 +20,7 @@ from flightstack.core.errors import ConfigError
 from flightstack.flight_log.ulog import DATA_TYPE, HEADER_SIZE, MESSAGE_HEADER, MESSAGE_TYPES
 
 DAMAGE = (ULogException, struct.error, ValueError, KeyError, IndexError, OverflowError, TypeError)
-"""Exceptions of pyulog, and of those who read its result, for a damaged log."""
+"""Exceptions for a damaged log, raised by pyulog or by code that reads its result."""
 _ROW_AT = 5
 """Offset of the row in a message of data: behind size, type and subscription id."""
 _SUBSCRIPTION_TYPE, _FLAG_TYPE = ord("A"), ord("B")

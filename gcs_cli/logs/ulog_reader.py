@@ -30,7 +30,7 @@ def read_ulog(content: bytes, source: str) -> Recording:
         epoch_us=_epoch_us(topics),
         topics=topics,
         texts=tuple(sorted(_texts(log))),
-        info=dict(log.msg_info_dict),
+        info={**_binary_information(log), **log.msg_info_dict},
         parameters=dict(log.initial_parameters),
         changes=tuple(
             ParameterChange(int(time_us), name, float(value))
@@ -40,6 +40,14 @@ def read_ulog(content: bytes, source: str) -> Recording:
         damaged=damaged,
         vehicle=_vehicle(log.initial_parameters),
     )
+
+
+def _binary_information(log: Any) -> dict[str, bytes]:
+    """Return the multi-information messages that hold bytes, the first of each key with its continuations."""
+    found = {key: values[0] for key, values in log.msg_info_multiple_dict.items()}
+    return {
+        key: b"".join(parts) for key, parts in found.items() if all(isinstance(part, bytes) for part in parts)
+    }
 
 
 def _topics(log: Any) -> Iterator[Topic]:

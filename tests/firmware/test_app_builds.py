@@ -13,8 +13,7 @@ from tests.firmware.app_support import FIRMWARE, LIBRARY, PORTABLE, build, sourc
 from tests.firmware.codec_support import compiler
 from tests.support.tools import missing
 
-APP_TESTS = ("pil", "windows", "baud", "free", "services", "params", "damage")
-TESTS = [str(Path(__file__).with_name(f"test_app_{name}.py")) for name in APP_TESTS]
+TESTS = [str(path) for path in sorted(Path(__file__).parent.glob("test_app_*.py")) if path != Path(__file__)]
 NEEDLESS = "double"
 """Part of the names of tests that would compile another library."""
 

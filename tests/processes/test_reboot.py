@@ -1,4 +1,4 @@
-"""A reboot by command: the vehicle begins anew, and keeps what it was given."""
+"""A reboot by command: the vehicle restarts, and keeps plans, home and parameters."""
 
 from __future__ import annotations
 

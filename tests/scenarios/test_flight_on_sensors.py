@@ -60,6 +60,7 @@ def test_magnetometer_turned_at_boot_is_replaced_by_gnss_velocity() -> None:
         world.run_for(8.0)
         estimator, truth = world.engine.stack.estimation.estimator, world.engine.simulator.frame.state
         assert estimator.memory["flags"][0, MAG_FAULT] == 1
+        assert sum("Compass disagrees with GNSS" in text for text in world.texts) == 1
         error = turn_between(Quaternion(*truth[6:10].tolist()), estimator.state().attitude)
         assert abs(math.degrees(error)) < 8.0  # measured 2; 50 if the filter follows alone
 

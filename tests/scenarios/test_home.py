@@ -12,6 +12,7 @@ from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.config import DEFAULT_HOME
 from flightstack.plan import MissionItem
+from flightstack.process.assembly import transfer_state
 from flightstack.testing import RefusedError, World
 from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.summary import item_ned_m
@@ -163,3 +164,41 @@ def test_moved_origin_leaves_places_where_they_are() -> None:
         area.move_origin(FRAME.to_geo(Vector3(-2.0, 5.0, 8.0)))
         assert area.home == corner  # set by a user
         assert places.home.altitude_m == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(
+    ("north_m", "down_m", "reason"),
+    [
+        (150_000.0, 0.0, "home is more than 100 km from where the vehicle started"),
+        (0.0, -1500.0, "home is more than 1000 m above or below where the vehicle started"),
+    ],
+)
+def test_home_that_the_first_fix_refuses_is_announced(north_m: float, down_m: float, reason: str) -> None:
+    with World() as world:
+        stack = world.engine.stack
+        home = GeoPoint(DEFAULT_HOME.latitude_deg + 0.01, DEFAULT_HOME.longitude_deg, DEFAULT_HOME.altitude_m)
+        origin = FRAME.to_geo(Vector3(north_m, 0.0, down_m))
+        assert stack.area.set_home(home) is None
+        stack.area.move_origin(origin)
+        assert stack.area.home == origin
+        assert stack.journal.texts[-1].severity == mavlink.MAV_SEVERITY_WARNING
+        assert stack.journal.texts[-1].text == f"Home moved to the origin: {reason}"
+
+
+def test_origin_without_a_chosen_home_moves_home_silently() -> None:
+    with World() as world:
+        stack = world.engine.stack
+        count = len(stack.journal.texts)
+        stack.area.move_origin(FRAME.to_geo(Vector3(150_000.0, 0.0, 0.0)))
+        assert len(stack.journal.texts) == count
+
+
+def test_reboot_on_sensors_keeps_a_home_near_the_first_fix() -> None:
+    """The first fix may be far from the default origin, which a rebooted stack has at first."""
+    with World(state="estimated") as old, World(state="estimated") as new:
+        place = FRAME.to_geo(Vector3(150_000.0, 0.0, 0.0))
+        old.engine.stack.area.move_origin(place)
+        assert old.engine.stack.area.set_home(place) is None
+        transfer_state(old.engine.stack, new.engine.stack)
+        assert new.engine.stack.area.home == place
+        assert new.engine.stack.places.home_is_chosen

@@ -105,6 +105,7 @@ def test_filter_repeats_the_flown_estimate_from_the_log(content: bytes) -> None:
 
 def test_filter_starts_anew_on_the_log_of_another_version(content: bytes) -> None:
     recording = read_ulog(content, "hop")
+    assert ESTIMATOR_START not in ULog(io.BytesIO(content)).msg_info_dict  # ulog_info prints each of these
     assert ESTIMATOR_START not in recording.facts  # which exports and a run with --param use
     start = bytes(4) + recording.info[ESTIMATOR_START][4:]
     result = estimate_log(replace(recording, info={**recording.info, ESTIMATOR_START: start}))

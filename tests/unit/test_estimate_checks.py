@@ -48,13 +48,27 @@ def test_every_preflight_check_of_the_estimate_is_tested() -> None:
     assert {reason for _, reason in REFUSED} == {text for text, _ in PREFLIGHT}
 
 
-def test_condition_that_acts_in_the_air_prevents_arming() -> None:
-    refused = GOOD._replace(refused_s=2.0)
-    assert estimate_refusals(refused, Behaviour()) == ()  # a warning
-    reasons = ("spoofed GNSS suspected",)
-    assert estimate_refusals(refused, Behaviour(gnss_doubt_action=2)) == reasons
-    assert estimate_refusals(GOOD._replace(tilt_rad=0.2), Behaviour()) == ("attitude estimate is doubtful",)
-    assert estimate_refusals(GOOD._replace(lag_s=0.6), Behaviour()) == ("position is lost",)
+CONDITIONS = [
+    ({"imu_age_s": 0.05}, Failsafe.IMU_FAULT, "inertial sensor is missing or stuck"),
+    ({"imu_is_stuck": True}, Failsafe.IMU_FAULT, "inertial sensor is missing or stuck"),
+    ({"tilt_rad": 0.2}, Failsafe.ATTITUDE_DOUBTFUL, "attitude estimate is doubtful"),
+    ({"unaided_s": 5.1}, Failsafe.POSITION_LOST, "position is lost"),
+    ({"is_inaccurate": True}, Failsafe.POSITION_LOST, "position is lost"),
+    ({"lag_s": 0.6}, Failsafe.POSITION_LOST, "position is lost"),
+    ({"refused_s": 1.1}, Failsafe.GNSS_REFUSED, "spoofed GNSS suspected"),
+]
+
+
+@pytest.mark.parametrize(("change", "_", "reason"), CONDITIONS)
+def test_condition_that_acts_in_the_air_prevents_arming(change: dict, _: Failsafe, reason: str) -> None:
+    for action in (0, 1):  # of a lost position: altitude mode, land
+        behaviour = Behaviour(position_loss_action=action, gnss_doubt_action=2)
+        assert estimate_refusals(GOOD._replace(**change), behaviour) == (reason,)
+
+
+def test_condition_that_only_warns_does_not_prevent_arming() -> None:
+    doubtful = GOOD._replace(refused_s=2.0, tilt_rad=0.2)
+    assert estimate_refusals(doubtful, Behaviour(gnss_doubt_action=0, attitude_doubt_action=0)) == ()
 
 
 def test_estimate_before_the_first_measurement_is_refused() -> None:
@@ -62,19 +76,10 @@ def test_estimate_before_the_first_measurement_is_refused() -> None:
     assert "the attitude is not aligned yet" in estimate_refusals(NO_HEALTH, Behaviour())
 
 
-@pytest.mark.parametrize(
-    ("change", "failsafe"),
-    [
-        ({"imu_age_s": 0.05}, Failsafe.IMU_FAULT),
-        ({"imu_is_stuck": True}, Failsafe.IMU_FAULT),
-        ({"tilt_rad": 0.2}, Failsafe.ATTITUDE_DOUBTFUL),
-        ({"unaided_s": 5.1}, Failsafe.POSITION_LOST),
-        ({"is_inaccurate": True}, Failsafe.POSITION_LOST),
-        ({"lag_s": 0.6}, Failsafe.POSITION_LOST),
-        ({"refused_s": 1.1}, Failsafe.GNSS_REFUSED),
-    ],
-)
-def test_each_fault_of_the_estimate_is_a_condition_in_flight(change: dict, failsafe: Failsafe) -> None:
+@pytest.mark.parametrize(("change", "failsafe", "_"), CONDITIONS)
+def test_each_fault_of_the_estimate_is_a_condition_in_flight(
+    change: dict, failsafe: Failsafe, _: str
+) -> None:
     assert estimate_failsafes(GOOD._replace(**change), Behaviour()) == {failsafe}
 
 

@@ -60,6 +60,18 @@ def test_fault_of_a_sensor_is_rejected_on_the_true_state() -> None:
     assert link.error is None
 
 
+@pytest.mark.parametrize("fault", ["state:freeze", "state:nan", "state:drop", "state:late=0.01"])
+@pytest.mark.parametrize("flags", [ARMED_FLAG, ARMED_FLAG | LOCKSTEP_FLAG])
+def test_fault_of_the_state_is_rejected_on_sensors(fault: str, flags: int) -> None:
+    link = linked(f"{fault}@100")
+    send(link, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAVLINK_MSG_ID_HIL_SENSOR, 2000)
+    link.receive(memoryview(bytes(command(flags=flags).frame)))
+    assert link.error == (
+        f"{fault.partition('=')[0]} cannot act: the flight stack flies on its sensors; start it with --state truth, "
+        "or use a fault of a sensor, such as sensor:imu:freeze"
+    )
+
+
 def test_lockstep_goes_on_with_another_clock() -> None:
     link = linked("clock jump 5 @0.004", "clock stalled @0.008-0.02")
     for _ in range(20):

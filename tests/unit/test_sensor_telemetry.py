@@ -14,6 +14,7 @@ from flightstack.core.geometry import conjugate, quaternion_product, rotate, rot
 from flightstack.estimation.error_state import ATTITUDE, POSITION, VELOCITY, read_nominal, turned
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_report import ControlFlags, RejectionFlags, SolutionFlags
+from flightstack.estimation.health import STUCK_SAMPLES
 from flightstack.estimation.imu_track import ImuTrack
 from flightstack.estimation.motion_covariance import motion_covariance, pose_covariance, twist_covariance
 from flightstack.estimation.sensed import Sensed
@@ -23,8 +24,6 @@ from flightstack.estimation.vibration import vibration_of
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 from flightstack.services.telemetry.streams import (
-    SENSOR_API_RATES_HZ,
-    SENSOR_GROUND_RATES_HZ,
     Streams,
     default_rates_hz,
 )
@@ -80,7 +79,7 @@ def test_report_of_a_good_flight_has_good_flags() -> None:
     assert report.resets.position == report.resets.velocity == 0
 
 
-def test_report_before_alignment_claims_nothing() -> None:
+def test_report_before_alignment_has_no_flags() -> None:
     report = Sensed(Estimator().memory[0], NewestSamples()).report
     assert report.solution == 0
     assert report.control == 0
@@ -232,6 +231,10 @@ def test_gps_raw_of_a_silent_receiver_has_no_fix() -> None:
     assert (m.fix_type, m.satellites_visible, m.lat) == (mavlink.GPS_FIX_TYPE_NO_GPS, 0, 0)
 
 
+IMU = mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
+BARO = mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+
+
 def test_sys_status_has_the_health_of_each_sensor() -> None:
     healthy = the(mavlink.MAVLINK_MSG_ID_SYS_STATUS)
     gps, mag = mavlink.MAV_SYS_STATUS_SENSOR_GPS, mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
@@ -249,6 +252,45 @@ def test_sys_status_has_the_health_of_each_sensor() -> None:
     m = the(mavlink.MAVLINK_MSG_ID_SYS_STATUS, without_fix)
     assert not m.onboard_control_sensors_health & gps
     assert not m.onboard_control_sensors_present & mag
+
+
+def silent_after(silent_s: float) -> Sensed:
+    """Return what the vehicle knows ``silent_s`` after the last sample of any sensor."""
+    sensed, estimator = sensed_after(SECONDS)
+    return Sensed(estimator.memory[0], sensed.samples, time_s=SECONDS + silent_s)
+
+
+def test_health_of_sensors_is_bad_after_the_imu_dies() -> None:
+    healthy = the(mavlink.MAVLINK_MSG_ID_SYS_STATUS, silent_after(0.1)).onboard_control_sensors_health
+    assert not healthy & (IMU | mavlink.MAV_SYS_STATUS_AHRS)
+    assert healthy & BARO  # its last measurement is not yet old
+    gps, mag = mavlink.MAV_SYS_STATUS_SENSOR_GPS, mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
+    m = the(mavlink.MAVLINK_MSG_ID_SYS_STATUS, silent_after(10.0))
+    assert m.onboard_control_sensors_present & (IMU | BARO | gps | mag) == IMU | BARO | gps | mag
+    assert not m.onboard_control_sensors_health & (IMU | BARO | gps | mag | mavlink.MAV_SYS_STATUS_AHRS)
+    assert the(mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, silent_after(10.0)).fix_type == mavlink.GPS_FIX_TYPE_NO_GPS
+
+
+def test_health_of_sensors_is_bad_while_the_imu_is_frozen() -> None:
+    sensed, estimator = sensed_after(SECONDS)
+    frozen = NewestSamples(ImuTrack(), *(getattr(sensed.samples, name) for name in ("mag", "baro", "gnss")))
+    for _ in range(STUCK_SAMPLES + 1):
+        frozen.imu_track.take(*sensed.samples.imu)
+    shown = Sensed(estimator.memory[0], frozen)
+    healthy = the(mavlink.MAVLINK_MSG_ID_SYS_STATUS, shown).onboard_control_sensors_health
+    assert not healthy & (IMU | mavlink.MAV_SYS_STATUS_AHRS)
+    assert healthy & BARO
+    assert not the(mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS, shown).flags & SolutionFlags.ATTITUDE
+
+
+def test_estimator_status_has_no_good_state_after_the_imu_dies() -> None:
+    flags = the(mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS, silent_after(2.0)).flags
+    assert flags & GOOD == GOOD & ~SolutionFlags.ATTITUDE  # GNSS is accepted for the last time 2 s before
+    assert the(mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS, silent_after(10.0)).flags & GOOD == 0
+
+
+def test_highres_imu_of_a_dead_imu_marks_no_measurement() -> None:
+    assert the(mavlink.MAVLINK_MSG_ID_HIGHRES_IMU, silent_after(1.0)).fields_updated == 0
 
 
 def test_vibration_measures_change_from_sample_to_sample() -> None:
@@ -334,7 +376,14 @@ def test_sensor_messages_are_available_only_on_sensors() -> None:
         assert Streams({}, SENSOR_STREAMED).set_interval(message_id, 1e5)
 
 
-@pytest.mark.parametrize("rates", [SENSOR_GROUND_RATES_HZ, SENSOR_API_RATES_HZ], ids=["ground", "api"])
-def test_every_stream_of_sensors_is_available(rates: dict[int, float]) -> None:
-    assert rates.keys() <= SENSOR_STREAMED
-    assert rates in (default_rates_hz(False, True), default_rates_hz(True, True))
+@pytest.mark.parametrize("is_api", [False, True], ids=["ground", "api"])
+def test_every_stream_of_sensors_is_available(is_api: bool) -> None:
+    rates_hz = default_rates_hz(is_api, has_sensors=True)
+    assert rates_hz.keys() <= SENSOR_STREAMED
+    assert rates_hz.keys() > default_rates_hz(is_api, has_sensors=False).keys()
+
+
+def test_only_companions_get_raw_imu_samples_by_default() -> None:
+    raw = mavlink.MAVLINK_MSG_ID_HIGHRES_IMU
+    assert default_rates_hz(is_api=True, has_sensors=True)[raw] == 50.0
+    assert raw not in default_rates_hz(is_api=False, has_sensors=True)

@@ -105,8 +105,10 @@ def test_vehicle_on_sensors_flies_in_lockstep_with_this_simulator() -> None:
 
 def test_truth_is_kept_beside_the_state() -> None:
     link, simulator = connected()
+    assert link.known_truth() is None
     for _ in range(300):
         exchange(link, simulator, 700.0)
+    assert link.known_truth() is link.truth
     assert link.truth[2] < -0.1
     assert link.truth.tolist() != simulator.simulator.frame.state.tolist()  # one step older
     assert link.state.tolist() == [0.0] * 6 + [1.0] + [0.0] * 6  # for the estimator to write
@@ -203,6 +205,7 @@ def test_simulator_with_px4s_contract_alone_is_flown(first_us: int) -> None:
         (answer,) = codec.decode(bytes(link.answer(np.full(8, 400.0), armed=True)))
         assert (answer.get_type(), answer.time_usec, answer.flags) == ("HIL_ACTUATOR_CONTROLS", now_us, 1)
         assert link.time_us == 4000 * step
+        assert link.known_truth() is None
         samples = [sample for _, sample in taken(link)]
         gps = next(sample for sample in samples if isinstance(sample, GnssSample))
         assert gps.time_s == pytest.approx(4e-3 * step)  # of its reception
@@ -224,8 +227,10 @@ def test_truth_of_other_simulators_drives_no_time() -> None:
     truth = mavlink.MAVLink_hil_state_quaternion_message(
         9000, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0, 473977420, 85455940, 498000, 100, 0, 0, 0, 0, 0, 0, 0
     )
+    assert link.known_truth() is None
     assert not receive(link, codec.encode(truth))
     assert not link.has_state
+    assert link.known_truth() is link.truth
     assert link.truth[2] == pytest.approx(-10.0)
     assert link.truth[3] == 1.0
     assert receive(link, codec.encode(hil_sensor(4000)))

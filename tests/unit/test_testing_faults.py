@@ -51,6 +51,12 @@ def test_fault_of_a_sensor_is_refused_on_the_true_state() -> None:
         world.fault("sensor:mag:off")
 
 
+@pytest.mark.parametrize("fault", ["state:freeze", "state nan", "state:drop", "state late 0.01"])
+def test_fault_of_the_state_is_refused_on_sensors(fault: str) -> None:
+    with World(state="estimated") as world, pytest.raises(ConfigError, match="flies on its sensors"):
+        world.fault(fault)
+
+
 def test_gravity_of_the_filter_is_that_of_the_simulator() -> None:
     with World(state="estimated") as world:
         estimation = world.engine.stack.estimation

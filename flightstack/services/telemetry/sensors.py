@@ -75,11 +75,10 @@ def highres_imu(_f: VehicleStatus, sensed: Sensed) -> tuple[Message, ...]:
     imu, mag, baro = samples.imu, samples.mag or _NO_MAG, samples.baro or _NO_BARO
     if imu is None:
         return ()
-    updated = _ACCEL_GYRO
-    if imu.time_s - mag.time_s < LATE_S:
-        updated |= _MAG
-    if imu.time_s - baro.time_s < LATE_S:
-        updated |= _BARO
+    updated = 0
+    for bits, sample in ((_ACCEL_GYRO, imu), (_MAG, mag), (_BARO, baro)):
+        if sensed.time_s - sample.time_s < LATE_S:
+            updated |= bits
     return (
         HIGHRES_IMU(
             _us(imu.time_s),
@@ -218,6 +217,7 @@ def _into_world(q: Quaternion, v: Vector3) -> tuple[float, float, float]:
     )
 
 
+_IMU = mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
 _Timed: TypeAlias = ImuSample | MagSample | BaroSample | GnssSample | RangeSample
 
 
@@ -233,6 +233,8 @@ def sensor_health(sensed: Sensed) -> tuple[int, int]:
         present |= bits
         if now_s - sample.time_s < limit_s and not _is_without_fix(sample):
             healthy |= bits
+    if sensed.imu_has_failed:
+        healthy &= ~_IMU
     if not sensed.report.control & ControlFlags.MAG_3D:
         healthy &= ~mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
     return present, healthy
@@ -240,7 +242,7 @@ def sensor_health(sensed: Sensed) -> tuple[int, int]:
 
 def _sensors(samples: NewestSamples) -> tuple[tuple[int, _Timed | None, float], ...]:
     return (
-        (mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL, samples.imu, SILENT_S),
+        (_IMU, samples.imu, SILENT_S),
         (mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG, samples.mag, SILENT_S),
         (mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE, samples.baro, SILENT_S),
         (mavlink.MAV_SYS_STATUS_SENSOR_GPS, samples.gnss, GNSS_SILENT_S),

@@ -70,7 +70,7 @@ class Telemetry:
         loop_timing: Callable[[], Message],
         has_sensors: bool = False,
     ) -> None:
-        """``has_sensors``: the status has what a vehicle that flies on its sensors knows."""
+        """``has_sensors`` is true if the vehicle flies on its sensors: the status then has ``sensed``."""
         self.has_sensors = has_sensors
         self.streamed = SENSOR_STREAMED if has_sensors else STREAMED
         """Messages that can be sent at a rate."""
