@@ -119,6 +119,7 @@ class Resets(NamedTuple):
     velocity: int
     velocity_change_m_s: Vector3
     yaw: int
+    yaw_change_rad: float
 
 
 class EstimatorReport(NamedTuple):
@@ -232,8 +233,9 @@ def nominal_of(memory: Record) -> Nominal:
 def _resets(x: Sequence[float]) -> Resets:
     position, velocity = x[POSITION_RESET : POSITION_RESET + 4], x[VELOCITY_RESET : VELOCITY_RESET + 4]
     return Resets(
-        int(position[0]), Vector3(*position[1:]), int(velocity[0]), Vector3(*velocity[1:]), int(x[YAW_RESET])
-    )
+        int(position[0]), Vector3(*position[1:]), int(velocity[0]), Vector3(*velocity[1:]),
+        int(x[YAW_RESET]), x[YAW_RESET + 1],
+    )  # fmt: skip
 
 
 def _is_recent(rows: Sequence[Observation], now_s: float, limit_s: float) -> bool:

@@ -137,6 +137,7 @@ class Estimation:
         self._recorder.state(time_us, self._truth, self.sensed)
         if (resets[POSITION_RESET], resets[VELOCITY_RESET], resets[YAW_RESET]) != self._seen:
             self._follow_resets()
+            self._recorder.local_position(time_us, self.sensed())
         if reports and self._time_us >= self._health_due_us:
             self._update_health(self._time_us)
 
