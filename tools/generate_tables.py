@@ -9,6 +9,7 @@ from dataclasses import fields
 from flightstack.commander.failsafe import RULES, Action, Rule
 from flightstack.core.contract import LoopFlags, LoopStatus
 from flightstack.core.enums import NAVIGATION_STATE
+from flightstack.flight_log.local_position import LOCAL_POSITION
 from flightstack.flight_log.sensor_recorder import SENSOR_GROUPS
 from flightstack.flight_log.topics import EVENT_TOPICS, OUTER_TOPICS, Field, Topic, inner_topics
 from flightstack.params.behaviour import Behaviour
@@ -281,7 +282,8 @@ ON_SENSORS = """
 Only a vehicle that flies on its sensors (`--state estimated`) writes these topics: measurements as they arrive, the
 estimator's twice a second, the truth a hundred times. PX4's `Tools/ecl_ekf`, `gcs estimate` and PlotJuggler's layouts
 for PX4 read them. The multi-information message `estimator_start` holds the estimator's memory at the start of the
-log, so that `gcs estimate` repeats the flown estimate.
+log, so that `gcs estimate` repeats the flown estimate. `vehicle_local_position` replaces that of other vehicles; its
+validity and accuracies are updated five times a second and at each reset.
 """
 
 
@@ -300,7 +302,7 @@ def topics_page() -> str:
             topic_table(EVENT_TOPICS),
             f"\n`vehicle_status.nav_state`: {states}.\n",
             ON_SENSORS,
-            topic_table(topic for group in SENSOR_GROUPS for topic in group.topics),
+            topic_table((LOCAL_POSITION, *(topic for group in SENSOR_GROUPS for topic in group.topics))),
             "\n## Bits\n\n`wrench.status`:\n",
             bit_table(LoopStatus),
             "\n`vehicle_attitude_setpoint.loop_flags`:\n",

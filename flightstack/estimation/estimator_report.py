@@ -120,6 +120,7 @@ class Resets(NamedTuple):
     velocity: int
     velocity_change_m_s: Vector3
     yaw: int
+    yaw_change_rad: float
 
 
 class EstimatorReport(NamedTuple):
@@ -235,7 +236,10 @@ def _resets(x: Sequence[float]) -> Resets:
         Vector3(*x[kind + RESET_CHANGE : kind + RESET_CHANGE + 3])
         for kind in (POSITION_RESET, VELOCITY_RESET)
     )
-    return Resets(int(x[POSITION_RESET]), position, int(x[VELOCITY_RESET]), velocity, int(x[YAW_RESET]))
+    return Resets(
+        int(x[POSITION_RESET]), position, int(x[VELOCITY_RESET]), velocity,
+        int(x[YAW_RESET]), x[YAW_RESET + RESET_CHANGE],
+    )  # fmt: skip
 
 
 def _is_recent(rows: Sequence[Observation], now_s: float, limit_s: float) -> bool:

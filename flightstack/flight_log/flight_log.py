@@ -18,7 +18,15 @@ from flightstack.core.contract import FloatArray, LoopRow
 from flightstack.core.geodesy import GeoPoint
 from flightstack.flight_log import ulog
 from flightstack.flight_log.row_block import RowBlock, TimeArray, content_size
-from flightstack.flight_log.topics import EVENT_TOPICS, OUTER, OUTER_TOPICS, Group, Topic, inner_topics
+from flightstack.flight_log.topics import (
+    EVENT_TOPICS,
+    OUTER,
+    OUTER_GROUP,
+    OUTER_TOPICS,
+    Group,
+    Topic,
+    inner_topics,
+)
 from flightstack.mavlink.fields import COUNTERS, STRUCT_CODES, fitted
 from flightstack.params.vehicle import Vehicle, system_type
 
@@ -127,17 +135,19 @@ class FlightLog:
         parameters: Mapping[str, float],
         origin: GeoPoint,
         groups: Sequence[Group] = (),
+        outer: Group = OUTER_GROUP,
     ) -> None:
         """Write header and definitions, with ``groups`` of further topics. Call first, once.
 
-        ``origin`` is the origin of the local frame.
+        ``origin`` is the origin of the local frame. ``outer`` has the topics of the outer loop.
         """
         reference = {
             "ref_lat": origin.latitude_deg, "ref_lon": origin.longitude_deg, "ref_alt": origin.altitude_m,
         }  # fmt: skip
         capacity = self.outer.capacity
-        self._outer_block = RowBlock(OUTER_TOPICS, self._first_outer_id, capacity, reference)
-        topics = [*self._inner_topics, *OUTER_TOPICS, *EVENT_TOPICS]
+        self.outer = Trace(capacity, outer.columns, self.flush)
+        self._outer_block = RowBlock(outer.topics, self._first_outer_id, capacity, reference)
+        topics = [*self._inner_topics, *outer.topics, *EVENT_TOPICS]
         for group in groups:
             trace = self.sampled[group.name] = Trace(capacity, group.columns, self.flush)
             self._sampled_blocks.append((trace, RowBlock(group.topics, len(topics), capacity, reference)))

@@ -26,6 +26,7 @@ from flightstack.flight_log.topics import (
     ARMING_STATE_ARMED,
     ARMING_STATE_DISARMED,
     OUTER,
+    OUTER_GROUP,
     Group,
     outer_heading,
 )
@@ -49,10 +50,11 @@ class FlightRecorder:
         home: GeoPoint,
         battery: Callable[[], Battery],
         groups: Sequence[Group] = (),
+        outer: Group = OUTER_GROUP,
     ) -> None:
         """``parameters`` returns the values at the start of a log; ``home`` is the origin of the local frame.
 
-        ``battery`` returns the newest report. ``groups`` are further topics of the logs.
+        ``battery`` returns the newest report. ``groups`` are further topics, ``outer`` those of the outer loop.
         """
         self._open_log = open_log
         self._info = info
@@ -60,7 +62,9 @@ class FlightRecorder:
         self._origin = home
         self._battery, self._battery_due_us = battery, 0
         self._home = (home, Vector3(0.0, 0.0, 0.0))
-        self._groups = groups
+        self._groups, self._outer = groups, outer
+        self.estimate = np.zeros(outer.columns - OUTER.size)
+        """Further columns of each row of the outer loop, written in place; none of a vehicle on the true state."""
         self._log: FlightLog | None = None
         scratch = np.zeros(LoopRow.SIZE)
         self._no_row: Callable[[int], FloatArray] = lambda _: scratch
@@ -102,6 +106,8 @@ class FlightRecorder:
             return
         row = self._log.outer.append(time_us)
         self._store_outer(row, state, setpoint, attitude_target, loop_flags)
+        if len(self.estimate):
+            row[OUTER.size :] = self.estimate
         if time_us >= self._battery_due_us:
             self._battery_due_us = time_us + _BATTERY_INTERVAL_US
             self._write_battery(time_us)
@@ -140,7 +146,7 @@ class FlightRecorder:
             return
         self.inner_row = self._log.inner.append
         self._battery_due_us = time_us
-        self._log.start(time_us, self._info, self._parameters(), self._origin, self._groups)
+        self._log.start(time_us, self._info, self._parameters(), self._origin, self._groups, self._outer)
         self._write_home(time_us)
         self.landed(time_us, True)
         self._write_mission(time_us)

@@ -13,6 +13,7 @@ from flightstack.estimation.sensor_samples import BaroSample, GnssSample, MagSam
 from flightstack.estimation.snapshot import ESTIMATOR_START
 from flightstack.flight_log.estimator_topics import ESTIMATOR, WIND_GROUP, fill_estimator, fill_wind
 from flightstack.flight_log.flight_log import FlightLog
+from flightstack.flight_log.local_position import fill_local_position
 from flightstack.flight_log.recorder import FlightRecorder
 from flightstack.flight_log.sensor_topics import (
     BARO_GROUP,
@@ -36,6 +37,8 @@ SENSOR_GROUPS = (
 )  # fmt: skip
 TRUTH_INTERVAL_US, GLOBAL_INTERVAL_US, ESTIMATOR_INTERVAL_US = 10_000, 100_000, 500_000
 """Intervals of PX4's logger."""
+LOCAL_INTERVAL_US = 200_000
+"""Interval of the validity and accuracy of the local position: a report of the estimator takes 0.1 ms."""
 _FILLS: dict[type, tuple[Group, Callable[[FloatArray, Any], None]]] = {
     MagSample: (MAG_GROUP, fill_mag),
     BaroSample: (BARO_GROUP, fill_baro),
@@ -53,7 +56,7 @@ class SensorRecorder:
         self._frame, self._true_frame = frame, LocalFrame(home)
         self._offset_m = Vector3(0.0, 0.0, 0.0)  # of the true frame's origin in the vehicle's
         self._log: FlightLog | None = None
-        self._truth_us = self._global_us = self._estimator_us = 0
+        self._truth_us = self._global_us = self._estimator_us = self._local_us = 0
 
     def begin(self, estimator: Callable[[], bytes]) -> None:
         """Record the estimator's snapshot in a new log; call before the estimator takes the next sample."""
@@ -85,6 +88,8 @@ class SensorRecorder:
 
         ``truth`` returns None before the first true state.
         """
+        if time_us >= self._local_us:
+            self.local_position(time_us, sense())
         log = self._log
         if log is None or time_us < self._truth_us:
             return
@@ -98,6 +103,11 @@ class SensorRecorder:
             fill_estimator(log.sampled[ESTIMATOR.name].append(time_us), sensed)
             if sensed.report.wind_is_observed:
                 fill_wind(log.sampled[WIND_GROUP.name].append(time_us), sensed)
+
+    def local_position(self, time_us: int, sensed: Sensed) -> None:
+        """Update what the next rows of the outer loop record of the estimate; also call after a reset."""
+        self._local_us = time_us + LOCAL_INTERVAL_US
+        fill_local_position(self._recorder.estimate, sensed)
 
     def _record_truth(self, log: FlightLog, time_us: int, truth: FloatArray) -> None:
         row = log.sampled[TRUTH_GROUP.name].append(time_us)

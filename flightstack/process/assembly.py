@@ -22,8 +22,10 @@ from flightstack.firmware.choice import PYTHON, parse_loops
 from flightstack.firmware.law_tree import law_tree, own_params
 from flightstack.firmware.targets import make_loops
 from flightstack.flight_log.flight_log import vehicle_fields
+from flightstack.flight_log.local_position import SENSED_OUTER
 from flightstack.flight_log.recorder import FlightRecorder, OpenLog
 from flightstack.flight_log.sensor_recorder import SENSOR_GROUPS, SensorRecorder
+from flightstack.flight_log.topics import OUTER_GROUP
 from flightstack.guidance.safe_places import SafePlaces
 from flightstack.params.config import AUTOPILOT, ESTIMATED, GENERIC, STATES, SYSTEM_ID, StackConfig
 from flightstack.params.gains_file import open_gains
@@ -193,8 +195,8 @@ def _join(
         vehicle, config.home, config.lockstep, system_id, loop_rates.interval_us,
         uses_sensors=config.state == ESTIMATED,
     )  # fmt: skip
-    groups = () if simulator.sensors is None else SENSOR_GROUPS
-    recorder = FlightRecorder(open_log, info, params.values, config.home, lambda: simulator.battery, groups)
+    topics = ((), OUTER_GROUP) if simulator.sensors is None else (SENSOR_GROUPS, SENSED_OUTER)
+    recorder = FlightRecorder(open_log, info, params.values, config.home, lambda: simulator.battery, *topics)
     parts = assemble(
         vehicle, backend, behaviour, config.home, loop_rates.divisor, loop_rates.outer_hz, recorder,
         simulator.state, simulator.rotor_speed_rad_s, simulator,

@@ -144,6 +144,7 @@ class Estimation:
         self._recorder.state(time_us, self._truth, self.sensed)
         if (resets[POSITION_RESET], resets[VELOCITY_RESET], resets[YAW_RESET]) != self._counts:
             self._follow_resets()
+            self._recorder.local_position(time_us, self.sensed())
         if reports and self._time_us >= self._health_due_us:
             self._update_health(self._time_us)
 
@@ -153,6 +154,7 @@ class Estimation:
             self.estimator.set_earth_field(earth_field_ned_gauss(frame.origin))
             self._users.area.move_origin(frame.origin)
             self._now.has_state = True
+            self._health_due_us = 0  # at once: the vehicle counts as healthy now, and a client may arm it
 
     def _follow_resets(self) -> None:
         """Shift the reference of guidance by the resets since the last call."""

@@ -97,6 +97,9 @@ def flying(start: Start, tmp_path: Path) -> dict[str, Process]:
         done = gcs("--connect", link, "--timeout", BOUND_S, "mission", *arguments)
         assert done.returncode == 0, done.stderr
     processes["station"].wait_for("MISSION")
+    assert (
+        gcs("--connect", link, "--timeout", BOUND_S, "wait", "in-air").returncode == 0
+    )  # the log has content
     return processes
 
 

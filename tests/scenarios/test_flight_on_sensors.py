@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import math
 
 import numpy as np
 import pytest
+from pyulog import ULog
 
 from flightstack.core.contract import Quaternion
 from flightstack.core.errors import ConfigError
@@ -90,6 +92,10 @@ def test_source_of_the_state_is_checked(conditions: dict, text: str) -> None:
         World(**conditions)
 
 
+KNOWN_ROW = 30
+"""Row of the log, of 100 Hz, after the first update of the validity, which has 5 Hz."""
+
+
 @pytest.mark.parametrize("bias", ["15,-10,0", "15,-10,10"])
 def test_vehicle_does_not_tilt_for_a_reset_of_its_position(bias: str) -> None:
     with World(vehicle="x_quad", state="estimated") as world:
@@ -105,6 +111,30 @@ def test_vehicle_does_not_tilt_for_a_reset_of_its_position(bias: str) -> None:
         assert max(tilts) < 15.0  # 12.0, on the way back to the goal; 45 without the shift
         error_m = world.engine.stack.now.setpoint[:2] - world.engine.stack.now.state[:2]
         assert max(abs(error_m)) < 0.5
+        log = ULog(io.BytesIO(world.engine.newest_log()))
+    position = log.get_dataset("vehicle_local_position").data
+    assert (position["xy_valid"][KNOWN_ROW:] == 1).all()
+    (before,) = np.diff(position["xy_reset_counter"].astype(int)).nonzero()[0]
+    after = before + 1
+    assert position["delta_xy[0]"][after] == pytest.approx(
+        position["x"][after] - position["x"][before], abs=0.2
+    )
+
+
+def test_log_has_an_invalid_position_after_dead_reckoning() -> None:
+    with World(vehicle="x_quad", state="estimated") as world:
+        world.wait_until_ready()
+        world.takeoff(5.0)
+        world.run_until("mode == 'HOLD'")
+        world.fault("sensor:gnss:off")
+        world.run_for(8.0)
+        log = ULog(io.BytesIO(world.engine.newest_log()))
+    position = log.get_dataset("vehicle_local_position").data
+    for name in ("xy_valid", "v_xy_valid", "xy_global"):
+        assert (position[name][KNOWN_ROW], position[name][-1]) == (1, 0)
+    assert (position["z_valid"] == 1).all()
+    assert (position["dead_reckoning"][KNOWN_ROW], position["dead_reckoning"][-1]) == (0, 1)
+    assert position["eph"][-1] > 2.0 * position["eph"][KNOWN_ROW]
 
 
 def test_gnss_that_comes_back_is_not_suspected_of_spoofing() -> None:

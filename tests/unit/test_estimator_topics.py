@@ -59,7 +59,9 @@ def test_log_without_a_true_state_has_no_groundtruth() -> None:
     log = FlightLog(file, 4)
     log.start(0, {}, {}, flown.HOME, SENSOR_GROUPS)
     recorder = SensorRecorder(
-        cast(FlightRecorder, SimpleNamespace(log=log)), LocalFrame(flown.HOME), flown.HOME
+        cast(FlightRecorder, SimpleNamespace(log=log, estimate=np.zeros(23))),
+        LocalFrame(flown.HOME),
+        flown.HOME,
     )
     sensed, estimator = sensed_after(SECONDS)
     recorder.begin(lambda: snapshot(estimator))
