@@ -33,7 +33,7 @@ WATCHED = {
     "IMU_FAULT": "no measurement of the inertial sensor for 0.04 s, or 100 equal ones",
     "ATTITUDE_DOUBTFUL": "standard deviation of the estimated tilt above `FS_TILT_DEV`",
     "POSITION_LOST": "dead reckoning for `FS_DEAD_RECK_T`, or standard deviation of the estimated position above "
-    "`COM_POS_FS_EPH`, or a filter that is late by 0.5 s",
+    "`COM_POS_FS_EPH` (until it is below 80 % of that for 1 s), or a filter that is late by 0.5 s",
     "GNSS_REFUSED": "positions of GNSS are refused for 1 s",
     "FENCE": "outside the geofence, `GF_MAX_HOR_DIST` or `GF_MAX_VER_DIST`",
     "POSITION_ERROR": "the position differs from its setpoint by `FS_POS_ERR` for `FS_POS_ERR_T`",

@@ -20,7 +20,7 @@ MOST_GYRO_BIAS_RAD_S, MOST_ACCEL_BIAS_M_S2 = 0.1125, 0.3
 MOST_RATIO, MOST_HEIGHT_RATIO = 0.5, 1.0
 """Largest mean test ratios: PX4's defaults of COM_ARM_EKF_VEL, _POS, _YAW and _HGT."""
 LATE_S = 0.5
-"""Time from the filter's state to the newest IMU sample at which the filter has stopped; the longest delay is 0.33 s."""
+"""Age of the filter's state at which the filter has stopped; the longest delay is 0.32 s."""
 REFUSED_S = 1.0
 """Time of refused GNSS positions after which spoofing is suspected."""
 
@@ -61,14 +61,14 @@ def estimate_failsafes(health: EstimateHealth | None, behaviour: Behaviour) -> f
     """Return the conditions of failsafes in flight."""
     if health is None:
         return frozenset()
-    b, limit_m = behaviour, behaviour.position_accuracy_m
-    is_far_off = 0.0 < limit_m < health.horizontal_m
+    b = behaviour
+    is_off = health.is_inaccurate or health.lag_s > LATE_S
     conditions = (
         (Failsafe.IMU_FAULT, health.imu_age_s > IMU_MISSING_S or health.imu_is_stuck),
         (Failsafe.ATTITUDE_DOUBTFUL, health.tilt_rad > math.radians(b.tilt_accuracy_deg) > 0.0),
         (
             Failsafe.POSITION_LOST,
-            health.unaided_s > b.dead_reckoning_s or is_far_off or health.lag_s > LATE_S,
+            health.unaided_s > b.dead_reckoning_s or is_off,
         ),
         (Failsafe.GNSS_REFUSED, health.refused_s > REFUSED_S),
     )

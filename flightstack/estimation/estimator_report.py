@@ -36,6 +36,7 @@ from flightstack.estimation.memory import (
     LANDED,
     MAG_FAULT,
     POSITION_RESET,
+    RESET_CHANGE,
     VELOCITY_RESET,
     YAW_RESET,
 )
@@ -112,7 +113,7 @@ class Observation(NamedTuple):
 
 
 class Resets(NamedTuple):
-    """Numbers of resets, and the last change of each."""
+    """Numbers of resets, and the change of each in the last step of the filter with one."""
 
     position: int
     position_change_m: Vector3
@@ -231,11 +232,14 @@ def nominal_of(memory: Record) -> Nominal:
 
 
 def _resets(x: Sequence[float]) -> Resets:
-    position, velocity = x[POSITION_RESET : POSITION_RESET + 4], x[VELOCITY_RESET : VELOCITY_RESET + 4]
+    position, velocity = (
+        Vector3(*x[kind + RESET_CHANGE : kind + RESET_CHANGE + 3])
+        for kind in (POSITION_RESET, VELOCITY_RESET)
+    )
+    yaw_rad = x[YAW_RESET + RESET_CHANGE]
     return Resets(
-        int(position[0]), Vector3(*position[1:]), int(velocity[0]), Vector3(*velocity[1:]),
-        int(x[YAW_RESET]), x[YAW_RESET + 1],
-    )  # fmt: skip
+        int(x[POSITION_RESET]), position, int(x[VELOCITY_RESET]), velocity, int(x[YAW_RESET]), yaw_rad
+    )
 
 
 def _is_recent(rows: Sequence[Observation], now_s: float, limit_s: float) -> bool:

@@ -20,6 +20,8 @@ SMOOTHING = 0.1
 STUCK_SAMPLES = 100
 """Equal successive samples of the inertial sensor after which it is stuck; PX4's limit. Noise changes the last bits."""
 MISSING_FIX_S = 1.0
+ACCURATE_SHARE, ACCURATE_S = 0.8, 1.0
+"""Share of the limit below which an inaccurate position is accurate again, after this time there."""
 
 
 class EstimateHealth(NamedTuple):
@@ -37,6 +39,8 @@ class EstimateHealth(NamedTuple):
     """Time since the newest accepted horizontal position or velocity: that of dead reckoning."""
     refused_s: float
     """Time for which horizontal positions of GNSS have arrived and were refused."""
+    is_inaccurate: bool
+    """True if ``horizontal_m`` exceeds its limit; with hysteresis, see ``accuracy_step``."""
     lag_s: float
     """Time from the filter's state to the newest IMU sample."""
     horizontal_m: float
@@ -52,8 +56,8 @@ class EstimateHealth(NamedTuple):
 
 
 NO_HEALTH = EstimateHealth(
-    False, False, math.inf, False, math.inf, math.inf, math.inf, math.inf, 0.0, 0.0, math.inf,
-    math.inf, math.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    False, False, math.inf, False, math.inf, math.inf, math.inf, math.inf, 0.0, False, 0.0,
+    math.inf, math.inf, math.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
 )  # fmt: skip
 _LAG, _SUMMARY_SIZE = 2, 12
 """Columns of the summary: time without accepted positions and velocities, time of refused positions, and from ``_LAG``
@@ -95,6 +99,22 @@ def health_kernel(memory: RecordArray, summary: FloatArray) -> None:
     summary[11] = _mean_ratio(summary[11], o, MAG, 3)
 
 
+class Accuracy(NamedTuple):
+    """Whether the position is inaccurate, and the last time at which its deviation was too large."""
+
+    is_inaccurate: bool = False
+    exceeded_s: float = 0.0
+
+
+def accuracy_step(memory: Accuracy, deviation_m: float, limit_m: float, time_s: float) -> Accuracy:
+    """Compare a deviation with its limit, with hysteresis; a limit of zero or less is none."""
+    if limit_m <= 0.0:
+        return Accuracy()
+    if deviation_m > limit_m * (ACCURATE_SHARE if memory.is_inaccurate else 1.0):
+        return Accuracy(True, time_s)
+    return Accuracy(memory.is_inaccurate and time_s - memory.exceeded_s < ACCURATE_S, memory.exceeded_s)
+
+
 class HealthMonitor:
     """Summarises an estimator at intervals."""
 
@@ -103,13 +123,17 @@ class HealthMonitor:
         self._memory = memory
         self._aligned = memory["flags"][0]
         self._summary = np.zeros(_SUMMARY_SIZE)
+        self._accuracy = Accuracy()
         self._summarise = direct(health_kernel, memory, self._summary)
 
-    def update(self, samples: NewestSamples, has_origin: bool, time_s: float) -> EstimateHealth:
-        """Return the health at ``time_s``."""
+    def update(
+        self, samples: NewestSamples, has_origin: bool, limit_m: float, time_s: float
+    ) -> EstimateHealth:
+        """Return the health at ``time_s``; ``limit_m`` is that of the horizontal deviation, -1 for none."""
         self._summarise(self._memory, self._summary)
         summary = self._summary.tolist()
-        unaided_s, refused_s = summary[:_LAG]
+        unaided_s, refused_s, _, horizontal_m = summary[: _LAG + 2]
+        self._accuracy = accuracy_step(self._accuracy, horizontal_m, limit_m, time_s)
         fix_age_s, imu = _fix_age_s(samples, time_s), samples.imu
         return EstimateHealth(
             bool(self._aligned[ALIGNED]),
@@ -121,6 +145,7 @@ class HealthMonitor:
             fix_age_s,
             unaided_s if has_origin else math.inf,
             refused_s if has_origin and fix_age_s < MISSING_FIX_S else 0.0,
+            self._accuracy.is_inaccurate,
             *summary[_LAG:],
         )
 

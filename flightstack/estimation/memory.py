@@ -29,8 +29,10 @@ from flightstack.estimation.yaw_estimator import MODEL_SIZE, MODELS
 ALIGNED, LANDED, HAS_BARO, HAS_GNSS, HAS_RANGE, HAS_MAG, HAS_YAW, MAG_FAULT, FLAGS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 """``HAS_YAW``: the yaw is known, from the magnetometer or from GNSS velocity. ``MAG_FAULT``: GNSS velocity has
 disproved the yaw of the magnetometer, which is not used any more."""
-POSITION_RESET, VELOCITY_RESET, YAW_RESET, RESETS = 0, 4, 8, 10
-"""Counter of each kind of reset, with the last change behind it."""
+POSITION_RESET, VELOCITY_RESET, YAW_RESET, RESETS = 0, 8, 16, 19
+RESET_CHANGE, RESET_SUM, RESET_S, YAW_RESET_SUM = 1, 4, 7, 18
+"""Of each kind: the number of its resets, their change in the last step with one, the sum of all changes, and the time
+of that step; yaw has no time."""
 GAP_PENDING_S, GAP_S, GAPS = 0, 1, 2
 """Columns of ``imu_gap``: time without samples in the step at hand, in all, and the number of such gaps."""
 YAW_TURN, YAW_VARIANCE, YAW_UPDATES, YAW_WRONG_S = 0, 1, 2, 3

@@ -16,7 +16,14 @@ from flightstack.core.portable_math import distance
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits, tuning_of
 from flightstack.estimation.health import NO_HEALTH, HealthMonitor
-from flightstack.estimation.memory import MAG_FAULT, POSITION_RESET, VELOCITY_RESET, YAW_RESET
+from flightstack.estimation.memory import (
+    MAG_FAULT,
+    POSITION_RESET,
+    RESET_SUM,
+    VELOCITY_RESET,
+    YAW_RESET,
+    YAW_RESET_SUM,
+)
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed
 from flightstack.estimation.sensor_samples import BaroSample, ImuSample
@@ -34,7 +41,7 @@ from flightstack.vehicle.journal import Journal
 
 HEALTH_US = 50_000
 """Interval of the health, in the time of the sensors."""
-_NO_CHANGE = Vector3(0.0, 0.0, 0.0)
+_ZERO = Vector3(0.0, 0.0, 0.0)
 
 
 def _tuning(values: Mapping[str, float]) -> tuple[EstimatorParams, GnssLimits]:
@@ -89,7 +96,7 @@ class Estimation:
         self._time_us = 0  # of the newest message of the sensors
         # as memory: a number of an array takes four times as long to read
         self._resets = self.estimator.memory["resets"][0].data
-        self._seen = (0.0, 0.0, 0.0)
+        self._seen, self._counts = self._resets.tolist(), (0.0, 0.0, 0.0)
         self._flags = self.estimator.memory["flags"][0].data
         self._mag_has_failed = False
 
@@ -112,7 +119,7 @@ class Estimation:
         estimator = Estimator()
         estimator.imu(ImuSample(0.0, 0.0, unknown, unknown))
         estimator.baro(BaroSample(0.0, math.nan, math.nan, math.nan))
-        estimator.set_earth_field(_NO_CHANGE)
+        estimator.set_earth_field(_ZERO)
 
     def _snapshot(self) -> bytes:
         return snapshot(self.estimator)
@@ -135,7 +142,7 @@ class Estimation:
         if is_known and not now.has_state:
             self._find_origin()
         self._recorder.state(time_us, self._truth, self.sensed)
-        if (resets[POSITION_RESET], resets[VELOCITY_RESET], resets[YAW_RESET]) != self._seen:
+        if (resets[POSITION_RESET], resets[VELOCITY_RESET], resets[YAW_RESET]) != self._counts:
             self._follow_resets()
             self._recorder.local_position(time_us, self.sensed())
         if reports and self._time_us >= self._health_due_us:
@@ -150,16 +157,19 @@ class Estimation:
 
     def _follow_resets(self) -> None:
         """Shift the reference of guidance by the resets since the last call."""
-        x, seen, users = self._resets.tolist(), self._seen, self._users
-        self._seen = x[POSITION_RESET], x[VELOCITY_RESET], x[YAW_RESET]
+        seen, users = self._seen, self._users
+        x = self._seen = self._resets.tolist()
+        self._counts = x[POSITION_RESET], x[VELOCITY_RESET], x[YAW_RESET]
         if not self._now.flying:
             return
-        moved, sped, turned = (new != old for new, old in zip(self._seen, seen, strict=True))
-        position_m = Vector3(*x[POSITION_RESET + 1 : POSITION_RESET + 4]) if moved else _NO_CHANGE
-        velocity_m_s = Vector3(*x[VELOCITY_RESET + 1 : VELOCITY_RESET + 4]) if sped else _NO_CHANGE
-        yaw_rad = x[YAW_RESET + 1] if turned else 0.0
+        change = [new - old for new, old in zip(x, seen, strict=True)]
+        position_m, velocity_m_s = (
+            Vector3(*change[kind + RESET_SUM : kind + RESET_SUM + 3])
+            for kind in (POSITION_RESET, VELOCITY_RESET)
+        )
+        yaw_rad = change[YAW_RESET_SUM]
         users.navigator.shift(position_m, velocity_m_s, yaw_rad)
-        if turned:  # the reference attitude of the loops has the old yaw
+        if change[YAW_RESET]:  # the reference attitude of the loops has the old yaw
             self._reset_loops()
         step = f"{distance(*position_m):.1f} m, {distance(*velocity_m_s):.1f} m/s, {math.degrees(yaw_rad):.0f} degrees"
         users.journal.say(Severity.NOTICE, f"Estimate reset by {step}")
@@ -171,7 +181,8 @@ class Estimation:
     def _update_health(self, time_us: int) -> None:
         now, users = self._now, self._users
         self._health_due_us = time_us + HEALTH_US
-        self.health = self._monitor.update(self._feed.newest, now.has_state, time_us * 1e-6)
+        limit_m = now.behaviour.position_accuracy_m
+        self.health = self._monitor.update(self._feed.newest, now.has_state, limit_m, time_us * 1e-6)
         users.failsafes.take_health(self.health)
         if self._flags[MAG_FAULT] and not self._mag_has_failed:
             self._mag_has_failed = True

@@ -96,12 +96,13 @@ KNOWN_ROW = 30
 """Row of the log, of 100 Hz, after the first update of the validity, which has 5 Hz."""
 
 
-def test_vehicle_does_not_tilt_for_a_reset_of_its_position() -> None:
+@pytest.mark.parametrize("bias", ["15,-10,0", "15,-10,10"])
+def test_vehicle_does_not_tilt_for_a_reset_of_its_position(bias: str) -> None:
     with World(vehicle="x_quad", state="estimated") as world:
         world.wait_until_ready()
         world.takeoff(5.0)
         world.run_until("mode == 'HOLD'")
-        world.fault("sensor:gnss:bias=15,-10,0")
+        world.fault(f"sensor:gnss:bias={bias}")
         world.run_until(lambda _: any("Estimate reset by" in text for text in world.texts), 30.0)
         tilts = []
         for _ in range(20):
@@ -113,7 +114,7 @@ def test_vehicle_does_not_tilt_for_a_reset_of_its_position() -> None:
         log = ULog(io.BytesIO(world.engine.newest_log()))
     position = log.get_dataset("vehicle_local_position").data
     assert (position["xy_valid"][KNOWN_ROW:] == 1).all()
-    (before,) = np.diff(position["xy_reset_counter"].astype(int)).nonzero()[0]
+    before = np.diff(position["xy_reset_counter"].astype(int)).nonzero()[0][0]
     after = before + 1
     assert position["delta_xy[0]"][after] == pytest.approx(
         position["x"][after] - position["x"][before], abs=0.2
@@ -134,6 +135,18 @@ def test_log_has_an_invalid_position_after_dead_reckoning() -> None:
     assert (position["z_valid"] == 1).all()
     assert (position["dead_reckoning"][KNOWN_ROW], position["dead_reckoning"][-1]) == (0, 1)
     assert position["eph"][-1] > 2.0 * position["eph"][KNOWN_ROW]
+
+
+def test_gnss_that_comes_back_is_not_suspected_of_spoofing() -> None:
+    params = {"FS_GNSS_ACT": 2, "EKF2_BARO_DELAY": 200}
+    with World(vehicle="x_quad", state="estimated", params=params) as world:
+        world.wait_until_ready()
+        world.takeoff(5.0)
+        world.run_until("mode == 'HOLD'")
+        world.fault("sensor:gnss:off", for_s=3.0)
+        world.run_for(5.0)
+        assert world.state.mode == "HOLD"
+        assert not [text for text in world.texts if "Spoofed" in text]
 
 
 @pytest.mark.parametrize(

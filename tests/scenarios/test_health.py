@@ -1,4 +1,4 @@
-"""What ground stations are told of the vehicle's health while it goes wrong."""
+"""Health of the vehicle in the messages to ground stations, during faults."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LASTING = {"FS_STALE_T": 0.1, "FS_BLIND_T": 5}
 
 
 def asked(world: World, message_id: int) -> Message:
-    """The message as it is now."""
+    """Return the present message."""
     world.command(mavlink.MAV_CMD_REQUEST_MESSAGE, message_id)
     return world.gcs.received[mavlink.mavlink_map[message_id].msgname]
 
@@ -36,7 +36,7 @@ def flying(**params: float) -> World:
 
 
 def seems_healthy(world: World) -> bool:
-    """Tell so, if all three messages agree."""
+    """Return True if the vehicle reports good health; all three messages must agree."""
     healthy = asked(world, SYS_STATUS).onboard_control_sensors_health & SENSORS == SENSORS
     assert (asked(world, GPS_RAW_INT).fix_type >= mavlink.GPS_FIX_TYPE_3D_FIX) is healthy
     assert bool(asked(world, ESTIMATOR_STATUS).flags) is healthy
@@ -44,7 +44,7 @@ def seems_healthy(world: World) -> bool:
 
 
 @pytest.mark.parametrize("fault", ["state:freeze", "state:nan"])
-def test_a_state_that_is_not_to_be_flown_by_is_ill_as_long_as_it_lasts(fault: str) -> None:
+def test_invalid_state_is_unhealthy_while_the_fault_lasts(fault: str) -> None:
     world = flying(**LASTING)
     assert seems_healthy(world)
     world.fault(fault, for_s=0.4)
@@ -54,7 +54,7 @@ def test_a_state_that_is_not_to_be_flown_by_is_ill_as_long_as_it_lasts(fault: st
     assert seems_healthy(world)
 
 
-def test_a_simulator_that_is_silent_is_ill_on_the_ground_too() -> None:
+def test_missing_state_is_unhealthy_on_the_ground() -> None:
     world = World(vehicle="x_quad", params=LASTING)
     world.run_for(0.1)
     assert seems_healthy(world)
@@ -76,7 +76,7 @@ def test_dead_imu_is_unhealthy_in_sys_status(fault: str) -> None:
         assert not asked(world, ESTIMATOR_STATUS).flags & mavlink.ESTIMATOR_ATTITUDE
 
 
-def test_each_breach_of_the_fence_is_told_with_its_kind_and_time() -> None:
+def test_fence_status_has_kind_and_time_of_each_breach() -> None:
     world = flying(GF_ACTION=1, GF_PREDICT=0, GF_MAX_VER_DIST=3.5)
     before = asked(world, FENCE_STATUS)
     assert (before.breach_status, before.breach_count, before.breach_type) == (0, 0, 0)
@@ -101,7 +101,7 @@ def test_each_breach_of_the_fence_is_told_with_its_kind_and_time() -> None:
     assert (far.breach_count, far.breach_type) == (2, mavlink.FENCE_BREACH_BOUNDARY)
 
 
-def test_the_battery_has_the_state_that_the_failsafes_go_by() -> None:
+def test_charge_state_follows_the_battery_failsafes() -> None:
     world = World(vehicle="x_quad")
     told = []
     for level in (0.5, 0.13, 0.06, 0.04):

@@ -8,13 +8,14 @@ import pytest
 
 from flightstack.commander.estimate_checks import PREFLIGHT, estimate_failsafes, estimate_refusals
 from flightstack.commander.failsafe import Failsafe
-from flightstack.estimation.health import NO_HEALTH, EstimateHealth
+from flightstack.estimation.health import NO_HEALTH, Accuracy, EstimateHealth, accuracy_step
 from flightstack.params.behaviour import Behaviour
 
 GOOD = EstimateHealth(
     aligned=True, has_origin=True, imu_age_s=0.0, imu_is_stuck=False, mag_age_s=0.01, baro_age_s=0.02, fix_age_s=0.1,
-    unaided_s=0.1, refused_s=0.0, lag_s=0.13, horizontal_m=0.5, velocity_m_s=0.1, tilt_rad=0.005, gyro_bias_rad_s=0.005,
-    accel_bias_m_s2=0.05, velocity_ratio=0.2, position_ratio=0.2, height_ratio=0.2, heading_ratio=0.3,
+    unaided_s=0.1, refused_s=0.0, is_inaccurate=False, lag_s=0.13, horizontal_m=0.5, velocity_m_s=0.1, tilt_rad=0.005,
+    gyro_bias_rad_s=0.005, accel_bias_m_s2=0.05, velocity_ratio=0.2, position_ratio=0.2, height_ratio=0.2,
+    heading_ratio=0.3,
 )  # fmt: skip
 
 
@@ -52,7 +53,7 @@ CONDITIONS = [
     ({"imu_is_stuck": True}, Failsafe.IMU_FAULT, "inertial sensor is missing or stuck"),
     ({"tilt_rad": 0.2}, Failsafe.ATTITUDE_DOUBTFUL, "attitude estimate is doubtful"),
     ({"unaided_s": 5.1}, Failsafe.POSITION_LOST, "position is lost"),
-    ({"horizontal_m": 5.1}, Failsafe.POSITION_LOST, "position is lost"),
+    ({"is_inaccurate": True}, Failsafe.POSITION_LOST, "position is lost"),
     ({"lag_s": 0.6}, Failsafe.POSITION_LOST, "position is lost"),
     ({"refused_s": 1.1}, Failsafe.GNSS_REFUSED, "spoofed GNSS suspected"),
 ]
@@ -70,10 +71,6 @@ def test_condition_that_only_warns_does_not_prevent_arming() -> None:
     assert estimate_refusals(doubtful, Behaviour(gnss_doubt_action=0, attitude_doubt_action=0)) == ()
 
 
-def test_position_worse_than_its_parameter_prevents_arming() -> None:
-    assert estimate_refusals(GOOD, Behaviour(position_accuracy_m=0.3)) == ("position is lost",)
-
-
 def test_estimate_before_the_first_measurement_is_refused() -> None:
     assert "GNSS has no fix" in estimate_refusals(NO_HEALTH, Behaviour())
     assert "the attitude is not aligned yet" in estimate_refusals(NO_HEALTH, Behaviour())
@@ -87,7 +84,26 @@ def test_each_fault_of_the_estimate_is_a_condition_in_flight(
 
 
 def test_limits_of_the_estimate_are_parameters() -> None:
-    behaviour = Behaviour(dead_reckoning_s=20.0, position_accuracy_m=-1.0, tilt_accuracy_deg=0.0)
-    doubtful = GOOD._replace(unaided_s=19.0, horizontal_m=90.0, tilt_rad=1.0)
+    behaviour = Behaviour(dead_reckoning_s=20.0, tilt_accuracy_deg=0.0)
+    doubtful = GOOD._replace(unaided_s=19.0, tilt_rad=1.0)
     assert estimate_failsafes(doubtful, behaviour) == frozenset()
     assert estimate_failsafes(doubtful._replace(unaided_s=21.0), behaviour) == {Failsafe.POSITION_LOST}
+
+
+def _times_inaccurate(deviations_m: list[float], limit_m: float = 5.0) -> list[float]:
+    memory, times = Accuracy(), []
+    for tick, deviation_m in enumerate(deviations_m):
+        memory = accuracy_step(memory, deviation_m, limit_m, 0.5 * tick)
+        if memory.is_inaccurate:
+            times.append(0.5 * tick)
+    return times
+
+
+def test_position_is_accurate_again_well_below_its_limit_for_a_second() -> None:
+    assert _times_inaccurate([4.9, 5.1, 4.9, 4.1, 3.9, 3.9, 4.9]) == [0.5, 1.0, 1.5, 2.0]
+    assert _times_inaccurate([5.1, 3.9, 4.1, 3.9, 3.9]) == [0.0, 0.5, 1.0, 1.5]
+    assert _times_inaccurate([5.1, 4.9] * 4) == [0.5 * tick for tick in range(8)]
+
+
+def test_position_without_a_limit_is_never_inaccurate() -> None:
+    assert _times_inaccurate([90.0, math.inf], -1.0) == []

@@ -22,6 +22,8 @@ from flightstack.estimation.memory import (
     HAS_YAW,
     MAG_FAULT,
     POSITION_RESET,
+    RESET_CHANGE,
+    RESET_SUM,
     VELOCITY_RESET,
     YAW_RESET,
 )
@@ -190,6 +192,18 @@ def test_lasting_error_of_the_vertical_velocity_resets_it_alone() -> None:
 def test_lasting_jump_of_slow_gnss_resets_the_position() -> None:
     estimator = fly(35.0, Faults(jump_s=(20.0, math.inf), jump_m=60.0, gnss_period=500))  # every 2 s
     assert resets(estimator, POSITION_RESET) == 1.0
+
+
+def test_resets_of_all_axes_in_one_step_are_added_up() -> None:
+    def higher(sample: Any) -> Any:
+        is_late = isinstance(sample, GnssSample) and sample.time_s >= 12.0
+        return sample._replace(altitude_msl_m=sample.altitude_msl_m + 30.0) if is_late else sample
+
+    estimator = fly(22.0, Faults(jump_s=(12.0, math.inf), jump_m=60.0), higher)
+    x = estimator.memory["resets"][0, POSITION_RESET:]
+    assert x[0] == 2.0
+    assert x[RESET_CHANGE : RESET_CHANGE + 3].tolist() == x[RESET_SUM : RESET_SUM + 3].tolist()
+    assert x[RESET_SUM : RESET_SUM + 3].tolist() == pytest.approx([60.0, 0.0, -30.0], abs=3.0)
 
 
 def test_refused_fix_after_an_outage_is_not_reset_to() -> None:

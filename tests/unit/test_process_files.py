@@ -81,6 +81,7 @@ def test_failed_build_keeps_current_stack(tmp_path: Path) -> None:
     file.write_text("1\t1\tMIS_TAKEOFF_ALT\tnonsense\t9\n")
     with pytest.raises(ConfigError):
         files.build(config)
+    file.write_text("")  # repaired: a damaged file is not overwritten
     stack.params.set("MIS_TAKEOFF_ALT", 5.5)
     files.close_parameters()
     assert "5.5" in file.read_text()
