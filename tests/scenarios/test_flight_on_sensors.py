@@ -114,7 +114,7 @@ def test_vehicle_does_not_tilt_for_a_reset_of_its_position(bias: str) -> None:
         log = ULog(io.BytesIO(world.engine.newest_log()))
     position = log.get_dataset("vehicle_local_position").data
     assert (position["xy_valid"][KNOWN_ROW:] == 1).all()
-    (before,) = np.diff(position["xy_reset_counter"].astype(int)).nonzero()[0]
+    before = np.diff(position["xy_reset_counter"].astype(int)).nonzero()[0][0]
     after = before + 1
     assert position["delta_xy[0]"][after] == pytest.approx(
         position["x"][after] - position["x"][before], abs=0.2
