@@ -36,7 +36,7 @@ $(READY): $(FLY_READY)
 	@$(INSTALL) '.[dev]'
 	@$(BIN)/python -m compileall -qq -j 0 $(VENV)/lib || true  # test processes side by side import most of it
 	@$(BIN)/sim-bridge open-loop --rotors 214,214,214,214 --seconds 0.01 --json >/dev/null & \
-		$(BIN)/flightstack --check && wait $$!
+		$(BIN)/flightstack --check && $(BIN)/flightstack --check --state estimated && wait $$!
 	@touch $@
 
 fly: $(FLY_READY) ## Fly missions/square.plan: simulator, flight stack and ground station as three processes

@@ -164,6 +164,22 @@ def _assignments(elements: list[tuple[str, Any]], names: Any = None) -> Iterator
 
 
 def _prediction() -> Iterator[str]:
+    """Yield a function for the rows of each part, as Numba's time grows with the square of a function's length."""
+    r, v = rotation(), vector("delta_velocity")
+    shared = [(f"r{i}{j}", r[i, j] * DT) for i in range(3) for j in range(3)]
+    shared += [(f"a{'xyz'[i]}", (r * v)[i]) for i in range(3)]
+    elements, calls = covariance_prediction(), []
+    for part, size in (("position", 78), ("velocity", 69), ("attitude", 60)):
+        used = {str(symbol) for _, value in elements[:size] for symbol in value.free_symbols}
+        arguments = [name for name in ("dt_s", *(name for name, _ in shared)) if name in used]
+        calls.append(f"    _predict_{part}({', '.join(['p', *arguments])})")
+        declared = [f"    {name}: float," for name in arguments]
+        yield "\n\n@compiled"
+        yield "\n".join([f"def _predict_{part}(", "    p: Covariance,", *declared, ") -> None:"])
+        yield f'    """Propagate the rows of {part}."""'
+        yield from _assignments(elements[:size])
+        del elements[:size]
+    assert not elements
     yield "\n\n@compiled"
     yield "def predict_covariance(p: Covariance, q: Quaternion, delta_velocity: Vector3, dt_s: float) -> None:"
     yield '    """Propagate the elements of ``p`` on and above the diagonal by F P Fᵀ, without process noise.'
@@ -171,16 +187,8 @@ def _prediction() -> Iterator[str]:
     yield "    ``q`` is the attitude in the middle of the step, ``delta_velocity`` the specific force in the body frame"
     yield "    times ``dt_s``, less the bias."
     yield '    """'
-    r, v = rotation(), vector("delta_velocity")
-    matrix = [(f"r{i}{j}", r[i, j] * DT) for i in range(3) for j in range(3)]
-    yield from _assignments(matrix + [(f"a{'xyz'[i]}", (r * v)[i]) for i in range(3)])
-    elements = covariance_prediction()
-    names = sp.numbered_symbols("s")
-    for part, size in (("position", 78), ("velocity", 69), ("attitude", 60)):
-        yield f"    # rows of {part}"
-        yield from _assignments(elements[:size], names)
-        del elements[:size]
-    assert not elements
+    yield from _assignments(shared)
+    yield from calls
 
 
 def _measurement(

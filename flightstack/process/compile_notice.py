@@ -9,6 +9,8 @@ from numba.core import event
 
 _COMPILATION = "numba:compile"
 """Numba's event of the compilation of one function."""
+_LOOPS_S, _ESTIMATOR_S = 10, 40
+"""Time of a vehicle on the true state, and of one on its sensors."""
 
 
 class CompileNotice(event.Listener):  # type: ignore[misc]  # Numba has no types
@@ -37,7 +39,8 @@ class CompileNotice(event.Listener):  # type: ignore[misc]  # Numba has no types
     def _report(self, kernel: str) -> None:
         if not self._began:
             self._began = True
-            self._say("compiling kernels, once; this takes about 10 s on two idle cores")
+            seconds = _ESTIMATOR_S if "imu_kernel" in self._kernels else _LOOPS_S
+            self._say(f"compiling kernels, once; this takes about {seconds} s on two idle cores")
         place = ""
         if kernel in self._kernels:
             place = f" {self._kernels.index(kernel) + 1} of {len(self._kernels)}"
