@@ -154,7 +154,7 @@ def test_the_heartbeat_of_the_safe_state_needs_no_room_that_others_may_not_take(
 
 
 def test_a_reboot_does_not_end_the_safe_state(target: Target) -> None:
-    """The parameters are at their defaults, and everybody is told; only a sound step with RESET flies again."""
+    """A restart sets the parameters to their defaults and announces it; only a sound step with RESET flies again."""
     target.ask(mavlink.MAVLink_param_set_message(1, 1, b"POS_Z_P", 3.0, 9))
     target.step(0, RESET)
     target.step(1, 0, [math.nan] * 13)

@@ -1,4 +1,4 @@
-"""Any interleaving of two ground stations on bad links: plans stay whole, and everybody is told the truth."""
+"""Any interleaving of two ground stations on bad links: plans stay whole, and every answer is true."""
 
 from __future__ import annotations
 
