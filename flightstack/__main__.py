@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flightstack.process import console, options
+from flightstack.process import collection, console, options
 from flightstack.process.command_line import (
     PanelCommand,
     UsageError,
@@ -39,7 +39,7 @@ class RunOptions:
     outer_hz: options.OuterHz = None
     clock: options.Clock = "lockstep"
     loops: options.Loops = "python"
-    state: options.State = "truth"
+    state: options.State = "estimated"
     sim_host: options.SimHost = "127.0.0.1"
     sim_port: options.SimPort = None
     sim_timeout: options.SimTimeout = 30.0
@@ -87,6 +87,7 @@ def run(given: RunOptions) -> None:
         sys.exit(EXIT_TIMEOUT)
     if started is not None:
         _print_summary(*started)
+        collection.resume()
         sys.exit(started[0].run())
 
 
@@ -244,6 +245,7 @@ def _open_files(
 
 def _print_summary(vehicle_process: App, config: StackConfig, process: ProcessConfig) -> None:
     """Print vehicle, loops and ports, and warnings about the parameter file and open ports."""
+    from flightstack.params.config import FLOWN_ON
     from flightstack.process.ports import described, warning
     from flightstack.process.process_config import complain
 
@@ -255,7 +257,7 @@ def _print_summary(vehicle_process: App, config: StackConfig, process: ProcessCo
     clock = "lockstep" if config.lockstep else "realtime"
     say(
         f"flightstack: {stack.vehicle.name}, {config.controller} ({config.gains}), "
-        f"{_loops_text(config)}{config.inner_hz:g}/{config.outer_hz:g} Hz, {clock}; "
+        f"{FLOWN_ON[config.state]}, {_loops_text(config)}{config.inner_hz:g}/{config.outer_hz:g} Hz, {clock}; "
         f"simulator {process.simulator_host}:{process.simulator_port}, {described(process.ports)}, "
         f"{_state_text(config, process)}"
     )
@@ -281,7 +283,8 @@ def main() -> None:
     """Run the command."""
     console.replace_unencodable()
     try:
-        sys.exit(app(prog_name="flightstack", standalone_mode=False))
+        with collection.paused():
+            sys.exit(app(prog_name="flightstack", standalone_mode=False))
     except UsageError as error:
         console.complain(f"flightstack: {usage_sentence(error)}")
         sys.exit(2)

@@ -1,19 +1,10 @@
-"""Copies between arrays and tuples in compiled functions, as LLVM code.
-
-Compiled from Python, each pair of types would be a function of its own for Numba, 5 % of the compilation in all.
-"""
-# mypy: disable-error-code="untyped-decorator"
+"""Copies between arrays and tuples. In compiled functions they are LLVM code: see ``compiled_builtins``."""
 
 from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
-from numba.core import cgutils
-from numba.core.imputils import lower_builtin
-from numba.extending import type_callable
-from numba.np.arrayobj import load_item, make_array, store_item
 
 
 def as_tuple(array: Any, count: int) -> Any:
@@ -28,72 +19,3 @@ def store(out: np.ndarray[Any, np.dtype[np.float64]], values: Any) -> None:
     """
     for index in range(len(values)):
         out[index] = values[index]
-
-
-def _is_vector(kind: Any) -> bool:
-    return isinstance(kind, numba.types.Array) and kind.ndim == 1
-
-
-@type_callable(as_tuple)
-def _type_as_tuple(_: Any) -> Any:
-    def result(array: Any, count: Any) -> Any:
-        if _is_vector(array) and isinstance(count, numba.types.IntegerLiteral):
-            return numba.types.UniTuple(array.dtype, count.literal_value)
-        return None
-
-    return result
-
-
-@type_callable(store)
-def _type_store(context: Any) -> Any:
-    def result(out: Any, values: Any) -> Any:
-        if not (_is_vector(out) and out.mutable):
-            return None
-        if isinstance(values, numba.types.BaseTuple):
-            items = values.types
-        elif _is_vector(values):
-            items = (values.dtype,)
-        else:
-            return None
-        is_convertible = all(context.can_convert(item, out.dtype) is not None for item in items)
-        return numba.types.none if is_convertible else None
-
-    return result
-
-
-def _pointer(context: Any, builder: Any, array_type: Any, array: Any, index: Any) -> Any:
-    return cgutils.get_item_pointer(context, builder, array_type, array, [index])
-
-
-@lower_builtin(as_tuple, numba.types.Array, numba.types.IntegerLiteral)
-def _lower_as_tuple(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    array_type, array = sig.args[0], make_array(sig.args[0])(context, builder, args[0])
-    indices = (context.get_constant(numba.types.intp, index) for index in range(sig.return_type.count))
-    pointers = [_pointer(context, builder, array_type, array, index) for index in indices]
-    items = [load_item(context, builder, array_type, pointer) for pointer in pointers]
-    return context.make_tuple(builder, sig.return_type, items)
-
-
-@lower_builtin(store, numba.types.Array, numba.types.BaseTuple)
-def _lower_store_tuple(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    out_type, out = sig.args[0], make_array(sig.args[0])(context, builder, args[0])
-    for number, item_type in enumerate(sig.args[1].types):
-        item = context.cast(builder, builder.extract_value(args[1], number), item_type, out_type.dtype)
-        index = context.get_constant(numba.types.intp, number)
-        store_item(context, builder, out_type, item, _pointer(context, builder, out_type, out, index))
-    return context.get_dummy_value()
-
-
-@lower_builtin(store, numba.types.Array, numba.types.Array)
-def _lower_store_array(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    (out_type, out), (values_type, values) = (
-        (array_type, make_array(array_type)(context, builder, array))
-        for array_type, array in zip(sig.args, args, strict=True)
-    )
-    with cgutils.for_range(builder, cgutils.unpack_tuple(builder, values.shape, 1)[0]) as loop:
-        item = load_item(
-            context, builder, values_type, _pointer(context, builder, values_type, values, loop.index)
-        )
-        item = context.cast(builder, item, values_type.dtype, out_type.dtype)
-        store_item(context, builder, out_type, item, _pointer(context, builder, out_type, out, loop.index))
-    return context.get_dummy_value()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from flightstack.core.array_items import store
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import (
@@ -16,6 +18,15 @@ from flightstack.core.contract import (
 )
 
 _WRENCH, _ACHIEVED, _STATUS = LoopRow.WRENCH.start, LoopRow.WRENCH_ACHIEVED.start, LoopRow.STATUS
+
+
+@compiled
+def all_finite(values: FloatArray | tuple[float, ...]) -> bool:
+    """Return True if all values of an array or a flat tuple are finite."""
+    for value in values:  # noqa: SIM110  # compiled code has no generators
+        if not math.isfinite(value):
+            return False
+    return True
 
 
 @compiled

@@ -5,106 +5,65 @@ its first call and read from the cache afterwards. With ``NUMBA_DISABLE_JIT=1`` 
 
 Python passes arrays to a compiled *kernel*, at a tenth of the cost of NamedTuples. Compiled functions pass NamedTuples
 to each other, which keeps control laws readable.
+
+Numba is imported at the first use of a kernel: a program that checks options or reads parameters does without it.
 """
 
 from __future__ import annotations
 
-import gc
+import functools
 import importlib
+import os
 from collections.abc import Callable
 from functools import cached_property
 from types import FunctionType
-from typing import Any, ClassVar, TypeVar
+from typing import Any, TypeVar
 
-import numba
-from numba.core.caching import FunctionCache
-from numba.core.compiler import Compiler
-from numba.core.registry import CPUDispatcher
-from numba.extending import register_jitable
-from numba.np import linalg
+from flightstack.core.kernel_cache import is_own
 
-from flightstack.core import portable_math
-from flightstack.core.kernel_cache import directory, is_own
-
-_TESTED_NUMBA = {(0, minor) for minor in range(60, 69)}
-"""Versions whose compiler ``kernel_compiler`` extends; another compiles the same in a longer time."""
-
-KernelCompiler: type[Compiler] = Compiler
-PartCompiler: type[Compiler] = Compiler
-KernelCache: type[FunctionCache] = FunctionCache
-PartCache: type[FunctionCache] = FunctionCache
-if numba.version_info.short in _TESTED_NUMBA:
-    from flightstack.core.kernel_compiler import KernelCache, KernelCompiler, PartCache, PartCompiler
-
-
-def _import_without_scipy() -> None:
-    """Import Numba's array functions without their search for BLAS, which imports scipy.linalg and takes 0.2 s.
-
-    A kernel that needs BLAS, such as a plug-in controller, repeats the search when it is compiled.
-    """
-    search, linalg.ensure_blas = linalg.ensure_blas, lambda: None
-    try:
-        importlib.import_module("numba.np.arraymath")
-    finally:
-        linalg.ensure_blas = search
-
-
-_import_without_scipy()
+IS_DISABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+"""True if compiled functions are plain Python, for debugging."""
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 specialised: dict[tuple[Callable[..., Any], str], Callable[..., Any]] = {}
 """Kernels made by ``specialise`` in this process, by template and key."""
 
-for _function in portable_math.FUNCTIONS:
-    register_jitable(error_model="numpy", no_cfunc_wrapper=True, pipeline_class=PartCompiler)(_function)
 
-
-class _Kernel(CPUDispatcher):  # type: ignore[misc]  # Numba has no types
-    """A compiled function that Python calls. Compiled functions call its ``part``."""
-
-    _OPTIONS: ClassVar = {"nopython": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+class Kernel:
+    """A function that is compiled at its first use. Its other attributes are those of Numba's dispatcher."""
 
     def __init__(self, function: Callable[..., Any], modules: frozenset[str]) -> None:
-        super().__init__(function, targetoptions=self._OPTIONS, pipeline_class=KernelCompiler)
+        functools.update_wrapper(self, function)
+        self.py_func = function
         self._modules = modules
-        self._enable_cache(self, KernelCache)
-
-    def _enable_cache(self, dispatcher: CPUDispatcher, cache: type[FunctionCache]) -> None:
-        if not is_own(self.py_func.__module__):
-            return
-        others = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = str(directory(self._modules, numba.__version__))
-        try:
-            dispatcher._cache = cache(dispatcher.py_func)
-        finally:
-            numba.config.CACHE_DIR = others
 
     @cached_property
-    def part(self) -> CPUDispatcher:
-        """The same function without machine code and without the wrapper for Python."""
-        copy = _renamed(self.py_func, "part", self.py_func.__globals__)
-        options = {**self._OPTIONS, "no_cpython_wrapper": True}
-        part = CPUDispatcher(copy, targetoptions=options, pipeline_class=PartCompiler)
-        self._enable_cache(part, PartCache)  # under the name of the copy
-        return part
+    def dispatcher(self) -> Any:
+        """Numba's dispatcher of the function."""
+        from flightstack.core.dispatcher import KernelDispatcher  # noqa: PLC0415  # imports Numba
 
-    @property
-    def _numba_type_(self) -> numba.types.Type:
-        return numba.types.Dispatcher(self.part)
+        return KernelDispatcher(self.py_func, self._modules)
 
-    def compile(self, sig: Any) -> Any:
-        """Compile without garbage collection, which would take a tenth of the time."""
-        collects = gc.isenabled()
-        gc.disable()
-        try:
-            return super().compile(sig)
-        finally:
-            if collects:
-                gc.enable()
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the function compiled for the types of the arguments."""
+        return self.dispatcher(*arguments)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):  # such as the protocols that NumPy looks for
+            raise AttributeError(name)
+        return getattr(self.dispatcher, name)
+
+    def __reduce__(self) -> str:
+        return str(self.__name__)
 
 
-def _renamed(function: FunctionType, suffix: str, names: dict[str, Any]) -> FunctionType:
+def compiler_version() -> str:
+    """Return the version of Numba."""
+    return str(importlib.import_module("numba").__version__)
+
+
+def renamed(function: FunctionType, suffix: str, names: dict[str, Any]) -> FunctionType:
     """Return a copy of ``function`` named ``function__suffix`` with the globals ``names``."""
     name = f"{function.__name__}__{suffix}"
     copy = FunctionType(function.__code__, names, name, function.__defaults__, function.__closure__)
@@ -115,9 +74,7 @@ def _renamed(function: FunctionType, suffix: str, names: dict[str, Any]) -> Func
 
 def _compile(function: F, modules: frozenset[str]) -> F:
     """Compile ``function`` with a cache keyed by the sources of ``modules``."""
-    if numba.config.DISABLE_JIT:
-        return function
-    return _Kernel(function, modules)
+    return function if IS_DISABLED else Kernel(function, modules)  # type: ignore[return-value]
 
 
 def compiled(function: F) -> F:
@@ -136,9 +93,8 @@ def direct(kernel: Callable[..., Any], *examples: Any) -> Callable[..., Any]:
     """
     if isinstance(kernel, FunctionType):  # NUMBA_DISABLE_JIT
         return kernel
-    types = tuple(numba.typeof(example) for example in examples)
-    kernel.compile(types)  # type: ignore[attr-defined]
-    return kernel.get_overload(types)  # type: ignore[attr-defined,no-any-return]
+    assert isinstance(kernel, Kernel)
+    return kernel.dispatcher.compiled_for(*examples)  # type: ignore[no-any-return]
 
 
 def specialise(template: Callable[..., Any], key: str, **names: Any) -> Callable[..., Any]:
@@ -152,7 +108,7 @@ def specialise(template: Callable[..., Any], key: str, **names: Any) -> Callable
     known = specialised.get((template, key))
     if known is not None:
         return known
-    copy = _renamed(template, key, {**template.__globals__, **names})
+    copy = renamed(template, key, {**template.__globals__, **names})
     modules = {getattr(value, "__module__", None) or template.__module__ for value in names.values()}
     specialised[template, key] = _compile(copy, frozenset(filter(is_own, {copy.__module__, *modules})))
     return specialised[template, key]

@@ -17,6 +17,16 @@ class ConfigError(Exception):
         super().__init__(where + problem)
         self._parts = (str(file), key, problem)
 
+    def as_keyword(self, keys: Mapping[str, str]) -> ConfigError:
+        """Return the error of an option that a keyword argument gives: ``--inner-hz`` is ``inner_hz``.
+
+        ``keys``: keywords of options with another name. Other errors stay.
+        """
+        option, value, problem = self._parts
+        if not option.startswith("--"):
+            return self
+        return ConfigError(_key(option, keys), value, problem)
+
     def within(self, file: object, keys: Mapping[str, str]) -> ConfigError:
         """Return the error of an option that ``file`` gives: ``--inner-hz`` is its key ``inner_hz``.
 
@@ -25,12 +35,15 @@ class ConfigError(Exception):
         option, value, problem = self._parts
         if not option.startswith("--"):
             return ConfigError(file, "", str(self))
-        key = keys.get(option, option.removeprefix("--").replace("-", "_"))
-        return ConfigError(file, key, f"{value}: {problem}")
+        return ConfigError(file, _key(option, keys), f"{value}: {problem}")
 
     def __reduce__(self) -> tuple[type[ConfigError], tuple[str, str, str]]:
         """Support pickling: the default passes the text alone to a constructor with three arguments."""
         return type(self), self._parts
+
+
+def _key(option: str, keys: Mapping[str, str]) -> str:
+    return keys.get(option, option.removeprefix("--").replace("-", "_"))
 
 
 class TargetError(RuntimeError):

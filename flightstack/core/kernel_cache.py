@@ -19,6 +19,8 @@ from functools import cache
 from pathlib import Path
 
 OWN_PACKAGES = ("flightstack", "sim_bridge")
+STARTED_S = time.time()
+"""Time of the import of this module: sources that are newer are not those that this process runs [s]."""
 _KEPT_S = 14 * 86_400.0
 """Lifetime of a directory after its last use."""
 _IMPORT = re.compile(
@@ -85,7 +87,8 @@ def digest(top: Path, module_names: Iterable[str], version: str) -> str:
 
 
 @cache
-def _base() -> Path:
+def base_directory() -> Path:
+    """Return the directory of all kernels: below the user's cache, or a temporary one if that is read-only."""
     caches = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     base = Path(caches) / "flightstack" / "kernels"
     with suppress(OSError):
@@ -105,13 +108,20 @@ def _remove_old(base: Path) -> None:
 
 def is_shared() -> bool:
     """Return True if all processes of this user share the cache."""
-    return _base().name == "kernels"
+    return base_directory().name == "kernels"
 
 
 @cache
-def directory(module_names: frozenset[str], version: str) -> Path:
-    """Return the cache directory for kernels made from these modules; ``version`` is the compiler's."""
-    path = _base() / digest(Path(__file__).resolve().parents[2], module_names, version)
+def directory(module_names: frozenset[str], version: str) -> Path | None:
+    """Return the cache directory for kernels made from these modules; ``version`` is the compiler's.
+
+    It is None if a source was replaced since this process started, which may run the version before. The time of the
+    change in the file system tells, since a file may be replaced by one with an older time of its own.
+    """
+    top = Path(__file__).resolve().parents[2]
+    if any(path.stat().st_ctime > STARTED_S for path in sources(top, module_names)):
+        return None
+    path = base_directory() / digest(top, module_names, version)
     path.mkdir(parents=True, exist_ok=True)
     os.utime(path)
     return path

@@ -12,14 +12,17 @@ from types import FunctionType, SimpleNamespace
 from typing import Any
 
 import numba
-from llvmlite.binding import parse_bitcode  # type: ignore[import-untyped]
+from llvmlite.binding import parse_assembly, parse_bitcode  # type: ignore[import-untyped]
 from numba.core import types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult, Flags
 from numba.core.environment import lookup_environment
+from numba.core.runtime import rtsys
 from numba.core.sigutils import normalize_signature
 from numba.core.typing.templates import AbstractTemplate, Signature, infer_global, signature
+
+from flightstack.core.kernel_cache import is_own
 
 _DEFAULTS = {name: option.default for name, option in Flags.options.items()}
 _NO_ENVIRONMENT = SimpleNamespace(set_env=lambda name, environment: None)
@@ -51,6 +54,9 @@ class _Compiler(Compiler):  # type: ignore[misc]
         flags: Flags,
         locals: Any,
     ) -> None:
+        from flightstack.core.compiled_builtins import register  # noqa: PLC0415  # compiles only
+
+        register(PartCompiler)
         super().__init__(typingctx, targetctx, library, args, return_type, _Flags(flags), locals)
 
     def compile_extra(self, func: Any) -> CompileResult:
@@ -126,8 +132,19 @@ class _Locator(UserProvidedCacheLocator):  # type: ignore[misc]
         return ""
 
 
-class _KernelCacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
+class _CacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
     _locator_classes = [_Locator]  # noqa: RUF012
+
+
+class _KernelCacheImpl(_CacheImpl):
+    def reduce(self, result: CompileResult) -> Any:
+        """Return the result to store, with the name of the function that Python calls in place of all LLVM code.
+
+        Numba keeps the LLVM code for callers: they include the part.
+        """
+        (name, kind, (machine_code, _)), *rest = super().reduce(result)
+        names = parse_assembly(f'define void @"{result.fndesc.llvm_cpython_wrapper_name}"() {{ ret void }}')
+        return ((name, kind, (machine_code, names.as_bitcode())), *rest)
 
 
 class KernelCache(FunctionCache):  # type: ignore[misc]
@@ -138,14 +155,30 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
         """Return the stored result for these types, or None.
 
+        Numba would first install all types and functions that it can compile. A stored result needs its runtime alone.
         Two processes that save for the first time at once choose the same file: the index of one names the other's.
         """
-        stored = super().load_overload(sig, target_context)
+        stored = None
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            stored = self._load_overload(sig, target_context)
         arguments, _ = normalize_signature(sig)
         return stored if stored is not None and tuple(stored.signature.args) == tuple(arguments) else None
 
+    def save_overload(self, sig: Any, data: CompileResult) -> None:
+        """Store the result, unless it is for a type of another package: a process without that cannot read the file."""
+        if all(_is_own_type(each) for each in (*data.signature.args, data.signature.return_type)):
+            super().save_overload(sig, data)
 
-class _PartCacheImpl(_KernelCacheImpl):
+
+def _is_own_type(kind: types.Type) -> bool:
+    """Return True if no part of a type is a named tuple of another package."""
+    named = getattr(kind, "instance_class", None)
+    parts = getattr(kind, "types", ())  # of a tuple
+    return (named is None or is_own(named.__module__)) and all(_is_own_type(part) for part in parts)
+
+
+class _PartCacheImpl(_CacheImpl):
     def rebuild(self, target_context: Any, payload: Any) -> CompileResult:
         """Return the result of a compilation as ``CompileResult._rebuild`` does, but without machine code."""
         serialised, description, environment, function_signature, object_mode, lifted, annotation, *rest = (
@@ -180,7 +213,7 @@ class PartCache(KernelCache):
     _impl_class = _PartCacheImpl
 
 
-class _FloatOperator(AbstractTemplate):  # type: ignore[misc]
+class FloatOperator(AbstractTemplate):  # type: ignore[misc]
     """Type of an operator with two floats, found before Numba asks NumPy for a matching ufunc.
 
     Templates are for all of a process: outside the compilation of a kernel this one leaves the type to Numba.
@@ -190,16 +223,17 @@ class _FloatOperator(AbstractTemplate):  # type: ignore[misc]
     result: Any = types.float64
 
     def generic(self, args: tuple[Any, ...], kws: dict[str, Any]) -> Signature | None:
+        """Return the signature of two floats, or None for Numba's own."""
         if not _Compiler.active or kws or args != (types.float64, types.float64):
             return None
         return signature(self.result, *args)
 
 
-class _FloatComparison(_FloatOperator):
+class _FloatComparison(FloatOperator):
     result = types.boolean
 
 
 for _operator in (operator.add, operator.sub, operator.mul, operator.truediv):
-    infer_global(_operator)(_FloatOperator)
+    infer_global(_operator)(FloatOperator)
 for _operator in (operator.lt, operator.le, operator.gt, operator.ge, operator.eq, operator.ne):
     infer_global(_operator)(_FloatComparison)

@@ -243,9 +243,11 @@ class App:
         self._follower = AffinityFollower(simulator.socket)
         divisor, tick = self.stack.rates.divisor, 0
         fresh, began_ns, before_ns = True, 0, 0  # fresh: the state received before the start
+        is_over = False
         while True:
             if fresh:
-                if until is not None and tick % divisor == 0 and until():
+                is_over = is_over or (until is not None and until())
+                if is_over and tick % divisor == 0:
                     return
                 before_ns, began_ns = began_ns, clock_ns()
                 commands = lockstep.tick(began_ns)
@@ -254,12 +256,13 @@ class App:
                 tick += 1
                 if tick % divisor == 0:
                     self._between_ticks(simulator)
-            if self._idle_poller is not None and began_ns - before_ns > GROUND_POLL_NS:
+            # a command between the end and the next outer tick would act at a time that depends on the machine
+            if self._idle_poller is not None and not is_over and began_ns - before_ns > GROUND_POLL_NS:
                 serve_while_idle(
                     simulator, self._idle_poller, self.stack, self._process, self._serve_while_idle
                 )
             data = receive()
-            fresh = self._wait_for_simulator(simulator) if data is None else link.receive(data)
+            fresh = self._wait_for_simulator(simulator, not is_over) if data is None else link.receive(data)
 
     def _serve_while_idle(self) -> None:
         """Serve the ground links between two states of the simulator, and check for a stop."""
@@ -267,11 +270,14 @@ class App:
             self._busy_until_ns = time.monotonic_ns() + GROUND_BUSY_NS
         self._check_stop()
 
-    def _wait_for_simulator(self, simulator: TcpClient) -> bool:
-        """Serve the ground links until the simulator sends data; return True for a new state."""
+    def _wait_for_simulator(self, simulator: TcpClient, serves: bool) -> bool:
+        """Serve the ground links, if asked to, until the simulator sends data; return True for a new state."""
         deadline_s = time.monotonic() + self._process.simulator_timeout_s
         while True:
-            self._serve_while_waiting()
+            if serves:
+                self._serve_while_waiting()
+            else:
+                self._check_stop()
             data = simulator.receive()
             if data is not None:
                 return self.stack.simulator.receive(data)

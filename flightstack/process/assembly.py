@@ -5,35 +5,32 @@ The process (``app``) and in-process tests use the same stack.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
 from flightstack import __version__
 from flightstack.control.backend import ControlBackend
-from flightstack.control.controller import controller_of
-from flightstack.control.controller_loading import check_python, load_controller
-from flightstack.control.loop_parameters import loop_numbers
 from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import GeoPoint
 from flightstack.firmware.c_loops import LoopsSetup
-from flightstack.firmware.choice import PYTHON, parse_loops
-from flightstack.firmware.law_tree import law_tree, own_params
-from flightstack.firmware.targets import make_loops
+from flightstack.firmware.choice import PYTHON
+from flightstack.firmware.law_tree import own_params
+from flightstack.firmware.targets import make_filter, make_loops
 from flightstack.flight_log.flight_log import vehicle_fields
 from flightstack.flight_log.local_position import SENSED_OUTER
 from flightstack.flight_log.recorder import FlightRecorder, OpenLog
 from flightstack.flight_log.sensor_recorder import SENSOR_GROUPS, SensorRecorder
 from flightstack.flight_log.topics import OUTER_GROUP
 from flightstack.guidance.safe_places import SafePlaces
-from flightstack.params.config import AUTOPILOT, ESTIMATED, GENERIC, STATES, SYSTEM_ID, StackConfig
-from flightstack.params.gains_file import open_gains
+from flightstack.params.config import AUTOPILOT, ESTIMATED, GENERIC, SYSTEM_ID, StackConfig
+from flightstack.params.estimator import MULTI_IMU
 from flightstack.params.param_file import LoadedParams
 from flightstack.params.store import ParamStore
-from flightstack.params.vehicle import Vehicle, load_vehicle
+from flightstack.params.vehicle import Vehicle
 from flightstack.process import compile_helper
 from flightstack.process.clock import LoopTiming, Rates, TimingReport, rates
+from flightstack.process.config_check import loops_setup
 from flightstack.services.commands.context import VehicleContext
 from flightstack.services.logs.log_store import NO_LOGS, LogStore
 from flightstack.services.routing.hub import GroundHub
@@ -43,13 +40,11 @@ from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.assembly import VehicleParts, assemble
 from flightstack.vehicle.autopilot import TickingAutopilot
 from flightstack.vehicle.estimation import Estimation, SensorAutopilot, Users
-from flightstack.vehicle.flight_state import FlightState
-from flightstack.vehicle.journal import Journal
+from flightstack.vehicle.flight_state import FlightState, Journal
 from flightstack.vehicle.parameters import (
     behaviour_of,
     connect_parameters,
     load_parameters,
-    read_parameters,
 )
 from flightstack.vehicle.status import VehicleStatus, vehicle_info, vehicle_status
 
@@ -113,50 +108,12 @@ class Stack(NamedTuple):
         return self.parts.area
 
 
-def vehicle_of(config: StackConfig) -> Vehicle:
-    """Load the vehicle; raise ConfigError."""
-    if config.state not in STATES:
-        raise ConfigError(
-            "--state", config.state, f"is not one of {', '.join(STATES)}; the directory is --state-dir"
-        )
-    vehicle = load_vehicle(config.vehicle)
-    if config.state == ESTIMATED and not vehicle.sensors.numbers:
-        raise ConfigError(
-            "--state", config.state, f"needs sensors, and {config.vehicle} has none: add [sensors]"
-        )
-    return vehicle.with_ideal_rotors() if config.ideal_rotors else vehicle
-
-
 def kernels_of(config: StackConfig) -> tuple[str, ...]:
     """Return the names of the kernels that ``build`` compiles or loads: those of the loops, then the other ones."""
     needs_loops = config.loops == PYTHON
     kernels = tuple(name for name in _KERNELS if needs_loops or name not in _LOOP_KERNELS)
     kernels += _ESTIMATOR_KERNELS if config.state == ESTIMATED else ()
     return kernels if config.lockstep else kernels + _REAL_TIME_KERNELS
-
-
-def check(config: StackConfig) -> None:
-    """Raise ConfigError for a configuration that ``build`` refuses; neither compile loops nor open a target."""
-    setup = _loops_setup(config, rates(config.inner_hz, config.outer_hz))
-    if parse_loops(config.loops).kind != PYTHON:
-        setup.numbers()
-        law_tree(setup.controller)
-    else:
-        check_python(controller_of(setup.controller))
-    numbers = loop_numbers(setup.vehicle, setup.controller, setup.gains, setup.max_tilt_rad)
-    read_parameters(config, numbers.specs)
-
-
-def _loops_setup(config: StackConfig, loop_rates: Rates) -> LoopsSetup:
-    return LoopsSetup(
-        vehicle_of(config),
-        load_controller(config.controller),
-        open_gains(config.gains),
-        math.radians(config.behaviour.max_tilt_deg),
-        loop_rates.inner_hz,
-        loop_rates.outer_hz,
-        loop_rates.divisor,
-    )
 
 
 def build(
@@ -167,7 +124,7 @@ def build(
     The compile helper and this process share the compilation. Raise ConfigError for an invalid configuration.
     """
     loop_rates = rates(config.inner_hz, config.outer_hz)
-    setup = _loops_setup(config, loop_rates)
+    setup = loops_setup(config, loop_rates)
     if config.loops == PYTHON:
         compile_helper.start()
     backend = make(config.loops, setup, config.lockstep)
@@ -177,6 +134,17 @@ def build(
     except BaseException:
         backend.close()  # a target may hold a process or a serial port
         raise
+
+
+def _recorder(
+    open_log: OpenLog,
+    info: dict[str, str | int | float],
+    params: ParamStore,
+    simulator: SimulatorEndpoint,
+    home: GeoPoint,
+) -> FlightRecorder:
+    topics = ((), OUTER_GROUP) if simulator.sensors is None else (SENSOR_GROUPS, SENSED_OUTER)
+    return FlightRecorder(open_log, info, params.values, home, lambda: simulator.battery, *topics)
 
 
 def _join(
@@ -195,8 +163,7 @@ def _join(
         vehicle, config.home, config.lockstep, system_id, loop_rates.interval_us,
         uses_sensors=config.state == ESTIMATED,
     )  # fmt: skip
-    topics = ((), OUTER_GROUP) if simulator.sensors is None else (SENSOR_GROUPS, SENSED_OUTER)
-    recorder = FlightRecorder(open_log, info, params.values, config.home, lambda: simulator.battery, *topics)
+    recorder = _recorder(open_log, info, params, simulator, config.home)
     parts = assemble(
         vehicle, backend, behaviour, config.home, loop_rates.divisor, loop_rates.outer_hz, recorder,
         simulator.state, simulator.rotor_speed_rad_s, simulator,
@@ -235,12 +202,18 @@ def _on_sensors(
     """
     if simulator.sensors is None:
         return parts.autopilot, None
+    core, imu_count = make_filter(parts.backend), parts.vehicle.sensors.imu_count
+    if core is not None and min(imu_count, int(params.value(MULTI_IMU.name))) > 1:
+        problem = f"follows one inertial sensor, and the vehicle has {imu_count}: set EKF2_MULTI_IMU to 1"
+        raise ConfigError("--loops", "", f"the estimator in C {problem}")
     users = Users(parts.area, parts.failsafes, parts.navigator, parts.backend, parts.journal)
     sensor_recorder = SensorRecorder(recorder, parts.places.frame, home)
     estimation = Estimation(
-        simulator.sensors, parts.now, users, params, sensor_recorder, simulator.known_truth
-    )
+        simulator.sensors, parts.now, users, params, sensor_recorder, simulator.known_truth,
+        imu_count, core,
+    )  # fmt: skip
     estimation.warm_up()
+    parts.area.await_origin()
     return SensorAutopilot(parts.autopilot, estimation), estimation
 
 

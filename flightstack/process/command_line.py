@@ -1,4 +1,4 @@
-"""Command lines of the three programs: common look, shared options, and how one program starts another."""
+"""Command lines of the three programs: common appearance, shared options, and how one program starts another."""
 
 from __future__ import annotations
 

@@ -16,10 +16,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 
 from flightstack.commander.failsafe_monitor import FailsafeMonitor
+from flightstack.core.compiled import IS_DISABLED
 from flightstack.core.contract import STATE_SIZE
 from flightstack.core.kernel_cache import is_shared
 from flightstack.flight_log.recorder import FlightRecorder
@@ -88,15 +88,20 @@ def finish(*, with_streams: bool) -> None:
 
 def is_useful() -> bool:
     """Return True if a helper can run beside this process and share its results, and has something to do."""
-    if numba.config.DISABLE_JIT or not is_shared():
+    if IS_DISABLED or not is_shared():
         return False
     cpus = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return cpus > 1 and not is_cached(goal_kernel)
+    return cpus > 1 and has_cache(goal_kernel) and not is_cached(goal_kernel)
+
+
+def has_cache(kernel: Any) -> bool:
+    """Return False if ``kernel`` is compiled in each process: its sources changed after the start of this one."""
+    return kernel.stats.cache_path is not None
 
 
 def is_cached(kernel: Any) -> bool:
     """Return True if the cache on disk holds a compiled version of ``kernel``."""
-    return any(Path(kernel.stats.cache_path).glob(f"*.{kernel.__name__}-*.nbi"))
+    return has_cache(kernel) and any(Path(kernel.stats.cache_path).glob(f"*.{kernel.__name__}-*.nbi"))
 
 
 def compile_guidance() -> Navigator:

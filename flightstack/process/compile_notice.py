@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
 from collections.abc import Callable, Sequence
-
-from numba.core import event
+from typing import Any
 
 _COMPILATION = "numba:compile"
 """Numba's event of the compilation of one function."""
@@ -13,7 +13,7 @@ _LOOPS_S, _ESTIMATOR_S = 10, 40
 """Time of a vehicle on the true state, and of one on its sensors."""
 
 
-class CompileNotice(event.Listener):  # type: ignore[misc]  # Numba has no types
+class CompileNotice:
     """Reports each kernel before its compilation, which includes the functions that it calls."""
 
     def __init__(self, say: Callable[[str], None], kernels: Sequence[str], began: bool = False) -> None:
@@ -22,19 +22,21 @@ class CompileNotice(event.Listener):  # type: ignore[misc]  # Numba has no types
         self._depth = 0
         self._began = began
 
-    def on_start(self, event: event.Event) -> None:
-        """Report a kernel at the start of its compilation."""
-        self._depth += 1
-        if self._depth == 1:
+    def notify(self, event: Any) -> None:
+        """Report a kernel at the start of its compilation, and track nested compilations; called by Numba."""
+        if event.is_start and not self._depth:
             self._report(base_name(event.data["dispatcher"].py_func.__name__))
+        self._depth += 1 if event.is_start else -1
 
-    def on_end(self, event: event.Event) -> None:
-        """Track nested compilations."""
-        self._depth -= 1
+    def start(self) -> None:
+        """Report the compilations of this process."""
+        events = _numba_events()
+        events.Listener.register(CompileNotice)
+        events.register(_COMPILATION, self)
 
     def stop(self) -> None:
         """Report no more."""
-        event.unregister(_COMPILATION, self)
+        _numba_events().unregister(_COMPILATION, self)
 
     def _report(self, kernel: str) -> None:
         if not self._began:
@@ -45,6 +47,12 @@ class CompileNotice(event.Listener):  # type: ignore[misc]  # Numba has no types
         if kernel in self._kernels:
             place = f" {self._kernels.index(kernel) + 1} of {len(self._kernels)}"
         self._say(f"compiling kernel{place}: {kernel}")
+
+
+def _numba_events() -> Any:
+    return importlib.import_module(
+        "numba.core.event"
+    )  # late: commands that fly nothing check the same options
 
 
 def base_name(kernel: str) -> str:
@@ -59,5 +67,5 @@ def announce_compilation(program: str, kernels: Sequence[str], began: bool = Fal
         print(f"{program}: {text}", file=sys.stderr, flush=True)
 
     notice = CompileNotice(say, kernels, began)
-    event.register(_COMPILATION, notice)
+    notice.start()
     return notice

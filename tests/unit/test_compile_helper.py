@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from flightstack.process import compile_helper
-from flightstack.testing import World
 from tests.support.tools import NIGHTLY
+from tests.support.truth import World
 
 pytestmark = pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
 ROOT = Path(__file__).resolve().parents[2]
@@ -24,7 +24,7 @@ COLD_FLIGHT = """
 import hashlib, json, sys
 from numba.core import event
 from flightstack.process.compile_notice import base_name
-from flightstack.testing import World
+from tests.support.truth import World
 
 class Listener(event.Listener):
     compiled = []

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import pytest
-from numba.core import event
 
 from flightstack.core.compiled import compiled
 from flightstack.process.compile_notice import CompileNotice
@@ -24,7 +25,7 @@ LOADED = """
 import json
 import os
 import sys
-from numba.core.dispatcher import Dispatcher
+from flightstack.core.compiled import Kernel
 import flightstack.process.assembly
 import sim_bridge.simulator
 
@@ -32,7 +33,7 @@ def report(name):
     found = {id(value): value for module_name, module in list(sys.modules.items())
              if module_name.partition(".")[0] in ("flightstack", "sim_bridge")
              for value in [*vars(module).values(), *getattr(module, "specialised", {}).values()]
-             if isinstance(value, Dispatcher)}
+             if isinstance(value, Kernel)}
     used = [kernel for kernel in found.values() if kernel.overloads]
     compiled = any(sum(kernel.stats.cache_misses.values()) for kernel in used)
     print(json.dumps([name, compiled, sorted(k.py_func.__name__.partition("__")[0] for k in used)]), flush=True)
@@ -99,10 +100,18 @@ def loaded_kernels() -> dict[str, list[str]]:
     return {name: ["compiled"] if compiled else kernels for name, compiled, kernels in reports}
 
 
+@contextlib.contextmanager
+def reporting(said: list[str], *kernels: str) -> Iterator[None]:
+    notice = CompileNotice(said.append, kernels)
+    notice.start()
+    yield
+    notice.stop()
+
+
 @JIT
 def test_compile_notice_counts_kernels_not_their_parts() -> None:
     said: list[str] = []
-    with event.install_listener("numba:compile", CompileNotice(said.append, ("other", "whole"))):
+    with reporting(said, "other", "whole"):
         assert whole(1.5) == 5.0
         assert whole(2.5) == 7.0
     assert said == [
@@ -119,7 +128,7 @@ def test_compile_notice_names_a_kernel_that_is_not_listed() -> None:
     def surplus(x: float) -> float:
         return math.sqrt(x)
 
-    with event.install_listener("numba:compile", CompileNotice(said.append, ())):
+    with reporting(said):
         surplus(4.0)
     assert said[-1] == "compiling kernel: surplus"
 

@@ -167,6 +167,24 @@ def test_kernels_are_in_the_users_cache_and_unused_ones_are_removed(tmp_path: Pa
     assert "old" not in names
 
 
+def test_sources_newer_than_the_process_are_not_cached(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The process may run the version before: its machine code is not that of the sources on disk."""
+    find = kernel_cache.directory.__wrapped__
+    assert find(frozenset({"flightstack.control.mixer"}), "1") is not None
+    monkeypatch.setattr(kernel_cache, "STARTED_S", Path(geometry.__file__).stat().st_ctime - 1.0)
+    assert find(frozenset({"flightstack.control.mixer"}), "1") is None
+
+
+def test_a_source_replaced_by_one_with_an_older_time_is_not_cached(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    replaced = tmp_path / "mixer.py"
+    replaced.touch()
+    os.utime(replaced, (1000.0, 1000.0))
+    monkeypatch.setattr(kernel_cache, "sources", lambda _top, _names: [replaced])
+    assert kernel_cache.directory.__wrapped__(frozenset({"mixer"}), "1") is None
+
+
 def test_a_home_that_cannot_be_written_does_not_stop_it(tmp_path: Path) -> None:
     used = cache_directory(XDG_CACHE_HOME=os.devnull, TMPDIR=str(tmp_path))
     assert used.parent.parent == tmp_path
@@ -228,15 +246,32 @@ def test_a_stored_kernel_for_other_types_is_not_used(tmp_path: Path) -> None:
     assert printed() == "-1 0 0 0\n-1.0 0.0 0.0 0.0\n"
 
 
+def test_kernel_for_a_type_of_another_package_is_not_stored(tmp_path: Path) -> None:
+    """A process without the package could not read the file, which has the results for all types."""
+    (tmp_path / "own_law.py").write_text(
+        "from typing import NamedTuple\nclass Memory(NamedTuple):\n    x: float\n"
+    )
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+    environment.pop("NUMBA_CACHE_DIR", None)
+    begin = "from flightstack.core.arrays import all_finite\nfrom flightstack.core.contract import Vector3\n"
+    with_package = f"import sys\nsys.path.insert(0, {str(tmp_path)!r})\nfrom own_law import Memory\n"
+    for script in (
+        with_package + begin + "assert all_finite(Memory(1.0))",
+        begin + "assert all_finite(Vector3(1.0, 2.0, 3.0))",
+    ):
+        subprocess.run([sys.executable, "-c", script], env=environment, check=True)
+    assert list(tmp_path.rglob("arrays.all_finite-*.nbc"))
+
+
 def test_cache_directory_of_other_numba_users_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(numba.config, "CACHE_DIR", "elsewhere")
-    module._Kernel(quaternion_product.py_func, frozenset({geometry.__name__}))
+    module.Kernel(quaternion_product.py_func, frozenset({geometry.__name__}))
     assert numba.config.CACHE_DIR == "elsewhere"
 
 
 def test_existing_read_only_cache_does_not_stop_compilation(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "access", lambda path, mode: False)
-    assert kernel_cache._base.__wrapped__().name.startswith("flightstack-kernels-")
+    assert kernel_cache.base_directory.__wrapped__().name.startswith("flightstack-kernels-")
 
 
 @compiled

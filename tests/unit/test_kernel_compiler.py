@@ -6,6 +6,7 @@ import gc
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numba
 import numpy as np
@@ -42,7 +43,7 @@ def test_kernels_call_parts_without_a_wrapper_for_python() -> None:
 
 @JIT
 def test_cached_part_is_included_in_another_kernel() -> None:
-    loaded = module._Kernel(quaternion_product.py_func, frozenset({geometry.__name__}))
+    loaded = module.Kernel(quaternion_product.py_func, frozenset({geometry.__name__}))
 
     @compiled
     def square(a: Quaternion) -> Quaternion:
@@ -119,7 +120,7 @@ def test_compiled_function_called_by_a_kernel_raises_with_values() -> None:
 
 @JIT
 def test_operators_of_other_numba_users_are_typed_by_numba(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kernel_compiler._FloatOperator, "result", numba.boolean)
+    monkeypatch.setattr(kernel_compiler.FloatOperator, "result", numba.boolean)
     twice = numba.njit(lambda x: x + x)
     assert twice(1.5) == 3.0
 
@@ -145,3 +146,25 @@ print(quarter(6.0), "flightstack.core.kernel_compiler" in sys.modules)
 def test_an_untested_numba_compiles_with_its_own_compiler() -> None:
     done = subprocess.run([sys.executable, "-c", UNTESTED_NUMBA], capture_output=True, text=True, check=True)
     assert done.stdout == "value 6.0\nvalue 3.0\n1.5 False\n"
+
+
+LOADED_KERNEL = """
+import sys
+from flightstack.control.mixer import mix
+from flightstack.core.contract import Quaternion
+from flightstack.core.geometry import quaternion_product
+turn = Quaternion(0.0, 1.0, 0.0, 0.0)
+print("numba" in sys.modules, quaternion_product(turn, turn).w, "numba.np.arraymath" in sys.modules)
+"""
+
+
+@JIT
+def test_a_kernel_of_the_cache_is_read_without_the_compiler(tmp_path: Path) -> None:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+
+    def printed() -> str:
+        command = [sys.executable, "-c", LOADED_KERNEL]
+        return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+
+    assert printed() == "False -1.0 True\n"  # compiled
+    assert printed() == "False -1.0 False\n"

@@ -12,7 +12,7 @@ from flightstack.core.port_numbers import GROUND
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.signing import LinkSigning, Signing
-from flightstack.params.config import StackConfig
+from flightstack.params.config import TRUTH, StackConfig
 from flightstack.process.assembly import transfer_state
 from flightstack.process.process_config import ProcessConfig
 from flightstack.process.process_files import ProcessFiles
@@ -49,7 +49,7 @@ def test_a_recorded_signed_reboot_is_a_replay_after_the_reboot(tmp_path: Path) -
 
 
 def test_vehicle_time_begins_anew_at_a_reboot(tmp_path: Path) -> None:
-    files, config = process_files(tmp_path), StackConfig()
+    files, config = process_files(tmp_path), StackConfig(state=TRUTH)
     old, new, frame = files.build(config), files.build(config), PlantStateFrame(1, 51)
     for time_us in (1_000_000, 1_002_000, 1_004_000):
         old.simulator.receive(memoryview(bytes(frame.seal(time_us, 0))))

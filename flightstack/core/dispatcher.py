@@ -1,0 +1,85 @@
+"""Numba's dispatchers of kernels. Imported by ``compiled`` at the first use of a kernel."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable
+from functools import cached_property
+from types import FunctionType
+from typing import Any, ClassVar
+
+import numba
+from numba.core.caching import FunctionCache
+from numba.core.compiler import Compiler
+from numba.core.registry import CPUDispatcher
+
+from flightstack.core.compiled import renamed
+from flightstack.core.kernel_cache import directory, is_own
+
+_TESTED_NUMBA = {(0, minor) for minor in range(60, 69)}
+"""Versions whose compiler ``kernel_compiler`` extends; another compiles the same in a longer time."""
+
+KernelCompiler: type[Compiler] = Compiler
+PartCompiler: type[Compiler] = Compiler
+KernelCache: type[FunctionCache] = FunctionCache
+PartCache: type[FunctionCache] = FunctionCache
+if numba.version_info.short in _TESTED_NUMBA:
+    from flightstack.core.kernel_compiler import KernelCache, KernelCompiler, PartCache, PartCompiler
+else:
+    from flightstack.core.compiled_builtins import register
+
+    register(PartCompiler)  # type: ignore[arg-type]  # of no type
+
+
+def _enable_cache(dispatcher: CPUDispatcher, modules: frozenset[str], cache: type[FunctionCache]) -> None:
+    """Keep the results of a dispatcher in the directory for these modules, unless it is a function of a user."""
+    folder = directory(modules, numba.__version__) if is_own(dispatcher.py_func.__module__) else None
+    if folder is None:
+        return
+    others = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(folder)
+    try:
+        dispatcher._cache = cache(dispatcher.py_func)
+    finally:
+        numba.config.CACHE_DIR = others
+
+
+class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]  # Numba has no types
+    """A compiled function that Python calls. Compiled functions call its ``part``."""
+
+    _OPTIONS: ClassVar = {"nopython": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+
+    def __init__(self, function: Callable[..., Any], modules: frozenset[str]) -> None:
+        super().__init__(function, targetoptions=self._OPTIONS, pipeline_class=KernelCompiler)
+        self._modules = modules
+        _enable_cache(self, modules, KernelCache)
+
+    @cached_property
+    def part(self) -> CPUDispatcher:
+        """The same function without machine code and without the wrapper for Python."""
+        assert isinstance(self.py_func, FunctionType)
+        copy = renamed(self.py_func, "part", self.py_func.__globals__)
+        options = {**self._OPTIONS, "no_cpython_wrapper": True}
+        part = CPUDispatcher(copy, targetoptions=options, pipeline_class=PartCompiler)
+        _enable_cache(part, self._modules, PartCache)  # under the name of the copy
+        return part
+
+    @property
+    def _numba_type_(self) -> numba.types.Type:
+        return numba.types.Dispatcher(self.part)
+
+    def compile(self, sig: Any) -> Any:
+        """Compile without garbage collection, which would take a tenth of the time."""
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            return super().compile(sig)
+        finally:
+            if collects:
+                gc.enable()
+
+    def compiled_for(self, *examples: Any) -> Callable[..., Any]:
+        """Return the compiled function for the types of ``examples``, which it does not check."""
+        types = tuple(numba.typeof(example) for example in examples)
+        self.compile(types)
+        return self.get_overload(types)  # type: ignore[no-any-return]
