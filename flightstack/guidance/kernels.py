@@ -6,10 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-import numpy as np
-
 from flightstack.core.array_items import as_tuple, store
 from flightstack.core.arrays import (
+    all_finite,
     attitude_target,
     position_setpoint,
     store_attitude_target,
@@ -22,6 +21,7 @@ from flightstack.core.contract import (
     FloatArray,
     PositionSetpoint,
     Quaternion,
+    Record,
     RecordArray,
     Vector3,
     VehicleState,
@@ -37,7 +37,7 @@ from flightstack.guidance.mode_target import LAND, RETURN, advance_return, targe
 from flightstack.guidance.offboard import attitude_step, point_step
 from flightstack.guidance.params import GuidanceParams
 from flightstack.guidance.setpoints import ATTITUDE, NOT_GIVEN
-from flightstack.guidance.trajectory import Trajectory, TrajectoryLimits, setpoint_of, trajectory_step
+from flightstack.guidance.trajectory import Goal, Trajectory, TrajectoryLimits, setpoint_of, trajectory_step
 from flightstack.params.vehicle import GRAVITY_M_S2
 
 DESCEND, DESCEND_LEVEL = 64, 65
@@ -143,13 +143,15 @@ def _finish(
     state: VehicleState,
     trajectory: FloatArray,
     land: FloatArray,
-    target: AttitudeTarget,
+    last_target: FloatArray,
+    rotor_thrust_n: float,
     params: GuidanceParams,
     descent_m_s: float,
     dt_s: float,
     setpoint: FloatArray,
 ) -> None:
-    """Store reference and setpoint, and advance the land detector; ``target`` is the last attitude target."""
+    """Store reference and setpoint, and advance the land detector."""
+    target = attitude_target(last_target)
     lift = lift_share(state, target.thrust_n, params.weight_n)
     last_a = position_setpoint(setpoint).acceleration_ned_m_s2
     last_press = Vector3(last_a.x - last.ax, last_a.y - last.ay, last_a.z - last.az)
@@ -159,7 +161,8 @@ def _finish(
     pressed = Vector3(a.x + press.x, a.y + press.y, a.z + press.z)
     store_position_setpoint(setpoint, PositionSetpoint(p, v, pressed, yaw_rad, yaw_rate_rad_s))
     memory = LandMemory(*as_tuple(land, LAND_MEMORY_SIZE))
-    store(land, land_detector_step(memory, state, lift, descent_m_s, dt_s))
+    rotor_lift = lift_share(state, rotor_thrust_n, params.weight_n)
+    store(land, land_detector_step(memory, state, lift, rotor_lift, descent_m_s, dt_s))
 
 
 @compiled
@@ -167,9 +170,8 @@ def rest_kernel(
     state_array: FloatArray, trajectory: FloatArray, land: FloatArray, setpoint: FloatArray
 ) -> None:
     """Set reference and setpoint to the vehicle's position, at rest, landed; ignore a state that is not finite."""
-    for value in state_array:
-        if not np.isfinite(value):
-            return
+    if not all_finite(state_array):
+        return
     state = vehicle_state(state_array)
     p = state.position_ned_m
     yaw_rad = euler_from_quaternion(state.attitude).z
@@ -190,6 +192,14 @@ def levelling_kernel(last: FloatArray, thrust_n: float, fraction: float, target:
 
 
 @compiled
+def _goal(mode: int, mission: Record, plan: RecordArray, mode_target: Record, params: GuidanceParams) -> Goal:
+    """Return the goal of the mission or of another mode."""
+    if mode == MISSION:
+        return mission_goal(mission, plan, mode_target["start_x"], mode_target["start_y"], params)
+    return target_goal(LAND if mode >= DESCEND else mode, mode_target, params)
+
+
+@compiled
 def goal_kernel(
     mode: int,
     state_array: FloatArray,
@@ -200,35 +210,34 @@ def goal_kernel(
     mode_target: RecordArray,
     land: FloatArray,
     last_target: FloatArray,
+    rotor_thrust_n: float,
     params_array: FloatArray,
     dt_s: float,
     setpoint: FloatArray,
 ) -> None:
     """Advance guidance by one outer tick; write the setpoint (11,) and update the memories in place.
 
+    ``rotor_thrust_n`` is the thrust of the rotors by their speeds.
     A state that is not finite changes nothing: the loops hold their output and set a status bit.
     """
-    for value in state_array:
-        if not np.isfinite(value):
-            return
+    if not all_finite(state_array):
+        return
     state = vehicle_state(state_array)
     params = GuidanceParams(*as_tuple(params_array, GUIDANCE_PARAMS_SIZE))
     last = Trajectory(*as_tuple(trajectory, TRAJECTORY_SIZE))
+    landed = LandMemory(*as_tuple(land, LAND_MEMORY_SIZE)).landed > 0.0
     m, a = mission[0], mode_target[0]
     if mode == MISSION:
-        landed = LandMemory(*as_tuple(land, LAND_MEMORY_SIZE)).landed > 0.0
         mission_step(m, plan, jumps_left, state, last.yaw_rad, landed, params, dt_s)
-        goal = mission_goal(m, plan, a["start_x"], a["start_y"], params)
-    else:
-        if mode == RETURN:
-            advance_return(a, state, params)
-        goal = target_goal(LAND if mode >= DESCEND else mode, a, params)
-    goal = with_landing_descent(goal, state.position_ned_m.z, params)
+    elif mode == RETURN:
+        advance_return(a, state, params)
+    goal = with_landing_descent(_goal(mode, m, plan, a, params), state.position_ned_m.z, params)
     reference = _limit_sink_lead(last, trajectory_step(last, goal, _limits(params), dt_s), state)
     if mode >= DESCEND:
         reference = _without_position(last, reference, state, mode == DESCEND, _limits(params), dt_s)
-    loop_target = attitude_target(last_target)
-    _finish(last, reference, state, trajectory, land, loop_target, params, reference.vz, dt_s, setpoint)
+    _finish(
+        last, reference, state, trajectory, land, last_target, rotor_thrust_n, params, reference.vz, dt_s, setpoint
+    )  # fmt: skip
 
 
 @compiled
@@ -239,6 +248,7 @@ def stream_kernel(
     stream: RecordArray,
     land: FloatArray,
     last_target: FloatArray,
+    rotor_thrust_n: float,
     params_array: FloatArray,
     dt_s: float,
     setpoint: FloatArray,
@@ -248,13 +258,11 @@ def stream_kernel(
 
     An offboard attitude or rate is written to ``target`` (5,), which the loops use instead of the outer loop's.
     """
-    for value in state_array:
-        if not np.isfinite(value):
-            return
+    if not all_finite(state_array):
+        return
     state = vehicle_state(state_array)
     params = GuidanceParams(*as_tuple(params_array, GUIDANCE_PARAMS_SIZE))
     last, limits = Trajectory(*as_tuple(trajectory, TRAJECTORY_SIZE)), _limits(params)
-    loop_target = attitude_target(last_target)
     s = stream[0]
     if mode == OFFBOARD and s["kind"] >= ATTITUDE:
         reference = attitude_step(s, last_target, state, params, limits, dt_s, target)
@@ -266,4 +274,6 @@ def stream_kernel(
             reference = manual_step(last, s["sticks"], state, mode == POSITION, params, limits, dt_s)
         reference = _limit_sink_lead(last, reference, state)
         descent_m_s = reference.vz
-    _finish(last, reference, state, trajectory, land, loop_target, params, descent_m_s, dt_s, setpoint)
+    _finish(
+        last, reference, state, trajectory, land, last_target, rotor_thrust_n, params, descent_m_s, dt_s, setpoint
+    )  # fmt: skip

@@ -51,6 +51,15 @@ def _climb_wanted(sticks: FloatArray, down_m: float, params: GuidanceParams) -> 
 
 
 @compiled
+def _tilt_acceleration(sticks: FloatArray, yaw_rad: float, params: GuidanceParams) -> tuple[float, float]:
+    """Return the horizontal acceleration, north and east [m/s²], of the tilt that the sticks set."""
+    forward, right = _horizontal_sticks(sticks, params, 0.0)
+    size = math.sqrt(forward * forward + right * right)
+    scale = GRAVITY_M_S2 * tan(size * params.manual_tilt_rad) / size if size > 1e-9 else 0.0
+    return _to_ned(forward * scale, right * scale, yaw_rad)
+
+
+@compiled
 def manual_step(
     t: Trajectory,
     sticks: FloatArray,
@@ -85,10 +94,7 @@ def manual_step(
         )
         x, y = leashed(x, p.x), leashed(y, p.y)
     else:
-        forward, right = _horizontal_sticks(sticks, params, 0.0)
-        size = math.sqrt(forward * forward + right * right)
-        scale = GRAVITY_M_S2 * tan(size * params.manual_tilt_rad) / size if size > 1e-9 else 0.0
-        north, east = _to_ned(forward * scale, right * scale, t.yaw_rad)
+        north, east = _tilt_acceleration(sticks, t.yaw_rad, params)
         jx, jy = clipped(KA * (north - t.ax), KA * (east - t.ay), 2.0 * limits.jerk_m_s3)
         ax, ay = t.ax + jx * dt_s, t.ay + jy * dt_s
         x, y, vx, vy = p.x, p.y, v.x, v.y

@@ -20,7 +20,7 @@ from flightstack.core.portable_math import atan2
 from flightstack.guidance.params import GuidanceParams
 from flightstack.guidance.trajectory import Goal, Trajectory
 from flightstack.plan import MissionItem
-from flightstack.plan.vocabulary import Command
+from flightstack.plan.commands import Command
 
 # numbers for the kernels: compiled code knows no enumeration
 WAYPOINT, LOITER_TIME, RETURN_TO_LAUNCH = (

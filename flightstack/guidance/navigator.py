@@ -96,7 +96,7 @@ class Navigator:
         self._level = direct(levelling_kernel, target, 1.0, 1.0, self._levelling_target)
         self._fly_goal = direct(
             goal_kernel, 0, state, self._trajectory, self._mission, self._plan, self._jumps_left, self._mode_target,
-            self._land, target, self._params_array, self._dt_s, self.setpoint,
+            self._land, target, 0.0, self._params_array, self._dt_s, self.setpoint,
         )  # fmt: skip
 
     @cached_property
@@ -104,7 +104,7 @@ class Navigator:
         """The kernel of modes that follow a stream. In lockstep, its compilation takes no time of the vehicle."""
         state, target = np.zeros(STATE_SIZE), np.zeros(ATTITUDE_TARGET_SIZE)
         return direct(
-            stream_kernel, 0, state, self._trajectory, self._stream, self._land, target,
+            stream_kernel, 0, state, self._trajectory, self._stream, self._land, target, 0.0,
             self._params_array, self._dt_s, self.setpoint, self.attitude_target,
         )  # fmt: skip
 
@@ -366,19 +366,19 @@ class Navigator:
 
     # ------------------------------------------------------------------ ticks
 
-    def step(self, mode: Mode, state: FloatArray, attitude_target: FloatArray) -> None:
+    def step(self, mode: Mode, state: FloatArray, attitude_target: FloatArray, rotor_thrust_n: float) -> None:
         """Advance by one outer tick and write ``setpoint``, and ``attitude_target`` while ``flies_attitude``.
 
-        ``attitude_target`` (5,) is the loops' last one.
+        ``attitude_target`` (5,) is the loops' last one, ``rotor_thrust_n`` the thrust of the rotors by their speeds.
         """
         number = self._numbers[mode]
         if number in _STREAM_NUMBERS:
             self._fly_stream(
-                number, state, self._trajectory, self._stream, self._land, attitude_target,
+                number, state, self._trajectory, self._stream, self._land, attitude_target, rotor_thrust_n,
                 self._params_array, self._dt_s, self.setpoint, self.attitude_target,
             )  # fmt: skip
             return
         self._fly_goal(
             number, state, self._trajectory, self._mission, self._plan, self._jumps_left, self._mode_target,
-            self._land, attitude_target, self._params_array, self._dt_s, self.setpoint,
+            self._land, attitude_target, rotor_thrust_n, self._params_array, self._dt_s, self.setpoint,
         )  # fmt: skip

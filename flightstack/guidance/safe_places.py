@@ -47,6 +47,7 @@ class SafePlaces:
         self.home_is_chosen = False
         """True if a user has set home; it then does not follow the vehicle."""
         self.points: tuple[ReturnPlace, ...] = ()
+        self._has_origin = True
         self._fence_items: tuple[MissionItem, ...] = ()
         self._rally_items: tuple[MissionItem, ...] = ()
         self.ids: tuple[int, int, int] = (0, 0, 0)
@@ -59,20 +60,25 @@ class SafePlaces:
         if abs(point.latitude_deg) > 90.0 or abs(point.longitude_deg) > 180.0:
             return "home is not a place on earth"
         local = self.frame.to_ned(point)
-        if distance(local.x, local.y) > FARTHEST_HOME_M:
+        if self._has_origin and distance(local.x, local.y) > FARTHEST_HOME_M:
             return f"home is more than {FARTHEST_HOME_M / 1e3:g} km from where the vehicle started"
-        if abs(local.z) > GREATEST_HOME_STEP_M:
+        if self._has_origin and abs(local.z) > GREATEST_HOME_STEP_M:
             return f"home is more than {GREATEST_HOME_STEP_M:g} m above or below where the vehicle started"
         self.home_point, self.home_is_chosen = point, chosen
         self.home = ReturnPlace(local.x, local.y, -local.z)
         self.set_rally(self._rally_items)
         return None
 
+    def await_origin(self) -> None:
+        """Accept a home at any distance until ``move_origin``: the vehicle does not know yet where it is."""
+        self._has_origin = False
+
     def move_origin(self, origin: GeoPoint) -> str | None:
         """Move the origin of the local frame, and home with it unless a user has set home; keep all other places.
 
         Return the reason if the home of the user is refused and moves with the origin, or None.
         """
+        self._has_origin = True
         self.frame.move_to(origin)
         self.set_fence(self._fence_items)
         refusal = self.set_home(self.home_point, chosen=True) if self.home_is_chosen else None

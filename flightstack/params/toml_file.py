@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -139,6 +140,42 @@ def read_toml(path: Path) -> Table:
     except (RecursionError, ValueError) as error:  # deep nesting, numbers of thousands of digits
         problem = "is not usable TOML: its nesting is too deep or a number too long"
         raise ConfigError(path, "", problem) from error
+
+
+_STEP = re.compile(r"\.?([^.\[\]]+)|\[(\d+)\]")
+
+
+def set_value(values: dict[str, Any], path: str, value: Any) -> None:
+    """Set the value at ``path``, such as ``body.mass_kg`` or ``event[0].at_s``, in the tables and lists of a file.
+
+    A missing key of a table is added. Raise KeyError, whose text is the problem, if a table or an item of a list is
+    missing.
+
+    >>> values = {"event": [{"at_s": 3.0}]}
+    >>> set_value(values, "event[0].at_s", 4.0)
+    >>> values
+    {'event': [{'at_s': 4.0}]}
+    """
+    steps = [int(step[2]) if step[2] else step[1] for step in _STEP.finditer(path)]
+    if not steps or _STEP.sub("", path):
+        raise KeyError("is no path of a value, such as wind.gust_m_s or event[0].at_s")
+    here: Any = values
+    for step in steps[:-1]:
+        here = _entry(here, step)
+    last = steps[-1]
+    if isinstance(last, int) or not isinstance(here, dict):
+        _entry(here, last)
+    here[last] = value
+
+
+def _entry(container: Any, step: str | int) -> Any:
+    if isinstance(step, int):
+        if isinstance(container, list) and step < len(container):
+            return container[step]
+        raise KeyError(f"the file has no item [{step}] there")
+    if isinstance(container, dict) and step in container:
+        return container[step]
+    raise KeyError(f"the file has no table {step} there")
 
 
 def find_file(name_or_path: str, folder: Path, kind: str) -> Path:

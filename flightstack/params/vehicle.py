@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +16,7 @@ from flightstack.core.errors import ConfigError
 from flightstack.core.linear_algebra import pseudo_inverse
 from flightstack.params.battery import Battery, read_battery
 from flightstack.params.sensors import NO_SENSORS, Sensors, read_sensors
-from flightstack.params.toml_file import Table, built_in_names, find_file, hidden_file, read_toml
+from flightstack.params.toml_file import Table, built_in_names, find_file, hidden_file, read_toml, set_value
 from flightstack.params.vehicle_parts import Part, read_parts
 
 BUILT_IN = Path(__file__).parent / "vehicles"
@@ -160,6 +163,35 @@ def hidden_vehicle(name_or_path: str) -> str | None:
 def load_vehicle(name_or_path: str) -> Vehicle:
     """Read a built-in vehicle by name or a TOML file by path; raise ConfigError."""
     return _vehicle(read_toml(find_file(name_or_path, BUILT_IN, KIND)))
+
+
+def load_vehicle_with(name_or_path: str, numbers: Mapping[str, float]) -> Vehicle:
+    """Read a vehicle with other numbers than those of its file, by their paths; raise ConfigError.
+
+    With another mass the rotors keep their speeds: ``thrust_to_weight`` counts for the mass of the file.
+
+    >>> load_vehicle_with("x_quad", {"body.mass_kg": 1.8, "rotor_type.lag_s": 0.03}).mass_kg
+    1.8
+    """
+    file = find_file(name_or_path, BUILT_IN, KIND)
+    values = deepcopy(read_toml(file).values())
+    _set_numbers(file, values, {path: number for path, number in numbers.items() if path == _RATIO})
+    speed_rad_s = _vehicle(Table(file, values)).rotors[0].max_speed_rad_s
+    values["rotor_type"].pop("thrust_to_weight", None)
+    values["rotor_type"]["max_speed_rad_s"] = speed_rad_s
+    _set_numbers(file, values, {path: number for path, number in numbers.items() if path != _RATIO})
+    return _vehicle(Table(file, values))
+
+
+_RATIO = "rotor_type.thrust_to_weight"
+
+
+def _set_numbers(file: Path, values: dict[str, Any], numbers: Mapping[str, float]) -> None:
+    for path, number in numbers.items():
+        try:
+            set_value(values, path, number)
+        except KeyError as error:
+            raise ConfigError(file, path, error.args[0]) from None
 
 
 def _vehicle(top: Table) -> Vehicle:

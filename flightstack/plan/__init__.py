@@ -5,10 +5,7 @@ a ground station that only sends a plan does not.
 """
 
 from flightstack.plan.check import DEFAULT_LIMITS, Limits, check_mission, mission_rejections
-from flightstack.plan.files import load_plan, save_plan
-from flightstack.plan.item import MissionItem, Plan
-from flightstack.plan.rejection import Rejection
-from flightstack.plan.vocabulary import (
+from flightstack.plan.commands import (
     MAX_FENCE_ITEMS,
     MAX_MISSION_ITEMS,
     MAX_RALLY_POINTS,
@@ -25,6 +22,9 @@ from flightstack.plan.vocabulary import (
     command_name,
     result_name,
 )
+from flightstack.plan.files import load_plan, save_plan
+from flightstack.plan.item import MissionItem, Plan
+from flightstack.plan.rejection import Rejection
 
 __all__ = [
     "DEFAULT_LIMITS",

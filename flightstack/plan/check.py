@@ -11,11 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.portable_math import distance
-from flightstack.plan.item import MissionItem
-from flightstack.plan.jumps import find_idle_loop
-from flightstack.plan.parameter_rules import parameter_fault
-from flightstack.plan.rejection import Fault, Rejection, item_rejection, range_fault
-from flightstack.plan.vocabulary import (
+from flightstack.plan.commands import (
     GLOBAL_FRAMES,
     MAX_MISSION_ITEMS,
     NAV_COMMANDS,
@@ -25,6 +21,10 @@ from flightstack.plan.vocabulary import (
     Frame,
     MissionResult,
 )
+from flightstack.plan.item import MissionItem
+from flightstack.plan.jumps import find_idle_loop
+from flightstack.plan.parameter_rules import parameter_fault
+from flightstack.plan.rejection import Fault, Rejection, item_rejection, range_fault
 
 if TYPE_CHECKING:
     from flightstack.plan.fence_shape import FenceShape  # needs NumPy

@@ -6,11 +6,11 @@ import math
 from collections.abc import Sequence
 
 from flightstack.core.geodesy import GeoPoint
+from flightstack.plan.commands import MAX_FENCE_ITEMS, MissionResult
 from flightstack.plan.fence_areas import FenceAreas, fence_areas
 from flightstack.plan.fence_shape import FenceShape, edges_that_cross
 from flightstack.plan.item import MissionItem
 from flightstack.plan.rejection import Fault, Rejection, item_rejection
-from flightstack.plan.vocabulary import MAX_FENCE_ITEMS, MissionResult
 
 MIN_AREA_M2 = 1.0
 

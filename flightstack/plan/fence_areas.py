@@ -11,9 +11,9 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from flightstack.plan.commands import MAX_FENCE_ITEMS, FenceCommand, MissionResult, command_name
 from flightstack.plan.item import MissionItem
 from flightstack.plan.rejection import Fault, Rejection, item_rejection, place_fault
-from flightstack.plan.vocabulary import MAX_FENCE_ITEMS, FenceCommand, MissionResult, command_name
 
 _POLYGONS = (FenceCommand.POLYGON_VERTEX_INCLUSION, FenceCommand.POLYGON_VERTEX_EXCLUSION)
 _INCLUSIONS = (FenceCommand.POLYGON_VERTEX_INCLUSION, FenceCommand.CIRCLE_INCLUSION)

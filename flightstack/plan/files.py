@@ -31,7 +31,7 @@ def read_text(path: Path) -> str:
             data = file.read(MAX_FILE_BYTES + 1)
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         problem = error.strerror if isinstance(error, OSError) else error
-        raise ConfigError(path, "", f"cannot be read: {problem}") from error
+        raise ConfigError(path, "", f"cannot be read: {problem}") from None
     if len(data) > MAX_FILE_BYTES:
         raise ConfigError(path, "", f"is larger than the allowed {MAX_FILE_BYTES // 1_000_000} MB")
     try:

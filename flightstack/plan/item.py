@@ -9,7 +9,7 @@ from typing import Any
 
 from flightstack.core.float32 import as_float32
 from flightstack.core.geodesy import GeoPoint
-from flightstack.plan.vocabulary import (
+from flightstack.plan.commands import (
     ALSO_UNSET_E7,
     OPEN_POSITION_COMMANDS,
     PLACE_COMMANDS,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from flightstack.plan.commands import NAV_COMMANDS, Command
 from flightstack.plan.item import MissionItem
-from flightstack.plan.vocabulary import NAV_COMMANDS, Command
 
 LEAVES_GROUND = frozenset({Command.NAV_TAKEOFF, Command.NAV_WAYPOINT, Command.NAV_LOITER_TIME})
 STAYS_ON_GROUND = frozenset({Command.NAV_LAND, Command.NAV_RETURN_TO_LAUNCH})

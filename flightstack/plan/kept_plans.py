@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 
 from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import GeoPoint
+from flightstack.plan.commands import MissionType
 from flightstack.plan.item import MissionItem
-from flightstack.plan.vocabulary import MissionType
 
 VERSION = 1
 _KIND = "flightstack plans"

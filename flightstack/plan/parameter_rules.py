@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
+from flightstack.plan.commands import Command, MissionResult
 from flightstack.plan.item import MissionItem
 from flightstack.plan.rejection import Fault
-from flightstack.plan.vocabulary import Command, MissionResult
 
 
 class Rule(NamedTuple):

@@ -12,10 +12,10 @@ from typing import Any
 from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import GeoPoint
 from flightstack.plan import values
+from flightstack.plan.commands import RALLY_POINT, FenceCommand, Frame
 from flightstack.plan.fence_areas import MAX_GROUP, MIN_VERTICES, fence_areas
 from flightstack.plan.item import MissionItem, integer_coordinate
 from flightstack.plan.rejection import Rejection
-from flightstack.plan.vocabulary import RALLY_POINT, FenceCommand, Frame
 
 VERSION = 2
 _GROUP = "inclusionGroup"

@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import GeoPoint
 from flightstack.plan import values
+from flightstack.plan.commands import SCALED_FRAMES, Command
 from flightstack.plan.item import MissionItem, Plan, float_coordinate
 from flightstack.plan.qgc_areas import fence_document, fence_items, rally_document, rally_items
-from flightstack.plan.vocabulary import SCALED_FRAMES, Command
 
 
 class _Entry(NamedTuple):

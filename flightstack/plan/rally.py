@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from flightstack.core.geodesy import GeoPoint
 from flightstack.core.portable_math import distance
 from flightstack.plan.check import DEFAULT_LIMITS, Limits
+from flightstack.plan.commands import MAX_RALLY_POINTS, RALLY_POINT, MissionResult
 from flightstack.plan.fence_shape import FenceShape
 from flightstack.plan.item import MissionItem
 from flightstack.plan.rejection import Fault, Rejection, item_rejection, place_fault
-from flightstack.plan.vocabulary import MAX_RALLY_POINTS, RALLY_POINT, MissionResult
 
 
 def check_rally(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from flightstack.plan.commands import GLOBAL_FRAMES, MissionResult, command_name
 from flightstack.plan.item import MissionItem
-from flightstack.plan.vocabulary import GLOBAL_FRAMES, MissionResult, command_name
 
 
 class Fault(NamedTuple):

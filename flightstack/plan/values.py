@@ -8,8 +8,7 @@ from typing import Any
 from flightstack.core.errors import ConfigError
 from flightstack.core.float32 import as_float32
 from flightstack.core.geodesy import GeoPoint
-from flightstack.plan.item import MissionItem, integer_coordinate
-from flightstack.plan.vocabulary import (
+from flightstack.plan.commands import (
     MAX_MISSION_ITEMS,
     OPEN_POSITION_COMMANDS,
     POSITION_COMMANDS,
@@ -18,6 +17,7 @@ from flightstack.plan.vocabulary import (
     Frame,
     command_name,
 )
+from flightstack.plan.item import MissionItem, integer_coordinate
 
 _FIELDS = ("param 1", "param 2", "param 3", "param 4", "latitude", "longitude", "altitude")
 _PLAIN_FIELDS = (*_FIELDS[:4], "param 5", "param 6", "param 7")
@@ -48,6 +48,8 @@ def number(file: object, key: str, value: Any) -> float:
 
 def integer(file: object, key: str, value: Any, high: int) -> int:
     """Return a whole number from 0 to ``high``."""
+    if value is None:
+        raise ConfigError(file, key, f"is missing; it must be a whole number from 0 to {high}")
     if isinstance(value, float) and value.is_integer():
         value = int(value)
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= high:

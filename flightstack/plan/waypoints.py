@@ -12,8 +12,8 @@ from dataclasses import replace
 from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import GeoPoint
 from flightstack.plan import values
+from flightstack.plan.commands import Command
 from flightstack.plan.item import MissionItem, Plan, float_coordinate
-from flightstack.plan.vocabulary import Command
 
 WAYPOINTS_HEADER = "QGC WPL 110"
 _COLUMNS = 12

@@ -17,9 +17,9 @@ from flightstack.mavlink.text_file import PastText, pack_texts
 from flightstack.params.metadata import parameters_json
 from flightstack.services.commands.command_server import CommandService
 from flightstack.services.commands.context import VehicleContext
-from flightstack.services.commands.failure_commands import FailureCommands
 from flightstack.services.commands.guided import GuidedItems
 from flightstack.services.commands.link_commands import LinkCommands
+from flightstack.services.commands.system import FailureCommands
 from flightstack.services.files.component_metadata import ComponentMetadata, vehicle_files
 from flightstack.services.files.ftp_server import FtpServer
 from flightstack.services.logs.log_server import LogServer

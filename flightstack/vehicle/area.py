@@ -14,8 +14,7 @@ from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.rally import HOME, ReturnPlace
 from flightstack.guidance.safe_places import SafePlaces, plan_limits
 from flightstack.plan import MissionItem, Rejection
-from flightstack.vehicle.flight_state import FlightState
-from flightstack.vehicle.journal import Journal
+from flightstack.vehicle.flight_state import FlightState, Journal
 from flightstack.vehicle.mission import Mission
 
 CEILING_MARGIN_M = 1.0
@@ -72,6 +71,10 @@ class FlightArea:
     def set_home_here(self) -> str | None:
         """Move home to the vehicle; return the refusal, or None."""
         return self.set_home(self._places.frame.to_geo(self._here()), chosen=False)
+
+    def await_origin(self) -> None:
+        """Accept a home anywhere until the first fix."""
+        self._places.await_origin()
 
     def move_origin(self, origin: GeoPoint) -> None:
         """Move the origin of the local frame, as at the first fix; announce a chosen home that cannot stay."""

@@ -21,8 +21,7 @@ from flightstack.params.vehicle import Vehicle
 from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.autopilot import Autopilot
 from flightstack.vehicle.flight_monitor import FlightMonitor
-from flightstack.vehicle.flight_state import FlightState
-from flightstack.vehicle.journal import Journal
+from flightstack.vehicle.flight_state import FlightState, Journal
 from flightstack.vehicle.mission import Mission
 from flightstack.vehicle.mode_control import ModeControl, Readiness, Takeoff
 from flightstack.vehicle.requests import FlightRequests
@@ -79,16 +78,13 @@ def assemble(
     rotor_speed_rad_s: FloatArray,
     source: StateSource,
 ) -> VehicleParts:
-    """Assemble a vehicle on the ground at ``home``.
+    """Assemble a vehicle on the ground at ``home``; its outer loop runs every ``divisor`` ticks.
 
-    ``source`` writes ``state`` (13,) and ``rotor_speed_rad_s`` (8,) in place. The outer loop runs every ``divisor``
-    ticks.
+    ``source`` writes ``state`` (13,) and ``rotor_speed_rad_s`` (8,) in place.
     """
     navigator = Navigator(guidance_params(behaviour, vehicle.weight_n), outer_hz)
-    idle_row = np.zeros(LoopRow.SIZE)
-    now = FlightState(
-        behaviour, state, rotor_speed_rad_s, navigator.setpoint, backend.attitude_target, idle_row
-    )
+    idle = np.zeros(LoopRow.SIZE)
+    now = FlightState(behaviour, state, rotor_speed_rad_s, navigator.setpoint, backend.attitude_target, idle)
     journal = Journal(now, recorder)
     places = SafePlaces(home)
     failsafes = FailsafeMonitor(vehicle, behaviour, outer_hz, divisor, state, source)

@@ -86,6 +86,11 @@ class Autopilot:
         commands: FloatArray = row[_COMMANDS]
         return commands
 
+    @property
+    def quiet_ticks(self) -> int:
+        """Number of the next ticks that run no outer loop, and do not hold the rotors."""
+        return 0 if self._failsafes.states.holds_rotors else -self._tick % self._divisor
+
     def _guide(self) -> None:
         """Advance guidance, and reset the loops at ground contact. Hold both while the state is stale."""
         now, navigator = self.now, self._navigator
@@ -97,7 +102,7 @@ class Autopilot:
             return
         target = None
         touched = navigator.touches_ground
-        navigator.step(mode, now.state, now.attitude_target)
+        navigator.step(mode, now.state, now.attitude_target, self._failsafes.rotor_thrust_n)
         flies_attitude = navigator.flies_attitude(mode)
         if touched and not navigator.touches_ground:  # it climbs, or was in the air
             navigator.reset_reference(now.state)

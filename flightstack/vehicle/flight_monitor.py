@@ -9,8 +9,7 @@ from flightstack.commander.transitions import Event
 from flightstack.core.enums import STREAM_MODES, Mode, Severity
 from flightstack.guidance.navigator import Navigator
 from flightstack.vehicle.area import FlightArea
-from flightstack.vehicle.flight_state import FlightState
-from flightstack.vehicle.journal import Journal
+from flightstack.vehicle.flight_state import FlightState, Journal
 from flightstack.vehicle.mission import Mission
 from flightstack.vehicle.mode_control import ModeControl, Takeoff
 

@@ -3,6 +3,7 @@
 The step of the loops is fixed and independent of the simulator's. Each state is followed by the ticks that its time
 makes due: one tick if both steps are equal, two of 2 ms after a state 4 ms later, and none after an early or repeated
 state, which is answered with the last commands. Loops, timers and failsafes thus all count simulator time.
+A module of its own: real time has ticks without it.
 """
 
 from __future__ import annotations
@@ -37,6 +38,11 @@ class Lockstep:
         if self._link.time_us + self._lead_us == time_us and self._begun:  # the usual case
             return self._autopilot.tick(time_us)
         return self._catch_up(now_ns)
+
+    @property
+    def is_quiet(self) -> bool:
+        """True if the last tick was that of the newest state, and the vehicle's clock is the simulator's."""
+        return self._begun and not self._lead_us and self._link.is_quiet(self._now.time_us)
 
     def _catch_up(self, now_ns: int) -> FloatArray:
         link, interval_us = self._link, self._interval_us

@@ -10,8 +10,7 @@ from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.safe_places import HOME_SPREAD_M, SafePlaces, plan_limits
 from flightstack.plan import MissionItem, Rejection
 from flightstack.plan.jumps import takes_off
-from flightstack.vehicle.flight_state import FlightState
-from flightstack.vehicle.journal import Journal
+from flightstack.vehicle.flight_state import FlightState, Journal
 
 
 class Mission:

@@ -12,8 +12,7 @@ from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.params import SpeedOverrides
 from flightstack.guidance.safe_places import SafePlaces, plan_limits
 from flightstack.vehicle.area import FlightArea
-from flightstack.vehicle.flight_state import FlightState
-from flightstack.vehicle.journal import Journal
+from flightstack.vehicle.flight_state import FlightState, Journal
 from flightstack.vehicle.mission import Mission
 
 

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from flightstack.control.backend import ControlBackend
 from flightstack.control.controller_loading import controller_error
-from flightstack.flight_log.recorder import FlightRecorder
 from flightstack.params.behaviour import FIELDS, SPECS, Behaviour
 from flightstack.params.config import ESTIMATED, StackConfig, identity_specs
 from flightstack.params.estimator import ESTIMATOR_SPECS
 from flightstack.params.param_file import NOTHING_LOADED, LoadedParams, load_into
 from flightstack.params.spec import ParamSpec
 from flightstack.params.store import ParamStore, apply_assignments
-from flightstack.vehicle.assembly import VehicleParts
+
+if TYPE_CHECKING:  # a check of the parameters needs no vehicle
+    from flightstack.control.backend import ControlBackend
+    from flightstack.flight_log.recorder import FlightRecorder
+    from flightstack.vehicle.assembly import VehicleParts
 
 
 class Parameters(NamedTuple):

@@ -12,8 +12,7 @@ from flightstack.core.enums import Mode, Severity
 from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.setpoints import Sticks
 from flightstack.plan import MissionItem
-from flightstack.vehicle.flight_state import FlightState
-from flightstack.vehicle.journal import Journal
+from flightstack.vehicle.flight_state import FlightState, Journal
 from flightstack.vehicle.mission import Mission
 from flightstack.vehicle.mode_control import ModeControl, Readiness
 

@@ -1,4 +1,4 @@
-"""A user's own attitude controller: the documented example installed and flown, and broken ones."""
+"""A user's own attitude controller: the documented example installed and flown."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from scipy.linalg import solve_continuous_are
 
 from flightstack.control.attitude_pid import CONTROLLER as PID
 from flightstack.control.controller_loading import (
-    compile_error,
     controller_names,
     form_problem,
     load_controller,
@@ -34,30 +33,22 @@ from flightstack.params.gains_file import BUILT_IN, open_gains
 from flightstack.params.tunable import Tunable, undeclared
 from flightstack.params.vehicle import load_vehicle
 from flightstack.process.assembly import build
-from flightstack.testing import World
 from tests.support.commands import flightstack_command
 from tests.support.console_blocks import File, steps
-from tests.support.plugin_site import EXAMPLE, GROUP, ROOT, install
+from tests.support.plugin_site import EXAMPLE, GROUP, ROOT, install, installed_site, new_site
+from tests.support.truth import World
 
 MODULE = (EXAMPLE / "lqr_controller.py").read_text(encoding="utf-8")
 
 
 @pytest.fixture
 def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A directory of installed packages that this process and its children see."""
-    folder = tmp_path / "site"
-    folder.mkdir()
-    monkeypatch.syspath_prepend(str(folder))
-    for name in ("lqr_controller", "broken"):
-        monkeypatch.delitem(sys.modules, name, raising=False)
-    return folder
+    return new_site(tmp_path / "site", monkeypatch)
 
 
 @pytest.fixture
-def installed(site: Path) -> Path:
-    install(site)
-    importlib.invalidate_caches()
-    return site
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    return installed_site(tmp_path / "site", monkeypatch)
 
 
 # ---------------------------------------------------------------------- the example
@@ -184,7 +175,7 @@ def test_a_declaration_that_cannot_be(name: str) -> None:
 
 def test_a_name_that_the_vehicle_has_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     taken = PID._replace(tunables=(Tunable("kp_roll", "MPC_XY_CRUISE", 0, 1e5, "", "Gain"),))
-    monkeypatch.setattr("flightstack.process.assembly.load_controller", lambda _: taken)
+    monkeypatch.setattr("flightstack.process.config_check.load_controller", lambda _: taken)
     with pytest.raises(
         ConfigError, match="declares the parameter MPC_XY_CRUISE, which the vehicle has already"
     ):
@@ -232,110 +223,3 @@ def test_a_controller_that_is_gone_leaves_the_others_compilable(installed: Path)
     for path in indices:
         if path not in kernels:
             assert b"lqr_controller" not in path.read_bytes(), path.name
-
-
-# ---------------------------------------------------------------------- broken ones
-
-
-def replaced(old: str, new: str) -> str:
-    assert old in MODULE
-    return MODULE.replace(old, new)
-
-
-BROKEN = {
-    "its module is missing": (None, "broken:CONTROLLER cannot be loaded: No module named 'broken'"),
-    "its module fails": (
-        "import no_such_thing",
-        "broken:CONTROLLER cannot be loaded: No module named 'no_such_thing'",
-    ),
-    "its module is no Python": (
-        "def",
-        "broken:CONTROLLER cannot be loaded: invalid syntax (broken.py, line 1)",
-    ),
-    "it exits": ("raise RuntimeError('many\\nlines')", "broken:CONTROLLER cannot be loaded: many"),
-    "it has no such name": ("X = 1", "broken:CONTROLLER cannot be loaded: module 'broken' has no attribute"),
-    "it is something else": (
-        "CONTROLLER = 3",
-        "broken:CONTROLLER is neither a Controller nor an AttitudeController",
-    ),
-    "it has another name": (
-        MODULE,
-        "broken:CONTROLLER calls itself 'lqr', and must bear the name of its entry point",
-    ),
-    "too little memory": (
-        replaced('"lqr", step, Memory, Params, (0.0,)', '"broken", step, Memory, Params, ()'),
-        "broken:CONTROLLER has 0 initial values for the 1 fields of its memory (one at least)",
-    ),
-    "memory of no type": (
-        replaced('"lqr", step, Memory, Params', '"broken", step, dict, Params'),
-        "broken:CONTROLLER has 1 initial values for the 0 fields of its memory (one at least)",
-    ),
-    "no parameters": (
-        replaced('"lqr", step, Memory, Params', '"broken", step, Memory, tuple'),
-        "broken:CONTROLLER has no parameters",
-    ),
-    "parameters fail": (
-        replaced("    pairs = ", "    1 / 0\n    pairs = "),
-        "its parameters cannot be read: division by zero",
-    ),
-    "too few parameters": (
-        replaced("Params(*angle_gains, *rate_gains, *vehicle.inertia_kg_m2)", "(1.0, 2.0)"),
-        "its read_params must return 9 finite numbers",
-    ),
-    "infinite parameters": (
-        replaced("*vehicle.inertia_kg_m2)", "1.0, 1.0, math.inf)"),
-        "its read_params must return 9 finite numbers",
-    ),
-    "unknown attribute in the step": (
-        replaced("inputs.error_rad, inputs.rates", "inputs.errors, inputs.rates"),
-        "its step cannot be compiled: Unknown attribute 'errors' of type AttitudeInputs(",
-    ),
-    "unknown name in the step": (
-        replaced("+ ahead.x", "+ ahead_x"),
-        "its step cannot be compiled: NameError: name 'ahead_x' is not defined",
-    ),
-    "torque that is no vector": (
-        replaced("return memory, Vector3(", "return memory, ("),
-        "its step cannot be compiled: Unknown attribute 'x' of type",
-    ),
-    "one result too many": (
-        replaced("return memory, Vector3(", "return memory, 0.0, Vector3("),
-        "its step cannot be compiled: ",
-    ),
-}
-
-
-@pytest.mark.parametrize("name", BROKEN)
-def test_a_broken_controller_is_one_sentence_that_lists_the_installed_ones(site: Path, name: str) -> None:
-    text, sentence = BROKEN[name]
-    if text is not None:
-        if "CONTROLLER has" not in sentence and "calls itself" not in sentence:
-            text = text.replace('AttitudeController("lqr"', 'AttitudeController("broken"')
-        (site / "broken.py").write_text(text)
-    info = site / "broken-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(f"[{GROUP}]\nbroken = broken:CONTROLLER\n")
-    importlib.invalidate_caches()
-    with pytest.raises(ConfigError) as error:
-        build(StackConfig(controller="broken"), lambda: None)
-    shown = str(error.value)
-    assert shown.startswith(f"--controller: broken: {sentence}"), shown
-    assert shown.endswith("; installed are backstepping, broken, pid")
-    assert "\n" not in shown
-    assert len(shown) < 400
-
-
-def test_colours_of_the_compiler_do_not_hide_the_reason() -> None:
-    """Numba colours its messages if colorama is installed."""
-    text = '\x1b[1mFailed in nopython mode\x1b[0m\n\x1b[1mUnknown attribute\x1b[0m\n\x1b[1mFile "a.py", line 3:\x1b[0m'
-    assert "compiled: Unknown attribute (a.py, line 3)" in str(compile_error("pid", ValueError(text)))
-
-
-def test_two_packages_with_one_name_are_not_guessed_between(installed: Path) -> None:
-    info = installed / "rival-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: rival\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(f"[{GROUP}]\nlqr = rival:CONTROLLER\n")
-    with pytest.raises(ConfigError, match="several packages have a controller of this name: my-app, rival"):
-        load_controller("lqr")

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from flightstack.firmware import build, sources
-from flightstack.firmware.build import BuildError, Compiler
+from flightstack.firmware import sources
+from flightstack.firmware.toolchain import build
+from flightstack.firmware.toolchain.build import BuildError, Compiler
 
 ROOT = Path(__file__).parents[2]
 BOARD_PORTS = ("ports/bare", "ports/gnu", "ports/nucleo", "ports/pico2")
-COMPILED_HERE = (*sources.PORTABLE, "laws", "ports/host", "ports/cortex_m4", *BOARD_PORTS)
+COMPILED_HERE = (*sources.PORTABLE, "sensing", "laws", "ports/host", "ports/cortex_m4", *BOARD_PORTS)
 
 
 def test_a_wheel_holds_all_sources_that_an_installation_compiles() -> None:

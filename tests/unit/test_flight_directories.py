@@ -14,7 +14,7 @@ from rich.text import Text
 from gcs_cli.__main__ import main
 from gcs_cli.errors import DONE, USAGE, CliError
 from gcs_cli.fly.flight import Phase
-from gcs_cli.fly.fly_display import LineDisplay, make_display, phase_words, progress
+from gcs_cli.fly.fly_display import LineDisplay, make_display, phase_words, progress, speed_words
 from gcs_cli.report.flight_outcome import Code, Outcome
 from gcs_cli.report.poses import Run
 from gcs_cli.run_directory import LOG_NAME, make_run_directory
@@ -79,6 +79,14 @@ def test_the_live_line_fits_the_terminal(width: int, bar: bool, place: bool) -> 
     assert "MISSION" in line
     assert "t " in line
     assert ("━" in line, "up " in line) == (bar, place)
+
+
+def test_the_state_line_has_the_clock_of_the_texts() -> None:
+    story = Story(FakeVehicle())
+    story.vehicle.time_s = 60.0  # the vehicle has waited on the ground
+    story.run(until=Phase.FLY)
+    assert story.flight.flown_s == 5.0
+    assert speed_words(story.flight).startswith("t 1:05.0")
 
 
 def test_what_the_vehicle_says_of_an_early_end_is_not_shown() -> None:

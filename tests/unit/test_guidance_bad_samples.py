@@ -33,7 +33,7 @@ def test_one_bad_state_moves_no_reference(mode: Mode, bad: float) -> None:
     for index in range(13):
         state = disturbed.state.copy()
         state[index] = bad
-        disturbed.navigator.step(mode, state, HOVER)
+        disturbed.navigator.step(mode, state, HOVER, WEIGHT_N)
         disturbed.navigator.reset_reference(state)
         disturbed.navigator.reset_on_ground(state)
     for vehicle in (disturbed, quiet):
@@ -46,7 +46,7 @@ def test_one_bad_attitude_target_ends_no_flight_by_body_rates(bad: float) -> Non
     vehicle = flying(Mode.OFFBOARD)
     navigator = vehicle.navigator
     navigator.set_offboard(AttitudeSetpoint(None, Vector3(0.2, 0.0, 0.0), 0.5), 20.0)
-    navigator.step(Mode.OFFBOARD, vehicle.state, np.array([1.0, bad, 0.0, 0.0, WEIGHT_N]))
+    navigator.step(Mode.OFFBOARD, vehicle.state, np.array([1.0, bad, 0.0, 0.0, WEIGHT_N]), WEIGHT_N)
     for _ in range(5):
-        navigator.step(Mode.OFFBOARD, vehicle.state, navigator.attitude_target.copy())
+        navigator.step(Mode.OFFBOARD, vehicle.state, navigator.attitude_target.copy(), WEIGHT_N)
     assert np.isfinite(navigator.attitude_target).all()

@@ -18,7 +18,7 @@ from flightstack.core.port_numbers import GROUND
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.mission_messages import mission_id
-from flightstack.params.config import DEFAULT_HOME, StackConfig
+from flightstack.params.config import DEFAULT_HOME, TRUTH, StackConfig
 from flightstack.plan import MissionItem, MissionType, load_plan
 from flightstack.plan.item import UNSET_E7
 from flightstack.plan.kept_plans import KeptPlans, plans_from_text, plans_to_text
@@ -84,7 +84,7 @@ def test_any_text_is_read_or_refused(text: str) -> None:
 
 def stack_with(path: Path, *params: str) -> tuple[Stack, PlanFile, str | None]:
     """Start a vehicle that keeps its plans at ``path``; return the sentence about them, too."""
-    stack = build(StackConfig(params=params), lambda: None)
+    stack = build(StackConfig(params=params, state=TRUTH), lambda: None)
     file = PlanFile(path)
     return stack, file, file.restore(stack)
 

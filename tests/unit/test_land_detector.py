@@ -11,6 +11,7 @@ from flightstack.core.contract import Quaternion, Vector3, VehicleState
 from flightstack.guidance.land_detector import (
     BLOCKED_M_S,
     BOUNCE_SHARE,
+    CARRIED_M_S,
     CLIMB_M,
     CONTACT_M_S,
     LANDED_S,
@@ -28,6 +29,7 @@ from flightstack.params.vehicle import GRAVITY_M_S2
 DT_S, DESCENT_M_S = 0.01, 0.7
 FLYING = LandMemory(0.0, 0.0, 0.0, 0.0)
 TOUCHING = LandMemory(0.0, CONTACT_M_S, 0.0, 0.0)
+RESTING = LandMemory(0.0, REST_M_S, 0.0, 0.0)
 LEVEL = Quaternion(1.0, 0.0, 0.0, 0.0)
 
 
@@ -41,9 +43,10 @@ def watch(
     lift: float = 0.4,
     descent_m_s: float = DESCENT_M_S,
     memory: LandMemory = FLYING,
+    rotor_lift: float = 0.0,
 ) -> LandMemory:
     for _ in range(round(seconds / DT_S)):
-        memory = land_detector_step(memory, state, lift, descent_m_s, DT_S)
+        memory = land_detector_step(memory, state, lift, rotor_lift, descent_m_s, DT_S)
     return memory
 
 
@@ -93,7 +96,7 @@ def fly(
     while time_s < seconds:
         lift = lift_of(time_s)
         vz += (1.0 - lift - updraft) * GRAVITY_M_S2 * DT_S
-        memory = land_detector_step(memory, moving(down=vz), lift, math.inf, DT_S)
+        memory = land_detector_step(memory, moving(down=vz), lift, lift, math.inf, DT_S)
         most = max(most, memory.missing_m_s)
         time_s += DT_S
     return most
@@ -124,7 +127,7 @@ def test_hovering_with_an_upward_force_is_no_contact() -> None:
         memory, vz = watch(0.5, moving(), lift=1.0 - updraft, descent_m_s=math.inf), 0.0
         while memory.missing_m_s >= 0.0 and vz < 2.0 * SETTLING_M_S:
             vz += (1.0 - updraft) * GRAVITY_M_S2 * DT_S  # guidance takes the thrust away
-            memory = land_detector_step(memory, moving(down=vz), 0.0, DESCENT_M_S, DT_S)
+            memory = land_detector_step(memory, moving(down=vz), 0.0, 0.0, DESCENT_M_S, DT_S)
             assert memory.landed == 0.0
         assert not touches(memory)
 
@@ -140,14 +143,37 @@ def test_contact_that_ended_in_a_fall_is_blocked_for_two_seconds() -> None:
 
 def test_contact_lasts_while_the_reference_rests() -> None:
     """A pilot who centres the throttle on the ground has landed."""
-    assert watch(LANDED_S + DT_S, moving(), 0.0, descent_m_s=0.0, memory=TOUCHING).landed == 1.0
+    assert watch(LANDED_S + DT_S, moving(), 0.0, descent_m_s=0.0, memory=RESTING).landed == 1.0
 
 
 def test_landed_means_standing_without_thrust_for_a_while() -> None:
-    assert watch(LANDED_S - 2 * DT_S, moving(), 0.0, memory=TOUCHING).landed == 0.0
-    landed = watch(LANDED_S + DT_S, moving(), 0.0, memory=TOUCHING)
+    assert watch(0.25, moving(), 0.0, memory=TOUCHING).stood_s == 0.0  # the loops still run
+    assert watch(LANDED_S - 2 * DT_S, moving(), 0.0, memory=RESTING).landed == 0.0
+    landed = watch(LANDED_S + DT_S, moving(), 0.0, memory=RESTING)
     assert landed.landed == 1.0
     assert landed.ground_z_m == -0.02
+
+
+@pytest.mark.parametrize("updraft", [0.0, 0.3, 0.5])
+def test_saturated_loops_that_carry_the_vehicle_are_no_landing(updraft: float) -> None:
+    """The setpoint is near zero, the rotors carry the vehicle: contact, and a fall once the loops stop."""
+    memory = watch(0.5, moving(), 0.0, rotor_lift=1.0 - updraft)
+    assert memory.missing_m_s >= REST_M_S
+    vz, carries = -0.2, 1.0 - updraft
+    while touches(memory):
+        carries *= 0.6  # a lag of 20 ms
+        vz += (1.0 - carries - updraft) * GRAVITY_M_S2 * DT_S
+        memory = land_detector_step(memory, moving(down=vz), 0.0, carries, DESCENT_M_S, DT_S)
+        assert memory.landed == 0.0
+    assert memory.missing_m_s == -BLOCKED_M_S
+
+
+def test_rotors_that_do_not_stop_at_rest_end_contact_without_landing() -> None:
+    carried = watch(0.2, moving(), 0.0, memory=RESTING, rotor_lift=1.0)
+    assert touches(carried)
+    assert carried.stood_s == 0.0
+    still_s = (CARRIED_M_S - REST_M_S) / (SUPPORT_LIFT * GRAVITY_M_S2)
+    assert not touches(watch(still_s + DT_S, moving(), 0.0, memory=RESTING, rotor_lift=1.0))
 
 
 @pytest.mark.parametrize(

@@ -19,8 +19,8 @@ from sim_bridge import plants
 from sim_bridge.errors import PlantDivergedError, UsageProblemError
 from sim_bridge.multibody.plant import MultibodyPlant
 from sim_bridge.plant.disturbance import Disturbance
-from sim_bridge.plant.fault_effects import plant_faults
-from sim_bridge.plant.fault_schedule import parse_fault
+from sim_bridge.plant.faults.effects import plant_faults
+from sim_bridge.plant.faults.schedule import parse_fault
 from sim_bridge.plant.layout import DIVERGED
 from sim_bridge.plant.plant import InitialState, PlantOptions
 from sim_bridge.plants import PLANT_NAMES, make_plant

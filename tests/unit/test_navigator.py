@@ -113,7 +113,7 @@ def test_nothing_moves_while_the_state_is_not_finite(mode: Mode, bad: float) -> 
     state = vehicle.state.copy()
     state[7] = bad
     for _ in range(10):
-        n.step(mode, state, np.array([1.0, 0.0, 0.0, 0.0, 10.0]))
+        n.step(mode, state, np.array([1.0, 0.0, 0.0, 0.0, 10.0]), 10.0)
     for memory, kept in zip(memories, before, strict=True):
         for field in memory.dtype.names or (...,):  # not the bytes between the fields of a record
             np.testing.assert_array_equal(memory[field], kept[field])

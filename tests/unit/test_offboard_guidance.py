@@ -147,7 +147,7 @@ def test_a_reference_without_position_does_not_leave_a_vehicle_that_cannot_follo
     vehicle = in_offboard(PointSetpoint(velocity_ned_m_s=Vector3(5.0, 5.0, -1.0)))
     n, stuck = vehicle.navigator, vehicle.state.copy()
     for _ in range(1000):
-        n.step(Mode.OFFBOARD, stuck, np.array([1.0, 0.0, 0.0, 0.0, WEIGHT_N]))
+        n.step(Mode.OFFBOARD, stuck, np.array([1.0, 0.0, 0.0, 0.0, WEIGHT_N]), WEIGHT_N)
     assert n.setpoint[:3] == pytest.approx([3.0, 3.0, -8.0])
 
 
@@ -157,7 +157,7 @@ def test_an_attitude_is_handed_on_and_the_reference_goes_with_the_vehicle() -> N
     n = vehicle.navigator
     state = vehicle.state.copy()
     state[:6] = 1.0, 2.0, -3.0, 0.4, 0.5, 0.6
-    n.step(Mode.OFFBOARD, state, np.array([1.0, 0.0, 0.0, 0.0, WEIGHT_N]))
+    n.step(Mode.OFFBOARD, state, np.array([1.0, 0.0, 0.0, 0.0, WEIGHT_N]), WEIGHT_N)
     assert n.flies_attitude(Mode.OFFBOARD)
     assert not n.flies_attitude(Mode.HOLD)
     assert n.attitude_target == pytest.approx([*tilted, 0.5 * MAX_THRUST_N])
@@ -173,11 +173,11 @@ def test_body_rates_turn_the_target_but_not_far_ahead_of_the_vehicle() -> None:
     n = vehicle.navigator
     target = np.array([1.0, 0.0, 0.0, 0.0, WEIGHT_N])
     for _ in range(20):
-        n.step(Mode.OFFBOARD, vehicle.state, target)
+        n.step(Mode.OFFBOARD, vehicle.state, target, WEIGHT_N)
         target = n.attitude_target.copy()
     assert 2.0 * math.atan2(target[3], target[0]) == pytest.approx(0.5 * 20 * vehicle.dt_s, rel=1e-9)
     for _ in range(500):
-        n.step(Mode.OFFBOARD, vehicle.state, target)
+        n.step(Mode.OFFBOARD, vehicle.state, target, WEIGHT_N)
         target = n.attitude_target.copy()
     assert 2.0 * math.atan2(target[3], target[0]) == pytest.approx(0.5, rel=1e-9)
 

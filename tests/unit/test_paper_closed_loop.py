@@ -9,7 +9,7 @@ import pytest
 
 from flightstack.core.contract import LoopRow, LoopStatus, Vector3
 from flightstack.flight_log.flight_log import FlightLog
-from flightstack.params.config import StackConfig
+from flightstack.params.config import TRUTH, StackConfig
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
 from flightstack.process.assembly import build
@@ -54,6 +54,7 @@ def rows_over_the_links(case: Case, trajectory: Trajectory) -> np.ndarray:
         inner_hz=case.inner_hz,
         outer_hz=case.outer_hz,
         ideal_rotors=not case.limits,
+        state=TRUTH,
     )
     stack = build(config, no_log)
     options = PlantOptions(

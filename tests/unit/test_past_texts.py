@@ -10,7 +10,7 @@ from flightstack.core.enums import Severity
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address
 from flightstack.mavlink.text_file import PATH, PastText, pack_texts, read_texts
-from flightstack.vehicle.journal import KEPT_TEXTS
+from flightstack.vehicle.flight_state import KEPT_TEXTS
 from gcs_cli.clients.ftp_client import FtpClient, FtpDone
 from gcs_cli.commands.messages import TextPrinter
 from gcs_cli.link.connection import Connection

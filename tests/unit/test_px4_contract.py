@@ -12,7 +12,7 @@ from flightstack.core.geodesy import GeoPoint
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 from flightstack.simulator_link.sensor_frames import ACCEL, BARO, GYRO, MAG
-from sim_bridge.plant.fault_schedule import parse_fault
+from sim_bridge.plant.faults.schedule import parse_fault
 from sim_bridge.server.connection import PeerClosedError
 from sim_bridge.server.endpoint import FlightStackEndpoint
 from sim_bridge.server.session import Session

@@ -82,7 +82,7 @@ def test_addresses_are_those_of_the_instance() -> None:
         "instance": 1,
         "system_id": 2,
         "mavsdk": "udpin://127.0.0.1:14541",
-        "ground_station_port": 14551,
+        "ground_station_port": 14550,
         "gcs": "udpout:127.0.0.1:18571",
         "tcp": "tcp:127.0.0.1:5770",
         "latitude_deg": DEFAULT_HOME.latitude_deg,
@@ -101,6 +101,22 @@ def test_the_default_speed_is_real_time() -> None:
 
 def test_passed_options_are_options_of_the_flight_stack() -> None:
     assert set(TO_STACK) <= set(RunOptions.__dataclass_fields__)
+
+
+def test_several_vehicles_send_to_one_ground_station() -> None:
+    first, second = vehicles_of(SimOptions(vehicles=2, instance=3))
+    for vehicle in (first, second):
+        assert "--gcs=127.0.0.1:14553" in stack_arguments(vehicle)
+        assert sim_run.view_link(vehicle) == ["--connect", "udpin:127.0.0.1:14553"]
+    assert "gcs --instance 3 status" in ready_text(first)
+    assert "UDP 14553, added as a link" in ready_text(second)
+
+
+def test_view_of_vehicles_with_a_remote_ground_station_shows_the_first() -> None:
+    first, _ = vehicles_of(SimOptions(vehicles=2, gcs=["192.168.1.9:14550"]))
+    assert stack_arguments(first).count("--gcs=192.168.1.9:14550") == 1
+    assert sim_run.view_link(first) == ["--instance", "0"]
+    assert "UDP 192.168.1.9:14550\n" in ready_text(first)
 
 
 @pytest.mark.parametrize(

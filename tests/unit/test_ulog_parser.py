@@ -10,8 +10,8 @@ from pyulog import ULog
 
 from flightstack.core.errors import ConfigError
 from flightstack.flight_log.ulog import HEADER_SIZE
-from flightstack.testing import World
 from gcs_cli.logs.ulog_parser import LogBytes, parse_ulog
+from tests.support.truth import World
 
 
 @pytest.fixture(scope="module")

@@ -22,8 +22,8 @@ from flightstack.services.commands.context import (
     Handler,
     VehicleContext,
 )
-from flightstack.services.commands.failure_commands import FailureCommands
 from flightstack.services.commands.link_commands import LINK_COMMANDS
+from flightstack.services.commands.system import FailureCommands
 from flightstack.services.routing.peer import Peer
 
 _REPETITION_S = 4.0  # ground stations repeat after 0.5 s (MAVSDK) to 3 s (QGroundControl)

@@ -14,8 +14,7 @@ from flightstack.services.logs.log_store import NO_LOGS, LogStore
 from flightstack.services.logs.log_stream import LogTail
 from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.assembly import VehicleParts
-from flightstack.vehicle.flight_state import FlightState
-from flightstack.vehicle.journal import Journal
+from flightstack.vehicle.flight_state import FlightState, Journal
 from flightstack.vehicle.mission import Mission
 from flightstack.vehicle.mode_control import Readiness, Takeoff
 from flightstack.vehicle.requests import FlightRequests

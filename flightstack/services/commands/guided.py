@@ -17,7 +17,7 @@ from flightstack.guidance.safe_places import plan_limits
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Message, is_for, sender
 from flightstack.mavlink.mission_messages import CHANGES_ALTITUDE, GOES_THERE, ack_message
-from flightstack.plan.vocabulary import MissionResult, MissionType
+from flightstack.plan.commands import MissionResult, MissionType
 from flightstack.services.commands.context import (
     ACCEPTED,
     DENIED,

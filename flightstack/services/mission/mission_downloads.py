@@ -10,8 +10,8 @@ from typing import NamedTuple
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.mavlink.mission_messages import message_from_item
+from flightstack.plan.commands import MissionType
 from flightstack.plan.item import MissionItem
-from flightstack.plan.vocabulary import MissionType
 from flightstack.services.mission.mission_upload import Client
 
 _FORGET_AFTER_S = 30.0

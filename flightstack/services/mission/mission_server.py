@@ -14,9 +14,9 @@ from flightstack.core.enums import Severity
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Message, is_for, sender
 from flightstack.mavlink.mission_messages import DEFAULT_TIMING, GOES_THERE, PROTOCOL, Timing, ack_message
+from flightstack.plan.commands import PLAN_NAMES, MissionResult, MissionType
 from flightstack.plan.kept_plans import KeptPlans
 from flightstack.plan.rejection import Rejection
-from flightstack.plan.vocabulary import PLAN_NAMES, MissionResult, MissionType
 from flightstack.services.mission.mission_downloads import Downloads
 from flightstack.services.mission.mission_store import (
     Check,

@@ -6,9 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple, TypeAlias
 
 from flightstack.mavlink.mission_messages import mission_id
-from flightstack.plan.item import MissionItem
-from flightstack.plan.rejection import Rejection
-from flightstack.plan.vocabulary import (
+from flightstack.plan.commands import (
     MAX_FENCE_ITEMS,
     MAX_MISSION_ITEMS,
     MAX_RALLY_POINTS,
@@ -16,6 +14,8 @@ from flightstack.plan.vocabulary import (
     MissionResult,
     MissionType,
 )
+from flightstack.plan.item import MissionItem
+from flightstack.plan.rejection import Rejection
 
 Items: TypeAlias = tuple[MissionItem, ...]
 Check: TypeAlias = Callable[[Items], Rejection | None]

@@ -28,7 +28,7 @@ from flightstack.services.telemetry.streams import Streams, default_rates_hz
 from flightstack.services.telemetry.telemetry import Telemetry
 from flightstack.services.telemetry.vehicle import status_texts, system_time_at
 from flightstack.vehicle.assembly import VehicleParts
-from flightstack.vehicle.journal import ItemReached, Text
+from flightstack.vehicle.flight_state import ItemReached, Text
 from flightstack.vehicle.status import VehicleInfo
 
 HEARTBEAT_S = 1.0

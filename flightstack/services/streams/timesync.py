@@ -2,6 +2,8 @@
 
 https://mavlink.io/en/services/timesync.html and ping.html. The time in the answer is vehicle time, as in telemetry, so
 that a client can relate telemetry to its own clock at any simulation speed.
+
+A module of its own, as each service.
 """
 
 from __future__ import annotations
