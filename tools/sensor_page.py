@@ -63,8 +63,8 @@ Position and velocity at the origin of the vehicle. The receiver states the stan
 `eph` (both horizontal axes, √2·σ) and `epv`. Errors that last longer than a flight are left out: the position
 is right in the mean.
 """,
-    "range": "Looks along +z of the body. Out of range or beyond 60° of tilt it has no echo.\n",
-    "flow": "Looks along +z of the body; signs as in OPTICAL_FLOW_RAD.\n",
+    "range": "Points along +z of the body. Out of range or beyond 60° of tilt it has no echo.\n",
+    "flow": "Points along +z of the body; signs as in OPTICAL_FLOW_RAD.\n",
 }
 
 _TAIL = """

@@ -25,8 +25,11 @@ REFUSED_S = 1.0
 """Time of refused GNSS positions after which spoofing is suspected."""
 
 PREFLIGHT: tuple[tuple[str, Callable[[EstimateHealth], bool]], ...] = (
+    ("an inertial sensor has failed", lambda h: not h.spare_imu_has_failed),
+    ("the inertial sensors disagree", lambda h: not h.imus_disagree),
     ("the compass is missing", lambda h: h.mag_age_s < MISSING_S),
     ("the barometer is missing", lambda h: h.baro_age_s < MISSING_S),
+    ("the barometer is stuck", lambda h: not h.baro_is_stuck),
     ("GNSS has no fix", lambda h: h.fix_age_s < MISSING_S),
     ("the attitude is not aligned yet", lambda h: h.aligned),
     ("the GNSS fix is not accurate enough yet", lambda h: h.has_origin or not h.fix_age_s < MISSING_S),

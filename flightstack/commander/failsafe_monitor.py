@@ -117,6 +117,11 @@ class FailsafeMonitor:
         self._phase = Phase.DISARMED
         self._time_us = 0
 
+    @property
+    def rotor_thrust_n(self) -> float:
+        """Thrust at the mean speeds of the rotors: measured, or expected from their commands."""
+        return self.faults.rotor_thrust_n
+
     def warm_up(self) -> None:
         """Compile the fence, or load it from the cache."""
         self.fence.warm_up(self._state)

@@ -22,6 +22,7 @@ from flightstack.core.contract import (
     Quaternion,
     Record,
     RecordArray,
+    Vector3,
 )
 from flightstack.core.portable_math import acos, exp, pitch_angle, roll_angle
 from flightstack.params.behaviour import Behaviour
@@ -40,6 +41,8 @@ FASTEST_RAD_S = 1e6
 """A larger rotor speed is not a measurement; ideal rotors without limits stay below it."""
 UNMEASURED_AFTER_S = 0.5
 """Time without a measurement after which a rotor is reported as not measured."""
+FROZEN_S = 0.5
+"""Time for which the speed of a rotor has not changed, after which its thrust is that of the expected speed."""
 
 FAULTS = (
     (NOT_FINITE, Failsafe.NOT_FINITE),
@@ -58,6 +61,7 @@ LIMITS = np.dtype(
         ("time", "f8", TIMERS),  # s beyond the limit before a detector triggers
         ("rotors", "i8"),
         ("slow", "f8"),  # rad/s; the relative error's least denominator
+        ("thrust", "f8", MAX_ROTORS),  # N s²
     ]
 )
 ROTOR_SPEEDS = np.dtype(
@@ -70,7 +74,10 @@ ROTOR_SPEEDS = np.dtype(
         ("mean", "f8", MAX_ROTORS),  # of the expected speed
         ("error", "f8", MAX_ROTORS),  # mean of the measured minus the expected speed
         ("missing", "f8", MAX_ROTORS),  # s without a measurement
+        ("speed", "f8", MAX_ROTORS),  # rad/s; the last measured one
+        ("equal", "f8", MAX_ROTORS),  # s for which it has not changed
         ("measured", "i8"),  # 1 after the first measured speed other than 0
+        ("thrust", "f8"),  # N, at the mean speeds
     ]
 )
 ROTOR_LAGS = np.dtype(
@@ -105,6 +112,7 @@ def detector_limits(behaviour: Behaviour, vehicle: Vehicle) -> RecordArray:
         b.max_roll_s, b.max_pitch_s, b.max_tilt_error_s, b.max_position_error_s, b.rotor_error_ms * 1e-3
     )  # fmt: skip
     limits["rotors"] = len(vehicle.rotors)
+    limits["thrust"][0, : len(vehicle.rotors)] = [rotor.thrust_coefficient_n_s2 for rotor in vehicle.rotors]
     limits["slow"] = 0.1 * min(1e4, *(rotor.max_speed_rad_s for rotor in vehicle.rotors))
     return limits
 
@@ -134,6 +142,8 @@ def follow_rotors(row: FloatArray, speeds: RecordArray, lags: RecordArray) -> No
         is_measured = abs(speed) <= FASTEST_RAD_S  # NaN is not
         error = speed - expected if is_measured else 0.0
         s["error"][i] += (error - s["error"][i]) * lag["mean"]
+        s["equal"][i] = s["equal"][i] + lag["dt"] if speed == s["speed"][i] != 0.0 else 0.0
+        s["speed"][i] = speed
         s["missing"][i] = 0.0 if is_measured else s["missing"][i] + lag["dt"]
         if abs(command) <= FASTEST_RAD_S:
             s["expected"][i] = expected + (command - expected) * lag["lag"][i]
@@ -179,6 +189,21 @@ def _rotor_error(row: FloatArray, speeds: Record, limits: Record) -> float:
 
 
 @compiled
+def _thrust_n(speeds: Record, limits: Record) -> float:
+    """Return the thrust at the mean measured speeds; without measurements, at the mean expected speeds.
+
+    A speed other than 0 that has not changed for ``FROZEN_S`` is no measurement; that of a rotor at its limit is the
+    expected one too.
+    """
+    thrust_n = 0.0
+    for i in range(limits["rotors"]):
+        is_measured = speeds["measured"] and speeds["equal"][i] < FROZEN_S
+        speed = speeds["mean"][i] + (speeds["error"][i] if is_measured else 0.0)
+        thrust_n += limits["thrust"][i] * speed * abs(speed)
+    return thrust_n
+
+
+@compiled
 def _tilt_between(q: Quaternion, reference: FloatArray) -> float:
     """Return the angle [rad] between the thrust axes: between the third columns of the rotation matrices."""
     qw, qx, qy, qz = q
@@ -189,6 +214,17 @@ def _tilt_between(q: Quaternion, reference: FloatArray) -> float:
         + (1.0 - 2.0 * (qx * qx + qy * qy)) * (1.0 - 2.0 * (rx * rx + ry * ry))
     )
     return acos(min(1.0, max(-1.0, cosine)))
+
+
+@compiled
+def _distance(p: Vector3, setpoint: FloatArray) -> float:
+    dx, dy, dz = p.x - setpoint[0], p.y - setpoint[1], p.z - setpoint[2]
+    return math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@compiled
+def _is_moving(v: Vector3, rates: Vector3) -> bool:
+    return max(abs(v.x), abs(v.y), abs(v.z), abs(rates.x), abs(rates.y), abs(rates.z)) > MOVING_ABOVE
 
 
 @compiled
@@ -215,8 +251,7 @@ def detect(
             return NOT_FINITE | _fault_bits(memory)
     result = NOT_FINITE if status & _BAD_OUTPUT != 0 else 0
     now = vehicle_state(state)
-    v, rates = now.velocity_ned_m_s, now.rates_frd_rad_s
-    if max(abs(v.x), abs(v.y), abs(v.z), abs(rates.x), abs(rates.y), abs(rates.z)) > MOVING_ABOVE:
+    if _is_moving(now.velocity_ned_m_s, now.rates_frd_rad_s):
         result |= MOVING
     for i in range(limits["rotors"]):
         if limits["limit"][ROTORS] > 0.0 and speeds["missing"][i] >= UNMEASURED_AFTER_S:
@@ -224,10 +259,9 @@ def detect(
     w, x, y, z = now.attitude
     roll, pitch = roll_angle(w, x, y, z), pitch_angle(w, x, y, z)
     tilt_error = 0.0 if on_ground else _tilt_between(now.attitude, row[_REFERENCE_AT:])
-    p = now.position_ned_m
-    dx, dy, dz = p.x - setpoint[0], p.y - setpoint[1], p.z - setpoint[2]
-    distance = math.sqrt(dx * dx + dy * dy + dz * dz)
+    distance = _distance(now.position_ned_m, setpoint)
     errors = (abs(roll), abs(pitch), tilt_error, distance, _rotor_error(row, speeds, limits))
+    speeds["thrust"] = _thrust_n(speeds, limits)
     for index in range(TIMERS):
         limit = limits["limit"][index]
         beyond = limit > 0.0 and not errors[index] <= limit
@@ -262,6 +296,7 @@ class FaultDetector:
         self._rotors: RecordArray = np.zeros(1, ROTOR_SPEEDS)
         self._no_error_setpoint = np.zeros(SETPOINT_SIZE)
         self._lags = rotor_lags(vehicle, self._dt_s / divisor)
+        self._thrust_n = self._rotors["thrust"].data  # read ten times as fast as the field
         self._unmeasured: set[int] = set()
         self.found = 0
         """Bits of ``detect`` from the last update."""
@@ -310,6 +345,12 @@ class FaultDetector:
             self._state, setpoint, row, self._rotors, self._detectors, self._limits, on_ground, self._dt_s
         )
         return self.found
+
+    @property
+    def rotor_thrust_n(self) -> float:
+        """Thrust at the mean speeds of the rotors: measured, or expected from their commands."""
+        thrust_n: float = self._thrust_n[0]
+        return thrust_n
 
     @property
     def moves(self) -> bool:

@@ -64,7 +64,7 @@ class Need(Enum):
     IN_AIR = "the vehicle is on the ground"
     ARMED = "the vehicle is disarmed"
     MISSION = "no mission is loaded"
-    TAKES_OFF = "the vehicle is on the ground and the mission begins with a landing or a return"
+    TAKES_OFF = "the vehicle is on the ground and the mission continues with a landing or a return"
     MANUAL_STREAM = "no manual control is received"
     OFFBOARD_STREAM = "no offboard setpoints are received"
 

@@ -6,7 +6,7 @@ import math
 
 from flightstack.core.array_items import as_tuple
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray, Record, RecordArray, Vector3
+from flightstack.core.contract import FloatArray, Vector3
 from flightstack.core.geometry import rotation_over
 from flightstack.estimation.alignment import ALIGNMENT_S, WAIT_FOR_MAG_S, align
 from flightstack.estimation.error_state import (
@@ -38,6 +38,8 @@ from flightstack.estimation.memory import (
     HAS_MAG,
     HAS_YAW,
     LANDED,
+    MemoryArray,
+    MemoryRecord,
     filter_of,
     rings_of,
 )
@@ -49,6 +51,7 @@ from flightstack.estimation.position_sources import (
     take_gnss,
 )
 from flightstack.estimation.prediction import DeltaSample, less_bias, motion_of, moved, predict
+from flightstack.estimation.rate_filter import filtered_rates
 from flightstack.estimation.resets import count_of_resets
 from flightstack.estimation.rings import (
     BARO_RING,
@@ -64,13 +67,14 @@ from flightstack.estimation.rings import (
     Rings,
     count_of_measurements,
     is_due,
-    newest_time,
+    newest_fix_time,
     pop,
     push,
     slot_of,
     take_mean,
     write_row,
 )
+from flightstack.estimation.source_checks import add_fault_noise
 from flightstack.estimation.yaw_sources import predict_yaw, take_earth_field, take_field, take_velocity
 
 _LATE_S = 0.3
@@ -89,21 +93,22 @@ _GAP_RATE_RAD_S, _GAP_FORCE_M_S2 = 0.3, 3.0
 
 
 @compiled
-def push_kernel(memory: RecordArray, ring: int, row: FloatArray) -> None:
+def push_kernel(memory: MemoryArray, ring: int, row: FloatArray) -> None:
     """Store a measurement of a ring (``GNSS_RING``, …) until the horizon reaches its time.
 
     A measurement that is not finite is dropped; only the accuracies of GNSS, behind its velocity, may be missing.
     ``row`` may change.
     """
-    for i in range(min(row.size, _MEASURED)):
-        if not math.isfinite(row[i]):
+    for i in range(row.size):
+        if i < _MEASURED and not math.isfinite(row[i]):
             return
     m = memory[0]
     params = EstimatorParams(*as_tuple(m["params"], PARAMS_SIZE))
     r, wait_s = rings_of(m), params.delay_s + _WAIT_S
     if ring == GNSS_RING:
-        if row[0] - newest_time(r, GNSS_RING, r.gnss) >= wait_s / (GNSS_ROWS - _GNSS_SPARE_ROWS):
-            write_row(r.gnss, push(r, GNSS_RING, GNSS_ROWS), row)
+        if row[0] - newest_fix_time(r) >= wait_s / (GNSS_ROWS - _GNSS_SPARE_ROWS):
+            slot = push(r, GNSS_RING, GNSS_ROWS)
+            write_row(r.gnss[slot], row)
         return
     if ring == MAG_RING and m["flags"][ALIGNED] == 0:
         for i in range(3):
@@ -112,15 +117,18 @@ def push_kernel(memory: RecordArray, ring: int, row: FloatArray) -> None:
     if not take_mean(m["means"][ring], row, max(params.sensor_period_s, wait_s / (MAG_ROWS - 4))):
         return
     if ring == MAG_RING:
-        write_row(r.mag, push(r, MAG_RING, MAG_ROWS), row)
+        slot = push(r, MAG_RING, MAG_ROWS)
+        write_row(r.mag[slot], row)
     elif ring == BARO_RING:
-        write_row(r.baro, push(r, BARO_RING, BARO_ROWS), row)
-    elif ring == RANGE_RING:
-        write_row(r.range, push(r, RANGE_RING, RANGE_ROWS), row)
+        slot = push(r, BARO_RING, BARO_ROWS)
+        write_row(r.baro[slot], row)
+    else:
+        slot = push(r, RANGE_RING, RANGE_ROWS)
+        write_row(r.range[slot], row)
 
 
 @compiled
-def imu_kernel(memory: RecordArray, sample: FloatArray) -> None:
+def imu_kernel(memory: MemoryArray, sample: FloatArray) -> None:
     """Take an IMU sample, shape (8,): move the output, and the filter when a step is complete.
 
     A sample that is not finite, or without a step in time, or not later than the last one, is dropped. Time without
@@ -153,15 +161,16 @@ def imu_kernel(memory: RecordArray, sample: FloatArray) -> None:
             _advance(m, f, r, time_s, params)
         slot = push(r, IMU_RING, IMU_ROWS)
         write_step(r.imu[slot], step)
-        write_row(r.track, slot, output)
+        write_row(r.track[slot], output)
         for _ in range(_STEPS):
             if not _advance(m, f, r, time_s - params.delay_s, params):
                 break
-    _write_state(m, less_bias(gyro, n.gyro_bias_rad_s, 1.0))
+    rates = filtered_rates(m["rate_filter"], gyro, dt_s, params.gyro_cutoff_hz)
+    _write_state(m, less_bias(rates, n.gyro_bias_rad_s, 1.0))
 
 
 @compiled
-def _write_state(m: Record, rates: Vector3) -> None:
+def _write_state(m: MemoryRecord, rates: Vector3) -> None:
     """Write the output in the order of ``VehicleState``."""
     output, state = m["output"], m["state"]
     for i in range(3):
@@ -172,7 +181,7 @@ def _write_state(m: Record, rates: Vector3) -> None:
 
 
 @compiled
-def field_kernel(memory: RecordArray) -> None:
+def field_kernel(memory: MemoryArray) -> None:
     """Take the Earth's field in ``earth``."""
     m = memory[0]
     if m["flags"][ALIGNED] == 1:
@@ -180,7 +189,7 @@ def field_kernel(memory: RecordArray) -> None:
 
 
 @compiled
-def _real_step(m: Record, time_s: float, dt_s: float) -> float:
+def _real_step(m: MemoryRecord, time_s: float, dt_s: float) -> float:
     """Return the time that a sample has to cover: its own, or longer after a gap; zero for one that came too late."""
     last_s = m["last_imu_s"][0]
     if dt_s <= 0.0 or (last_s > 0.0 and time_s <= last_s):
@@ -205,7 +214,7 @@ def _in_start_frame(angle: Vector3, delta_velocity: Vector3) -> Vector3:
 
 
 @compiled
-def _collect(m: Record, accel: Vector3, time_s: float, dt_s: float, params: EstimatorParams) -> None:
+def _collect(m: MemoryRecord, accel: Vector3, time_s: float, dt_s: float, params: EstimatorParams) -> None:
     """Add a sample to the alignment; align when it is long enough."""
     sums = m["alignment"]
     sums[0] += accel.x
@@ -221,6 +230,8 @@ def _collect(m: Record, accel: Vector3, time_s: float, dt_s: float, params: Esti
     take_step(m["sums"], time_s)
     write_motion(m["output"], time_s, motion_of(read_nominal(f.nominal)))
     m["flags"][ALIGNED] = 1
+    for ring in range(MAG_RING, IMU_RING):
+        m["cursors"][ring, 1] = 0  # older than the state; the fields are in its yaw
     if sums[7] > 0.0:
         m["flags"][HAS_MAG], m["flags"][HAS_YAW] = 1, 1
         for i in range(3):
@@ -228,7 +239,7 @@ def _collect(m: Record, accel: Vector3, time_s: float, dt_s: float, params: Esti
 
 
 @compiled
-def _advance(m: Record, f: Filter, r: Rings, horizon_s: float, params: EstimatorParams) -> bool:
+def _advance(m: MemoryRecord, f: Filter, r: Rings, horizon_s: float, params: EstimatorParams) -> bool:
     """Move the filter by one step if it is older than the horizon; return True if it moved."""
     if r.cursors[IMU_RING, 1] == 0:
         return False
@@ -239,14 +250,16 @@ def _advance(m: Record, f: Filter, r: Rings, horizon_s: float, params: Estimator
     predict_yaw(m, f, step)
     predict(f, step, params)
     _account_for_gap(m, f)
-    stands = m["flags"][LANDED] == 1 and _stands(m, params)
-    has_changed = _rest(m, f, step, params) if stands else hold_position(m, f, params)
-    before = count_of_resets(m)
-    if _fuse_waiting(m, f, r, params) or _drag(m, f, step, params):
-        has_changed = True
+    add_fault_noise(m["checks"], f, step.dt_s)
+    has_changed = _bound(m, f, step, params)
+    is_fused = _fuse_waiting(m, f, r, params)
+    if not is_fused:
+        is_fused = _drag(m, f, step, params)
+    has_changed = has_changed or is_fused
     share = 1.0 if params.output_s <= step.dt_s else step.dt_s / params.output_s
-    if count_of_resets(m) != before:
-        share = 1.0
+    if count_of_resets(m) != m["followed"][0]:  # also one between two steps, by the Earth's field
+        share, m["followed"][0] = 1.0, count_of_resets(m)
+        has_changed = True
     if has_changed or share < 1.0:  # else the output has moved as the filter has
         follow(r, m["output"], motion_of(read_nominal(f.nominal)), share, params.gravity_m_s2)
     pop(r, IMU_RING, IMU_ROWS)
@@ -254,7 +267,15 @@ def _advance(m: Record, f: Filter, r: Rings, horizon_s: float, params: Estimator
 
 
 @compiled
-def _account_for_gap(m: Record, f: Filter) -> None:
+def _bound(m: MemoryRecord, f: Filter, step: DeltaSample, params: EstimatorParams) -> bool:
+    """Fuse rest of a vehicle that stands, or the held position without GNSS; return True if it was."""
+    if m["flags"][LANDED] == 1 and _stands(m, params):
+        return _rest(m, f, step, params)
+    return hold_position(m, f, params)
+
+
+@compiled
+def _account_for_gap(m: MemoryRecord, f: Filter) -> None:
     """Add the uncertainty of time without samples."""
     gap_s = m["imu_gap"][GAP_PENDING_S]
     if gap_s > 0.0:
@@ -266,7 +287,7 @@ def _account_for_gap(m: Record, f: Filter) -> None:
 
 
 @compiled
-def _stands(m: Record, params: EstimatorParams) -> bool:
+def _stands(m: MemoryRecord, params: EstimatorParams) -> bool:
     rate, force = mean_rate(m["sums"]), mean_force(m["sums"])
     bias = read_vector(m["nominal"], 10)
     off = math.sqrt(force.x * force.x + force.y * force.y + force.z * force.z) - params.gravity_m_s2
@@ -275,7 +296,7 @@ def _stands(m: Record, params: EstimatorParams) -> bool:
 
 
 @compiled
-def _rest(m: Record, f: Filter, step: DeltaSample, params: EstimatorParams) -> bool:
+def _rest(m: MemoryRecord, f: Filter, step: DeltaSample, params: EstimatorParams) -> bool:
     """Fuse rest ten times a second; return True if it was."""
     if f.clock[0] - m["rest_s"][0] < _REST_PERIOD_S:
         return False
@@ -288,7 +309,7 @@ def _rest(m: Record, f: Filter, step: DeltaSample, params: EstimatorParams) -> b
 
 
 @compiled
-def _drag(m: Record, f: Filter, step: DeltaSample, params: EstimatorParams) -> bool:
+def _drag(m: MemoryRecord, f: Filter, step: DeltaSample, params: EstimatorParams) -> bool:
     """Fuse drag in flight while the velocity over ground is measured, twenty times a second; return True if it was."""
     is_due = f.clock[0] - m["drag_s"][0] >= _DRAG_PERIOD_S
     if params.drag_is_fused == 0.0 or m["flags"][LANDED] == 1 or not is_due or not is_velocity_measured(f):
@@ -299,36 +320,36 @@ def _drag(m: Record, f: Filter, step: DeltaSample, params: EstimatorParams) -> b
 
 
 @compiled
-def _fuse_waiting(m: Record, f: Filter, r: Rings, params: EstimatorParams) -> bool:
+def _fuse_waiting(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorParams) -> bool:
     """Fuse all measurements that are due; drop those that are too late. Return False if none was due."""
     now_s, waiting = f.clock[0], count_of_measurements(r)
     for _ in range(MAG_ROWS):
-        row = r.mag[slot_of(r, MAG_RING, MAG_ROWS, 0)]
-        if not is_due(r, MAG_RING, row[0], now_s):
+        field = r.mag[slot_of(r, MAG_RING, MAG_ROWS, 0)]
+        if not is_due(r, MAG_RING, field[0], now_s):
             break
-        if row[0] > now_s - _LATE_S:
-            take_field(m, f, row, params)
+        if field[0] > now_s - _LATE_S:
+            take_field(m, f, field, params)
         pop(r, MAG_RING, MAG_ROWS)
     for _ in range(BARO_ROWS):
-        row = r.baro[slot_of(r, BARO_RING, BARO_ROWS, 0)]
-        if not is_due(r, BARO_RING, row[0], now_s):
+        altitude = r.baro[slot_of(r, BARO_RING, BARO_ROWS, 0)]
+        if not is_due(r, BARO_RING, altitude[0], now_s):
             break
-        if row[0] > now_s - _LATE_S:
-            take_baro(m, f, row, params)
+        if altitude[0] > now_s - _LATE_S:
+            take_baro(m, f, altitude, params)
         pop(r, BARO_RING, BARO_ROWS)
     for _ in range(RANGE_ROWS):
-        row = r.range[slot_of(r, RANGE_RING, RANGE_ROWS, 0)]
-        if not is_due(r, RANGE_RING, row[0], now_s):
+        distance = r.range[slot_of(r, RANGE_RING, RANGE_ROWS, 0)]
+        if not is_due(r, RANGE_RING, distance[0], now_s):
             break
-        if row[0] > now_s - _LATE_S:
-            take_range(m, f, row, params)
+        if distance[0] > now_s - _LATE_S:
+            take_range(m, f, distance, params)
         pop(r, RANGE_RING, RANGE_ROWS)
     for _ in range(GNSS_ROWS):
-        row = r.gnss[slot_of(r, GNSS_RING, GNSS_ROWS, 0)]
-        if not is_due(r, GNSS_RING, row[0], now_s):
+        fix = r.gnss[slot_of(r, GNSS_RING, GNSS_ROWS, 0)]
+        if not is_due(r, GNSS_RING, fix[0], now_s):
             break
-        if row[0] > now_s - _LATE_S:
-            take_gnss(m, f, row, params)
-            take_velocity(m, f, row)
+        if fix[0] > now_s - _LATE_S:
+            take_gnss(m, f, fix, params)
+            take_velocity(m, f, fix)
         pop(r, GNSS_RING, GNSS_ROWS)
     return count_of_measurements(r) != waiting

@@ -11,11 +11,11 @@ import numpy as np
 from flightstack.core.contract import FloatArray, Quaternion, RecordArray, Vector3, VehicleState
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.portable_math import atan2
-from flightstack.estimation.delayed_filter import field_kernel, imu_kernel, push_kernel
 from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits
+from flightstack.estimation.filter_core import FilterCore, PythonCore
 from flightstack.estimation.fusion import GNSS_SIZE, UNKNOWN_M, UNKNOWN_M_S, UNKNOWN_VERTICAL_M
 from flightstack.estimation.imu_track import IMU_SIZE
-from flightstack.estimation.memory import ALIGNED, LANDED, MEMORY
+from flightstack.estimation.memory import ALIGNED
 from flightstack.estimation.rings import BARO_RING, GNSS_RING, MAG_RING, RANGE_RING
 from flightstack.estimation.sensor_samples import (
     BaroSample,
@@ -27,31 +27,45 @@ from flightstack.estimation.sensor_samples import (
 )
 
 _pack_imu = struct.Struct(f"={IMU_SIZE}d").pack_into
+_pack_mag, _pack_pair = struct.Struct("=4d").pack_into, struct.Struct("=2d").pack_into
+"""A third of the time of an assignment to an array."""
 
 
 class Estimator:
     """Estimates the state of one vehicle. Samples of each sensor must arrive in the order of their time."""
 
-    def __init__(self, params: EstimatorParams | None = None, limits: GnssLimits | None = None) -> None:
-        self.memory: RecordArray = np.zeros(1, MEMORY)
+    def __init__(
+        self,
+        params: EstimatorParams | None = None,
+        limits: GnssLimits | None = None,
+        core: FilterCore | None = None,
+    ) -> None:
+        """``core`` runs the filter, by default in this process, compiled from Python."""
+        self._core: FilterCore = core or PythonCore()
+        self.memory: RecordArray = self._core.memory
         self.params = params or EstimatorParams()
         self.limits = limits or GnssLimits()
+        self._core.start(self.params)
         record: Any = self.memory[0]
-        record["params"] = self.params
-        record["sums"][1] = 1.0
-        record["clock"][1] = self.params.imu_noise_share
-        record["earth"][3] = math.nan
         self.frame: LocalFrame | None = None
-        self._record, self._flags, self._state = record, record["flags"], record["state"]
+        self._state = record["state"]
+        self._flags = record["flags"].data  # a number of an array takes four times as long to read
         self._imu = np.zeros(IMU_SIZE)
         self._gnss = np.zeros(GNSS_SIZE)
         self._mag = np.zeros(4)
         self._pair = np.zeros(2)
+        self.imu_row = self._core.imu
+        """Take a sample of the IMU in its array form, shape (8,)."""
+        self._push = self._core.push
 
     def set_params(self, params: EstimatorParams, limits: GnssLimits) -> None:
         """Set the parameters; those of the initial uncertainty have no effect after the alignment."""
         self.params, self.limits = params, limits
-        self._record["params"] = params
+        self._core.set_params(params)
+
+    def refresh(self) -> None:
+        """Bring the whole ``memory`` up to date: a filter elsewhere keeps only state, flags and resets so."""
+        self._core.refresh()
 
     @property
     def aligned(self) -> bool:
@@ -60,43 +74,40 @@ class Estimator:
 
     def set_landed(self, landed: bool) -> None:
         """Tell the filter whether the vehicle stands on the ground."""
-        self._flags[LANDED] = landed
+        self._core.set_landed(landed)
 
     def set_declination(self, declination_rad: float) -> None:
         """Set the magnetic declination, which holds until the Earth's field is known."""
-        self._record["earth"][3] = declination_rad
+        self.refresh()
+        self._core.set_earth(np.array([*self.memory["earth"][0, :3], declination_rad]), False)
 
     def set_earth_field(self, field_ned_gauss: Vector3) -> None:
         """Set the Earth's magnetic field at the place of the vehicle, from the World Magnetic Model; also in flight."""
-        self._record["earth"][:3] = field_ned_gauss
-        self._record["earth"][3] = atan2(field_ned_gauss.y, field_ned_gauss.x)
-        field_kernel(self.memory)
+        declination_rad = atan2(field_ned_gauss.y, field_ned_gauss.x)
+        self._core.set_earth(np.array([*field_ned_gauss, declination_rad]), True)
 
     def imu(self, sample: ImuSample) -> None:
         """Take a sample of the IMU."""
         time_s, dt_s, gyro, accel = sample
         _pack_imu(self._imu.data, 0, time_s, dt_s, *gyro, *accel)
-        imu_kernel(self.memory, self._imu)
-
-    def imu_row(self, row: FloatArray) -> None:
-        """Take a sample of the IMU in its array form, shape (8,)."""
-        imu_kernel(self.memory, row)
+        self.imu_row(self._imu)
 
     def mag(self, sample: MagSample) -> None:
         """Take a sample of the magnetometer."""
-        self._mag[:] = (sample.time_s - self.params.mag_delay_s, *sample.field_frd_gauss)
-        push_kernel(self.memory, MAG_RING, self._mag)
+        time_s, field = sample
+        _pack_mag(self._mag.data, 0, time_s - self.params.mag_delay_s, *field)
+        self._push(MAG_RING, self._mag)
 
     def baro(self, sample: BaroSample) -> None:
         """Take a sample of the barometer."""
-        self._pair[:] = sample.time_s - self.params.baro_delay_s, sample.pressure_altitude_m
-        push_kernel(self.memory, BARO_RING, self._pair)
+        _pack_pair(self._pair.data, 0, sample.time_s - self.params.baro_delay_s, sample.pressure_altitude_m)
+        self._push(BARO_RING, self._pair)
 
     def range(self, sample: RangeSample) -> None:
         """Take a sample of the range finder."""
         if sample.quality > 0.0:
             self._pair[:] = sample.time_s - self.params.range_delay_s, sample.distance_m
-            push_kernel(self.memory, RANGE_RING, self._pair)
+            self._push(RANGE_RING, self._pair)
 
     def gnss(self, sample: GnssSample) -> None:
         """Take a sample of the GNSS receiver. The first three-dimensional fix becomes the origin."""
@@ -106,7 +117,8 @@ class Estimator:
         if self.frame is None:
             if not self.aligned:
                 return
-            n, e, d = self._record["nominal"][7:10]
+            self.refresh()
+            n, e, d = self.memory["nominal"][0, 7:10]
             origin = LocalFrame(point).to_geo(Vector3(-float(n), -float(e), -float(d)))
             self.frame = LocalFrame(origin)
         x = self._gnss
@@ -116,7 +128,7 @@ class Estimator:
             sample.velocity_ned_m_s,
         )
         x[7:10] = sample.eph_m, sample.epv_m, sample.speed_accuracy_m_s
-        push_kernel(self.memory, GNSS_RING, x)
+        self._push(GNSS_RING, x)
 
     def _is_good(self, sample: GnssSample) -> bool:
         """Return True if a fix is accurate enough to start from."""
@@ -139,7 +151,7 @@ class Estimator:
 
     def deviations(self) -> FloatArray:
         """Return the standard deviation of each error state, shape (27,)."""
-        return np.sqrt(np.diag(self._record["covariance"]))
+        return np.sqrt(np.diag(self.memory["covariance"][0]))
 
 
 def _is_within(accuracy: float, unknown: float, limit: float) -> bool:

@@ -20,6 +20,8 @@ class EstimatorParams(NamedTuple):
     accel_noise: float = estimator_default("accel_noise")  # m/s²/√Hz
     imu_noise_share: float = 0.1
     """Share of the measured noise of the IMU that counts at the start."""
+    gyro_scale_error: float = 0.0035
+    """Error of scale and alignment of the gyro, 1σ of each term: 0.2°."""
     gyro_bias_walk: float = estimator_default("gyro_bias_walk")  # rad/s/√s
     accel_bias_walk: float = estimator_default("accel_bias_walk")  # m/s²/√s
     earth_field_walk: float = estimator_default("earth_field_walk")  # gauss/√s
@@ -85,6 +87,8 @@ class EstimatorParams(NamedTuple):
     """Time constant with which the output follows the filter; 0 follows at once."""
     reset_s: float = 7.0
     """Time without an accepted GNSS position or velocity after which the filter is reset to GNSS."""
+    gyro_cutoff_hz: float = estimator_default("gyro_cutoff_hz")
+    """Cutoff of the rates of the output; 0 for none."""
     gravity_m_s2: float = 9.80665
 
 

@@ -36,6 +36,7 @@ from flightstack.estimation.kalman import (
     INNOVATION_VARIANCE,
     MAG,
     RANGE,
+    REFUSED,
     REST_RATE,
     REST_VELOCITY,
     Filter,
@@ -43,6 +44,7 @@ from flightstack.estimation.kalman import (
     clear,
     fuse,
 )
+from flightstack.estimation.source_checks import POSITION_DRIFTS, VELOCITY_IS_WRONG, WRONG_VELOCITY_M_S
 
 GNSS_SIZE = 10
 """Array form of a GNSS measurement: time, position NED, velocity NED, eph, epv, speed accuracy."""
@@ -83,13 +85,19 @@ def speed_accuracy(row: GnssRow) -> float:
 
 
 @compiled
+def gnss_bias_share(params: EstimatorParams, axis: int) -> float:
+    """Return the share of the stated accuracy that is a slow error of one axis: eph covers two axes, epv one."""
+    return params.gnss_bias_share * (math.sqrt(2.0) if axis == 2 else 1.0)
+
+
+@compiled
 def _drift_gnss_bias(
     f: Filter, elapsed_s: float, eph_m: float, epv_m: float, params: EstimatorParams
 ) -> None:
     """Propagate the Gauss-Markov process of the GNSS position bias."""
     kept = max(0.0, 1.0 - elapsed_s / params.gnss_bias_s)
     for at in range(GNSS_BIAS, ERROR_STATES):
-        spread = params.gnss_bias_share * (epv_m if at == GNSS_BIAS + 2 else eph_m)
+        spread = gnss_bias_share(params, at - GNSS_BIAS) * (epv_m if at == GNSS_BIAS + 2 else eph_m)
         f.nominal[at + 1] *= kept
         for j in range(at + 1):
             f.covariance[j, at] *= kept
@@ -111,19 +119,34 @@ def _confirm_imu_noise(f: Filter, row: int) -> None:
 
 @compiled
 def fuse_gnss(
-    f: Filter, row: GnssRow, age_s: float, elapsed_s: float, first: int, params: EstimatorParams
+    f: Filter,
+    row: GnssRow,
+    age_s: float,
+    elapsed_s: float,
+    first: int,
+    faults: Vector3,
+    params: EstimatorParams,
 ) -> None:
-    """Fuse position and velocity from axis ``first``, measured ``age_s`` before the time of the state."""
+    """Fuse position and velocity from axis ``first``, measured ``age_s`` before the time of the state.
+
+    ``faults`` has the fault of each axis: a position that drifts is refused, a wrong velocity has more noise.
+    """
     eph_m, epv_m, speed_m_s = horizontal_accuracy(row), vertical_accuracy(row), speed_accuracy(row)
     _drift_gnss_bias(f, elapsed_s, eph_m, epv_m, params)
     for axis in range(first, 3):
-        least = params.gnss_velocity_noise_m_s
+        fault = faults.x if axis == 0 else faults.y if axis == 1 else faults.z
+        least = WRONG_VELOCITY_M_S if fault == VELOCITY_IS_WRONG else params.gnss_velocity_noise_m_s
         noise = Noise(least, speed_m_s, max(2.0 * speed_m_s, least), params.gnss_velocity_gate, 0.0)
         clear(f.h)
         f.h[VELOCITY + axis] = 1.0
-        if fuse(f, GNSS_VELOCITY + axis, row[4 + axis] - f.nominal[4 + axis], noise, 0.0):
+        accepted = fuse(f, GNSS_VELOCITY + axis, row[4 + axis] - f.nominal[4 + axis], noise, 0.0)
+        if accepted and fault != VELOCITY_IS_WRONG:
             _confirm_imu_noise(f, GNSS_VELOCITY + axis)
     for axis in range(first, 3):
+        fault = faults.x if axis == 0 else faults.y if axis == 1 else faults.z
+        if fault == POSITION_DRIFTS:
+            f.observations[GNSS_POSITION + axis, REFUSED] += 1.0
+            continue
         accuracy_m = epv_m if axis == 2 else eph_m
         least = params.gnss_position_noise_m
         noise = Noise(least, accuracy_m, max(2.0 * accuracy_m, least), params.gnss_position_gate, 0.0)

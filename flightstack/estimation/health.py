@@ -3,23 +3,34 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
 
 from flightstack.core.compiled import compiled, direct
 from flightstack.core.contract import FloatArray, RecordArray
 from flightstack.estimation.error_state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY
-from flightstack.estimation.kalman import BARO, FUSED_S, GNSS_POSITION, GNSS_VELOCITY, MAG, TEST_RATIO
-from flightstack.estimation.memory import ALIGNED
+from flightstack.estimation.kalman import (
+    BARO,
+    FUSED_S,
+    GNSS_POSITION,
+    GNSS_VELOCITY,
+    MAG,
+    TEST_RATIO,
+    Observations,
+)
+from flightstack.estimation.memory import ALIGNED, LANDED, MemoryArray
 from flightstack.estimation.sensor_feed import NewestSamples
-from flightstack.estimation.sensor_samples import GnssFix
+from flightstack.estimation.sensor_samples import BaroSample, GnssFix
 
 SMOOTHING = 0.1
 """Share of the newest test ratio in its mean."""
 STUCK_SAMPLES = 100
 """Equal successive samples of the inertial sensor after which it is stuck; PX4's limit. Noise changes the last bits."""
-MISSING_FIX_S = 1.0
+MISSING_FIX_S, STUCK_S = 1.0, 1.0
+NOISY = 40
+"""Changes of the pressure in turn, 2 s at the interval of the health, that show the noise of a barometer; the rotors
+of a vehicle that has landed stop sooner."""
 ACCURATE_SHARE, ACCURATE_S = 0.8, 1.0
 """Share of the limit below which an inaccurate position is accurate again, after this time there."""
 
@@ -33,12 +44,14 @@ class EstimateHealth(NamedTuple):
     imu_is_stuck: bool
     mag_age_s: float
     baro_age_s: float
+    baro_is_stuck: bool
+    """True if the pressure has not changed for 1 s, in the air or after it had noise on the ground."""
     fix_age_s: float
     """Time since the newest three-dimensional fix."""
     unaided_s: float
     """Time since the newest accepted horizontal position or velocity: that of dead reckoning."""
     refused_s: float
-    """Time for which horizontal positions of GNSS have arrived and were refused."""
+    """Time for which horizontal positions or heights of GNSS have arrived and were refused."""
     is_inaccurate: bool
     """True if ``horizontal_m`` exceeds its limit; with hysteresis, see ``accuracy_step``."""
     lag_s: float
@@ -53,15 +66,20 @@ class EstimateHealth(NamedTuple):
     position_ratio: float
     height_ratio: float
     heading_ratio: float
+    spare_imu_has_failed: bool = False
+    """True if an inertial sensor that is not selected cannot replace the selected one."""
+    imus_disagree: bool = False
+    """True if two inertial sensors contradict each other."""
 
 
 NO_HEALTH = EstimateHealth(
-    False, False, math.inf, False, math.inf, math.inf, math.inf, math.inf, 0.0, False, 0.0,
+    False, False, math.inf, False, math.inf, math.inf, False, math.inf, math.inf, 0.0, False, 0.0,
     math.inf, math.inf, math.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
 )  # fmt: skip
 _LAG, _SUMMARY_SIZE = 2, 12
 """Columns of the summary: time without accepted positions and velocities, time of refused positions, and from ``_LAG``
 on the fields of ``EstimateHealth`` from ``lag_s`` on."""
+Summary: TypeAlias = Annotated[FloatArray, _SUMMARY_SIZE]
 
 
 @compiled
@@ -73,30 +91,51 @@ def _largest(values: FloatArray, first: int, count: int) -> float:
 
 
 @compiled
-def _mean_ratio(mean: float, observations: FloatArray, first: int, count: int) -> float:
+def _mean_ratio(mean: float, observations: Observations, first: int, count: int) -> float:
     """Return a mean of test ratios after the newest one, the largest of ``count`` rows."""
-    newest = math.sqrt(_largest(observations[:, TEST_RATIO], first, count))
-    return mean + SMOOTHING * (newest - mean)
+    largest = 0.0
+    for row in range(first, first + count):
+        largest = max(largest, abs(observations[row, TEST_RATIO]))
+    return mean + SMOOTHING * (math.sqrt(largest) - mean)
 
 
 @compiled
-def health_kernel(memory: RecordArray, summary: FloatArray) -> None:
+def health_kernel(memory: MemoryArray, summary: Summary) -> None:
     """Write the summary of an estimator's record, shape (12,); it holds the mean ratios of the last call."""
     m = memory[0]
     p, o, x = m["covariance"], m["observations"], m["nominal"]
     position_s = min(o[GNSS_POSITION, FUSED_S], o[GNSS_POSITION + 1, FUSED_S])
     velocity_s = min(o[GNSS_VELOCITY, FUSED_S], o[GNSS_VELOCITY + 1, FUSED_S])
     summary[0] = m["clock"][0] - max(position_s, velocity_s)
-    summary[1] = max(m["refused_s"][3], m["refused_s"][4])
+    summary[1] = max(m["refused_s"][3], m["refused_s"][4], m["refused_s"][5])
     summary[2] = m["output"][0] - m["clock"][0]
-    for i, at in ((3, POSITION), (4, VELOCITY)):
-        summary[i] = math.sqrt(p[at, at] + p[at + 1, at + 1])
+    summary[3] = math.sqrt(p[POSITION, POSITION] + p[POSITION + 1, POSITION + 1])
+    summary[4] = math.sqrt(p[VELOCITY, VELOCITY] + p[VELOCITY + 1, VELOCITY + 1])
     summary[5] = math.sqrt(max(p[ATTITUDE, ATTITUDE], p[ATTITUDE + 1, ATTITUDE + 1]))
     summary[6], summary[7] = _largest(x, GYRO_BIAS + 1, 3), _largest(x, ACCEL_BIAS + 1, 3)
     summary[8] = _mean_ratio(summary[8], o, GNSS_VELOCITY, 3)
     summary[9] = _mean_ratio(summary[9], o, GNSS_POSITION, 2)
     summary[10] = _mean_ratio(summary[10], o, BARO, 1)
     summary[11] = _mean_ratio(summary[11], o, MAG, 3)
+
+
+class PressureTrack(NamedTuple):
+    """The last pressure, the time since which it is equal, and the number of its changes in turn, up to ``NOISY``."""
+
+    pressure_hpa: float = math.nan
+    equal_since_s: float = 0.0
+    changes: int = 0
+
+
+def pressure_step(memory: PressureTrack, pressure_hpa: float, landed: bool, time_s: float) -> PressureTrack:
+    """Compare a pressure with the last one; changes count at rest, where those of a barometer are its noise.
+
+    A simulator's ideal barometer repeats its pressure at rest, and is not stuck.
+    """
+    if pressure_hpa != memory.pressure_hpa:
+        changes = min(memory.changes + 1, NOISY) if landed else memory.changes
+        return PressureTrack(pressure_hpa, time_s, changes)
+    return memory if memory.changes == NOISY else memory._replace(changes=0)
 
 
 class Accuracy(NamedTuple):
@@ -121,9 +160,10 @@ class HealthMonitor:
     def __init__(self, memory: RecordArray) -> None:
         """``memory`` is the estimator's, shape (1,)."""
         self._memory = memory
-        self._aligned = memory["flags"][0]
+        self._flags = memory["flags"][0]
         self._summary = np.zeros(_SUMMARY_SIZE)
         self._accuracy = Accuracy()
+        self._pressure = PressureTrack()
         self._summarise = direct(health_kernel, memory, self._summary)
 
     def update(
@@ -136,18 +176,27 @@ class HealthMonitor:
         self._accuracy = accuracy_step(self._accuracy, horizontal_m, limit_m, time_s)
         fix_age_s, imu = _fix_age_s(samples, time_s), samples.imu
         return EstimateHealth(
-            bool(self._aligned[ALIGNED]),
+            bool(self._flags[ALIGNED]),
             has_origin,
             math.inf if imu is None else time_s - imu.time_s,
             samples.imu_track.repeats >= STUCK_SAMPLES,
             math.inf if samples.mag is None else time_s - samples.mag.time_s,
             math.inf if samples.baro is None else time_s - samples.baro.time_s,
+            self._baro_is_stuck(samples.baro, time_s),
             fix_age_s,
             unaided_s if has_origin else math.inf,
             refused_s if has_origin and fix_age_s < MISSING_FIX_S else 0.0,
             self._accuracy.is_inaccurate,
-            *summary[_LAG:],
+            *summary[_LAG:],  # type: ignore[arg-type]  # the fields from lag_s to heading_ratio
         )
+
+    def _baro_is_stuck(self, baro: BaroSample | None, time_s: float) -> bool:
+        if baro is None:
+            return False
+        landed = bool(self._flags[LANDED])
+        self._pressure = pressure_step(self._pressure, baro.pressure_hpa, landed, time_s)
+        has_noise = not landed or self._pressure.changes == NOISY
+        return has_noise and time_s - self._pressure.equal_since_s > STUCK_S
 
 
 def _fix_age_s(samples: NewestSamples, time_s: float) -> float:

@@ -3,28 +3,45 @@
 from __future__ import annotations
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray, Record
+from flightstack.core.contract import FloatArray
 from flightstack.estimation.error_state import BARO_BIAS, ERROR_STATES, POSITION
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.fusion import LEAST_COS_TILT, cos_tilt_of, fuse_baro, fuse_range
-from flightstack.estimation.kalman import FUSED_S, RANGE, Filter
-from flightstack.estimation.memory import HAS_BARO, HAS_RANGE
+from flightstack.estimation.kalman import BARO, FUSED_S, GNSS_VELOCITY, RANGE, Filter
+from flightstack.estimation.memory import HAS_BARO, HAS_RANGE, LANDED, MemoryRecord
 from flightstack.estimation.resets import reset_position
+from flightstack.estimation.source_checks import is_stuck, take_pressure_innovation
 
+_AIDED_S = 1.0
 _RANGE_LOST_S = 1.0
 """Time without an accepted distance after which the next one gives the height of the ground again."""
 
 
 @compiled
-def take_baro(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
-    """Fuse a pressure altitude; the first one gives the barometer's bias."""
+def take_baro(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
+    """Fuse a pressure altitude. The first one, and the first after the barometer was stuck, gives its bias.
+
+    So does one that follows a series of refused ones while GNSS velocity is accepted.
+    """
+    c = m["checks"]
+    has_stopped = False
+    if m["flags"][LANDED] == 0:
+        has_stopped = is_stuck(c, row[1], row[0])
+    if has_stopped:
+        m["flags"][HAS_BARO] = 0
+        return
+    last_s = f.observations[BARO, FUSED_S]
+    speed_s = f.observations[GNSS_VELOCITY + 2, FUSED_S]
+    if f.clock[0] - last_s > params.reset_s and f.clock[0] - speed_s < _AIDED_S:
+        m["flags"][HAS_BARO] = 0
     if m["flags"][HAS_BARO] == 0:
         _start_baro(m, f, row[1], params)
     fuse_baro(f, row[1], f.clock[0] - row[0], params)
+    take_pressure_innovation(c, f, min(f.clock[0] - last_s, params.sensor_period_s))
 
 
 @compiled
-def _start_baro(m: Record, f: Filter, altitude_m: float, params: EstimatorParams) -> None:
+def _start_baro(m: MemoryRecord, f: Filter, altitude_m: float, params: EstimatorParams) -> None:
     """Set the barometer's bias so that the first altitude agrees with the height."""
     p = f.covariance
     f.nominal[24] = altitude_m + f.nominal[9]
@@ -40,7 +57,7 @@ def _start_baro(m: Record, f: Filter, altitude_m: float, params: EstimatorParams
 
 
 @compiled
-def take_range(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
+def take_range(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
     """Fuse a distance. The first one, and the first after a loss, gives the height of the ground."""
     cos_tilt = cos_tilt_of(f)
     if cos_tilt < LEAST_COS_TILT:
@@ -55,7 +72,7 @@ def take_range(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) -
 
 
 @compiled
-def reset_height(m: Record, f: Filter, row: FloatArray) -> None:
+def reset_height(m: MemoryRecord, f: Filter, row: FloatArray) -> None:
     """Set the height to that of GNSS; barometer and range finder start again from it."""
     reset_position(m, f, row, 2, 1)
     m["flags"][HAS_BARO], m["flags"][HAS_RANGE] = 0, 0

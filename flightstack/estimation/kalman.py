@@ -42,6 +42,9 @@ innovations by their variance."""
 _ADAPTATION = 0.01
 """Share of an innovation in the estimate of the noise variance."""
 
+_PRIOR = 2.0
+"""Number of innovations that the noise stated at the start counts for."""
+
 _LARGEST_CORRELATION = 0.95
 
 HOLDS_HORIZONTAL = 2.0
@@ -93,11 +96,12 @@ def _project(f: Filter) -> float:
     """Write P hᵀ to ``ph`` and return h P hᵀ."""
     clear(f.ph)
     for k in range(ERROR_STATES):
-        if f.h[k] != 0.0:
+        slope = f.h[k]
+        if slope != 0.0:
             for i in range(k):
-                f.ph[i] += f.h[k] * f.covariance[i, k]
+                f.ph[i] += slope * f.covariance[i, k]
             for i in range(k, ERROR_STATES):
-                f.ph[i] += f.h[k] * f.covariance[k, i]
+                f.ph[i] += slope * f.covariance[k, i]
     total = 0.0
     for i in range(ERROR_STATES):
         total += f.h[i] * f.ph[i]
@@ -105,17 +109,44 @@ def _project(f: Filter) -> float:
 
 
 @compiled
-def _correct(f: Filter, innovation: float, variance: float) -> None:
-    """Correct state and covariance with ``gain``, by Joseph's form, which holds for any gain."""
+def _correct(f: Filter, innovation: float) -> None:
+    """Correct state and covariance with ``gain``: P hᵀ / variance, or zero for a state that keeps its value.
+
+    Joseph's form with such a gain subtracts P hᵀ h P / variance from the covariance, except between two states that
+    both keep their values: one product for each element instead of two.
+    """
     p, gain, ph = f.covariance, f.gain, f.ph
     for i in range(ERROR_STATES):
-        own = gain[i] * variance - ph[i]
-        for j in range(i, ERROR_STATES):
-            p[i, j] += own * gain[j] - gain[i] * ph[j]
+        if gain[i] != 0.0:
+            share = gain[i]
+            for j in range(i, ERROR_STATES):
+                p[i, j] -= share * ph[j]
+        elif ph[i] != 0.0:
+            share = ph[i]
+            for j in range(i, ERROR_STATES):
+                p[i, j] -= share * gain[j]
     for i in range(ERROR_STATES):
         p[i, i] = max(p[i, i], 1e-12)
         gain[i] *= innovation
     write_nominal(f.nominal, corrected(read_nominal(f.nominal), gain))
+
+
+@compiled
+def _adapt_noise(o: Observations, row: int, r: float, projected: float, last: float, noise: Noise) -> None:
+    """Move the noise variance ``r`` towards that of the accepted innovation; the first ones count for more.
+
+    Half the squared difference of two successive innovations has the variance of white noise, and an error of the
+    model, which both have, does not count. A slow sensor has the whole variance, as its correlation is counted apart.
+    """
+    innovation = o[row, INNOVATION]
+    o[row, LAGGED] += _ADAPTATION * (innovation * last - o[row, LAGGED])
+    share, square = _ADAPTATION, innovation * innovation
+    if noise.is_slow == 0.0 and o[row, FUSED] > 1.0:
+        share = max(share, 1.0 / (o[row, FUSED] + _PRIOR))
+        square = 0.5 * (innovation - last) * (innovation - last)
+    estimate = square - projected
+    least, largest = noise.least * noise.least, noise.largest * noise.largest
+    o[row, NOISE] = min(max(r + share * (estimate - r), least), largest)
 
 
 @compiled
@@ -141,9 +172,7 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
         return False
     o[row, FUSED] += 1.0
     o[row, NIS_SUM] += innovation * innovation / variance
-    estimate = innovation * innovation - projected
-    o[row, LAGGED] += _ADAPTATION * (innovation * last - o[row, LAGGED])
-    o[row, NOISE] = min(max(r + _ADAPTATION * (estimate - r), least), largest)
+    _adapt_noise(o, row, r, projected, last, noise)
     for i in range(ERROR_STATES):
         f.gain[i] = f.ph[i] / variance
     if holds == HOLDS_HORIZONTAL:
@@ -155,7 +184,7 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
             f.gain[i] = 0.0
         for i in range(12, 15):
             f.gain[i] = 0.0
-    _correct(f, innovation, variance)
+    _correct(f, innovation)
     o[row, FUSED_S] = f.clock[0]
     return True
 

@@ -2,33 +2,28 @@
 
 from __future__ import annotations
 
+import math
+from typing import Annotated, NamedTuple, TypeAlias
+
 import numpy as np
 
+from flightstack.core.array_items import as_tuple
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import Record
-from flightstack.estimation.alignment import ALIGNMENT_SIZE
-from flightstack.estimation.error_state import ERROR_STATES, NOMINAL_SIZE
-from flightstack.estimation.estimator_params import PARAMS_SIZE
-from flightstack.estimation.fusion import GNSS_SIZE
-from flightstack.estimation.imu_input import SUMS_SIZE
-from flightstack.estimation.kalman import OBSERVATION_COLUMNS, OBSERVATIONS, Filter
-from flightstack.estimation.rings import (
-    BARO_ROWS,
-    GNSS_ROWS,
-    IMU_COLUMNS,
-    IMU_ROWS,
-    MAG_ROWS,
-    MEAN_SIZE,
-    RANGE_ROWS,
-    RINGS,
-    TRACK_COLUMNS,
-    Rings,
-)
-from flightstack.estimation.yaw_estimator import MODEL_SIZE, MODELS
+from flightstack.core.contract import STATE_SIZE, FloatArray, Record, RecordArray
+from flightstack.core.record_types import dtype_of
+from flightstack.estimation.alignment import Alignment
+from flightstack.estimation.estimator_params import PARAMS_SIZE, EstimatorParams
+from flightstack.estimation.imu_input import Sums
+from flightstack.estimation.kalman import Filter
+from flightstack.estimation.rate_filter import RateFilter
+from flightstack.estimation.rings import MEAN_SIZE, RINGS, TRACK_COLUMNS, Rings
+from flightstack.estimation.source_checks import Checks
+from flightstack.estimation.yaw_estimator import Models
 
 ALIGNED, LANDED, HAS_BARO, HAS_GNSS, HAS_RANGE, HAS_MAG, HAS_YAW, MAG_FAULT, FLAGS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 """``HAS_YAW``: the yaw is known, from the magnetometer or from GNSS velocity. ``MAG_FAULT``: GNSS velocity has
 disproved the yaw of the magnetometer, which is not used any more."""
+Flags: TypeAlias = "Annotated[np.ndarray[tuple[int], np.dtype[np.int64]], FLAGS]"
 POSITION_RESET, VELOCITY_RESET, YAW_RESET, RESETS = 0, 8, 16, 19
 RESET_CHANGE, RESET_SUM, RESET_S, YAW_RESET_SUM = 1, 4, 7, 18
 """Of each kind: the number of its resets, their change in the last step with one, the sum of all changes, and the time
@@ -39,54 +34,71 @@ YAW_TURN, YAW_VARIANCE, YAW_UPDATES, YAW_WRONG_S = 0, 1, 2, 3
 """Columns of ``yaw_fix``: turn from the filter's yaw to that of GNSS velocity [rad], its variance, updates, and the
 time since which they contradict each other, 0 if they do not."""
 
-MEMORY = np.dtype(
-    [
-        ("params", "f8", (PARAMS_SIZE,)),
-        ("nominal", "f8", (NOMINAL_SIZE,)),
-        ("covariance", "f8", (ERROR_STATES, ERROR_STATES)),
-        ("observations", "f8", (OBSERVATIONS, OBSERVATION_COLUMNS)),
-        ("h", "f8", (ERROR_STATES,)),
-        ("ph", "f8", (ERROR_STATES,)),
-        ("gain", "f8", (ERROR_STATES,)),
-        ("clock", "f8", (2,)),
-        ("gnss", "f8", (GNSS_ROWS, GNSS_SIZE)),
-        ("mag", "f8", (MAG_ROWS, 4)),
-        ("baro", "f8", (BARO_ROWS, 2)),
-        ("range", "f8", (RANGE_ROWS, 2)),
-        ("imu", "f8", (IMU_ROWS, IMU_COLUMNS)),
-        ("track", "f8", (IMU_ROWS, TRACK_COLUMNS)),
-        ("cursors", "i8", (RINGS, 2)),
-        ("means", "f8", (RINGS, MEAN_SIZE)),
-        ("sums", "f8", (SUMS_SIZE,)),
-        ("alignment", "f8", (ALIGNMENT_SIZE,)),
-        ("output", "f8", (TRACK_COLUMNS,)),
-        ("state", "f8", (13,)),  # the output as VehicleState
-        ("earth", "f8", (4,)),  # field NED [gauss], declination [rad], NaN if unknown
-        ("field", "f8", (3,)),  # of the body [gauss], the last one at the horizon
-        ("last_imu_s", "f8", (1,)),
-        ("imu_gap", "f8", (3,)),
-        ("last_gnss_s", "f8", (1,)),
-        ("gnss_speed_m_s", "f8", (2,)),  # north, east, smoothed
-        ("refused_s", "f8", (6,)),  # time of refused GNSS velocities and positions, without an accepted one
-        ("ground_m", "f8", (1,)),
-        ("hold", "f8", (3,)),  # north, east [m], time of the last fusion
-        ("rest_s", "f8", (1,)),  # time of the last fusion at rest
-        ("drag_s", "f8", (1,)),  # and of drag
-        ("flags", "i8", (FLAGS,)),
-        ("resets", "f8", (RESETS,)),
-        ("yaw_models", "f8", (MODELS, MODEL_SIZE)),
-        ("yaw_fix", "f8", (4,)),
-    ]
-)
+
+class EstimatorMemory(NamedTuple):
+    """Parameters, state and waiting measurements of an estimator."""
+
+    params: EstimatorParams
+    filter: Filter
+    rings: Rings
+    means: Annotated[FloatArray, RINGS, MEAN_SIZE]
+    sums: Sums
+    alignment: Alignment
+    output: Annotated[FloatArray, TRACK_COLUMNS]
+    state: Annotated[FloatArray, STATE_SIZE]
+    """The output as ``VehicleState``."""
+    earth: Annotated[FloatArray, 4]
+    """Field NED [gauss], declination [rad], NaN if unknown."""
+    field: Annotated[FloatArray, 3]
+    """Of the body [gauss], the last one at the horizon."""
+    rate_filter: RateFilter
+    last_imu_s: Annotated[FloatArray, 1]
+    imu_gap: Annotated[FloatArray, 3]
+    last_gnss_s: Annotated[FloatArray, 1]
+    gnss_speed_m_s: Annotated[FloatArray, 2]
+    """North, east, smoothed."""
+    refused_s: Annotated[FloatArray, 6]
+    """Time of refused GNSS velocities and positions, without an accepted one."""
+    ground_m: Annotated[FloatArray, 1]
+    hold: Annotated[FloatArray, 3]
+    """North, east [m], time of the last fusion."""
+    rest_s: Annotated[FloatArray, 1]
+    """Time of the last fusion at rest."""
+    drag_s: Annotated[FloatArray, 1]
+    """Time of the last fusion of drag."""
+    flags: Flags
+    resets: Annotated[FloatArray, RESETS]
+    yaw_models: Models
+    yaw_fix: Annotated[FloatArray, 4]
+    followed: Annotated[FloatArray, 1]
+    """Number of resets that the output has followed."""
+    checks: Checks
+
+
+MEMORY = dtype_of(EstimatorMemory)
+MemoryRecord: TypeAlias = Annotated[Record, EstimatorMemory]
+"""One record of ``MEMORY``."""
+MemoryArray: TypeAlias = Annotated[RecordArray, EstimatorMemory]
+"""An array of one such record, shape (1,)."""
 
 
 @compiled
-def filter_of(m: Record) -> Filter:
+def start_memory(memory: MemoryArray) -> None:
+    """Set what is not zero at the start in a memory of zeros that has its parameters."""
+    m = memory[0]
+    params = EstimatorParams(*as_tuple(m["params"], PARAMS_SIZE))
+    m["sums"][1] = 1.0
+    m["clock"][1] = params.imu_noise_share
+    m["earth"][3] = math.nan
+
+
+@compiled
+def filter_of(m: MemoryRecord) -> Filter:
     """Return the filter's arrays of a record of ``MEMORY``."""
     return Filter(m["nominal"], m["covariance"], m["observations"], m["h"], m["ph"], m["gain"], m["clock"])
 
 
 @compiled
-def rings_of(m: Record) -> Rings:
+def rings_of(m: MemoryRecord) -> Rings:
     """Return the ring buffers of a record of ``MEMORY``."""
     return Rings(m["gnss"], m["mag"], m["baro"], m["range"], m["imu"], m["track"], m["cursors"])

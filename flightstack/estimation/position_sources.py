@@ -5,10 +5,16 @@ from __future__ import annotations
 import math
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray, Record
+from flightstack.core.contract import FloatArray
 from flightstack.estimation.error_state import BARO_BIAS, GNSS_BIAS, POSITION, VELOCITY, read_vector
 from flightstack.estimation.estimator_params import EstimatorParams
-from flightstack.estimation.fusion import fuse_gnss, fuse_hold, horizontal_accuracy, vertical_accuracy
+from flightstack.estimation.fusion import (
+    fuse_gnss,
+    fuse_hold,
+    gnss_bias_share,
+    horizontal_accuracy,
+    vertical_accuracy,
+)
 from flightstack.estimation.height_sources import reset_height
 from flightstack.estimation.kalman import (
     FUSED_S,
@@ -18,8 +24,15 @@ from flightstack.estimation.kalman import (
     deviation,
     reset_variance,
 )
-from flightstack.estimation.memory import HAS_GNSS, HAS_YAW
+from flightstack.estimation.memory import HAS_BARO, HAS_GNSS, HAS_YAW, LANDED, MemoryRecord
 from flightstack.estimation.resets import count_correction, reset_position, reset_velocity
+from flightstack.estimation.source_checks import (
+    GNSS_FAULT,
+    follow_drift,
+    position_drifts,
+    take_gnss_innovations,
+    take_horizontal_innovations,
+)
 
 _GNSS_LOST_S = 1.0
 _HOLD_PERIOD_S = 0.2
@@ -32,7 +45,7 @@ _MOVES_M_S = 0.15
 
 
 @compiled
-def take_gnss(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
+def take_gnss(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
     """Fuse a GNSS measurement; without a known yaw only its vertical parts. Reset what was refused too long."""
     if m["flags"][HAS_GNSS] == 0:
         _start_gnss(m, f, row, params)
@@ -41,7 +54,13 @@ def take_gnss(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) ->
     first = 0 if m["flags"][HAS_YAW] == 1 else 2
     outage_s = f.clock[0] - f.observations[GNSS_POSITION, FUSED_S]
     position, velocity = read_vector(f.nominal, 7), read_vector(f.nominal, 4)
-    fuse_gnss(f, row, f.clock[0] - row[0], elapsed_s, first, params)
+    c = m["checks"]
+    follow_drift(c, f, row, horizontal_accuracy(row))
+    fuse_gnss(f, row, f.clock[0] - row[0], elapsed_s, first, read_vector(c, GNSS_FAULT), params)
+    if m["flags"][LANDED] == 0:
+        take_gnss_innovations(c, f, elapsed_s, m["flags"][HAS_BARO] == 1)
+        if first == 0:
+            take_horizontal_innovations(c, f, elapsed_s)
     dx, dy = f.nominal[7] - position.x, f.nominal[8] - position.y
     if outage_s > _GNSS_LOST_S and dx * dx + dy * dy > _COUNTED_M * _COUNTED_M:
         count_correction(m, f, position, velocity)
@@ -53,7 +72,7 @@ def take_gnss(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) ->
     velocity_s, position_s = max(refused[0], refused[1]), max(refused[3], refused[4])
     if velocity_s > limit_s:
         reset_velocity(m, f, row, 0, 2)
-    if velocity_s > limit_s or position_s > limit_s:
+    if velocity_s > limit_s or (position_s > limit_s and not position_drifts(c)):
         reset_position(m, f, row, 0, 2)
     if refused[2] > limit_s:
         reset_velocity(m, f, row, 2, 1)
@@ -62,7 +81,7 @@ def take_gnss(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) ->
 
 
 @compiled
-def _count_refused(m: Record, f: Filter, first: int, elapsed_s: float) -> None:
+def _count_refused(m: MemoryRecord, f: Filter, first: int, elapsed_s: float) -> None:
     """Add up the time between refused measurements; an accepted one ends it. Time without any does not count."""
     refused = m["refused_s"]
     for i in range(6):
@@ -76,9 +95,12 @@ def _count_refused(m: Record, f: Filter, first: int, elapsed_s: float) -> None:
 
 
 @compiled
-def _start_gnss(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
-    """Account for the errors of the first GNSS position, which becomes the origin, in the covariance."""
-    p, share = f.covariance, params.gnss_bias_share
+def _start_gnss(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
+    """Account for the errors of the first GNSS position, which becomes the origin, in the covariance.
+
+    The slow part of that error is the bias of the next ones too: position and bias have opposite errors.
+    """
+    p = f.covariance
     for axis in range(3):
         accuracy_m = vertical_accuracy(row) if axis == 2 else horizontal_accuracy(row)
         variance = accuracy_m * accuracy_m
@@ -87,7 +109,12 @@ def _start_gnss(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) 
         if axis == 2:
             p[at, BARO_BIAS] += variance
             p[BARO_BIAS, BARO_BIAS] += variance
-        reset_variance(p, GNSS_BIAS + axis, 1, share * share * variance)
+        share = gnss_bias_share(params, axis)
+        slow = min(share * share, 1.0) * variance
+        reset_variance(p, GNSS_BIAS + axis, 1, slow)
+        p[at, GNSS_BIAS + axis] = -slow
+        if axis == 2:
+            p[BARO_BIAS, GNSS_BIAS + axis] = -slow
     m["last_gnss_s"][0] = row[0]
     m["flags"][HAS_GNSS] = 1
 
@@ -100,7 +127,7 @@ def is_velocity_measured(f: Filter) -> bool:
 
 
 @compiled
-def is_platform_at_rest(m: Record, f: Filter) -> bool:
+def is_platform_at_rest(m: MemoryRecord, f: Filter) -> bool:
     """Return False if GNSS measures that what the vehicle stands on moves, as a boat does."""
     north, east = m["gnss_speed_m_s"][0], m["gnss_speed_m_s"][1]
     is_measured = m["flags"][HAS_GNSS] == 1 and f.clock[0] - m["last_gnss_s"][0] < _GNSS_LOST_S
@@ -108,7 +135,7 @@ def is_platform_at_rest(m: Record, f: Filter) -> bool:
 
 
 @compiled
-def hold_position(m: Record, f: Filter, params: EstimatorParams) -> bool:
+def hold_position(m: MemoryRecord, f: Filter, params: EstimatorParams) -> bool:
     """Hold the horizontal position while the velocity is not measured; return True if it was fused."""
     hold, now_s = m["hold"], f.clock[0]
     is_used = m["flags"][HAS_GNSS] == 1 and m["flags"][HAS_YAW] == 1

@@ -26,6 +26,8 @@ from flightstack.estimation.error_state import (
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import Filter
 
+_TURN_S = 1.0
+
 
 class DeltaSample(NamedTuple):
     """Rotation vector and velocity change over ``dt_s``, in the body frame at its start, biases included.
@@ -111,12 +113,26 @@ def _add_body_noise(p: Covariance, at: int, axis: Vector3, variance: float) -> N
 
 
 @compiled
-def _add_process_noise(f: Filter, q: Quaternion, sample: DeltaSample, params: EstimatorParams) -> None:
+def _turn_variance(angle: Vector3, dt_s: float, params: EstimatorParams) -> float:
+    """Return the variance of each axis of the attitude by errors of scale and alignment of the gyro in a step.
+
+    An error e gives e ω T after a turn of duration T. As white noise that is a density of (e ω)² T, with T = 1 s.
+    """
+    square = angle.x * angle.x + angle.y * angle.y + angle.z * angle.z
+    error = params.gyro_scale_error
+    return error * error * square * (_TURN_S / dt_s)
+
+
+@compiled
+def _add_process_noise(
+    f: Filter, q: Quaternion, angle: Vector3, sample: DeltaSample, params: EstimatorParams
+) -> None:
     p, share = f.covariance, f.clock[1]
     dt_s, gyro, accel = sample.dt_s, params.gyro_noise, params.accel_noise
     x = rotate(q, Vector3(1.0, 0.0, 0.0))
     y = rotate(q, Vector3(0.0, 1.0, 0.0))
     z = cross(x, y)
+    _add(p, ATTITUDE, 3, _turn_variance(angle, dt_s, params))
     _add_body_noise(p, ATTITUDE, x, max(gyro * gyro, share * sample.gyro_density.x) * dt_s)
     _add_body_noise(p, ATTITUDE, y, max(gyro * gyro, share * sample.gyro_density.y) * dt_s)
     _add_body_noise(p, ATTITUDE, z, max(gyro * gyro, share * sample.gyro_density.z) * dt_s)
@@ -141,6 +157,6 @@ def predict(f: Filter, sample: DeltaSample, params: EstimatorParams) -> None:
     middle = quaternion_product(n.attitude, rotation_over(angle, 0.5))
     after = moved(motion_of(n), angle, delta_velocity, sample.dt_s, params.gravity_m_s2)
     predict_covariance(f.covariance, middle, delta_velocity, sample.dt_s)
-    _add_process_noise(f, middle, sample, params)
+    _add_process_noise(f, middle, angle, sample, params)
     write_nominal(f.nominal, with_motion(n, after))
     f.clock[0] = sample.time_s

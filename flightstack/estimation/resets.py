@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray, Record, Vector3
+from flightstack.core.contract import FloatArray, Vector3
 from flightstack.estimation.error_state import GNSS_BIAS, POSITION, VELOCITY
 from flightstack.estimation.fusion import horizontal_accuracy, speed_accuracy, vertical_accuracy
 from flightstack.estimation.kalman import Filter, reset_variance
@@ -15,24 +15,25 @@ from flightstack.estimation.memory import (
     VELOCITY_RESET,
     YAW_RESET,
     YAW_RESET_SUM,
+    MemoryRecord,
 )
 
 _LEAST_POSITION_M, _LEAST_SPEED_M_S = 0.5, 0.3
 
 
 @compiled
-def reset_velocity(m: Record, f: Filter, row: FloatArray, first: int, count: int) -> None:
+def reset_velocity(m: MemoryRecord, f: Filter, row: FloatArray, first: int, count: int) -> None:
     """Set ``count`` axes of the velocity from ``first`` to a GNSS measurement."""
     speed_m_s = max(speed_accuracy(row), _LEAST_SPEED_M_S)
     _count(m, f, VELOCITY_RESET)
     for axis in range(first, first + count):
-        _add(m, VELOCITY_RESET, axis, row[4 + axis] - f.nominal[4 + axis])
+        _add_change(m, VELOCITY_RESET, axis, row[4 + axis] - f.nominal[4 + axis])
         f.nominal[4 + axis], m["refused_s"][axis] = row[4 + axis], 0.0
     reset_variance(f.covariance, VELOCITY + first, count, speed_m_s * speed_m_s)
 
 
 @compiled
-def reset_position(m: Record, f: Filter, row: FloatArray, first: int, count: int) -> None:
+def reset_position(m: MemoryRecord, f: Filter, row: FloatArray, first: int, count: int) -> None:
     """Set ``count`` axes of the position from ``first`` to a GNSS measurement."""
     accuracy_m = vertical_accuracy(row) if first == 2 else horizontal_accuracy(row)
     accuracy_m = max(accuracy_m, _LEAST_POSITION_M)
@@ -40,25 +41,26 @@ def reset_position(m: Record, f: Filter, row: FloatArray, first: int, count: int
     _count(m, f, POSITION_RESET)
     for axis in range(first, first + count):
         now_m = row[1 + axis] + age_s * f.nominal[4 + axis]
-        _add(m, POSITION_RESET, axis, now_m - f.nominal[7 + axis])
+        _add_change(m, POSITION_RESET, axis, now_m - f.nominal[7 + axis])
         f.nominal[7 + axis], f.nominal[25 + axis], m["refused_s"][3 + axis] = now_m, 0.0, 0.0
     reset_variance(f.covariance, POSITION + first, count, accuracy_m * accuracy_m)
     reset_variance(f.covariance, GNSS_BIAS + first, count, 1e-4)
 
 
 @compiled
-def count_correction(m: Record, f: Filter, position_m: Vector3, velocity_m_s: Vector3) -> None:
+def count_correction(m: MemoryRecord, f: Filter, position_m: Vector3, velocity_m_s: Vector3) -> None:
     """Count the horizontal change from an earlier position and velocity as resets of both."""
     x = f.nominal
     _count(m, f, POSITION_RESET)
     _count(m, f, VELOCITY_RESET)
-    for axis in range(2):
-        _add(m, POSITION_RESET, axis, x[7 + axis] - position_m[axis])
-        _add(m, VELOCITY_RESET, axis, x[4 + axis] - velocity_m_s[axis])
+    _add_change(m, POSITION_RESET, 0, x[7] - position_m.x)
+    _add_change(m, POSITION_RESET, 1, x[8] - position_m.y)
+    _add_change(m, VELOCITY_RESET, 0, x[4] - velocity_m_s.x)
+    _add_change(m, VELOCITY_RESET, 1, x[5] - velocity_m_s.y)
 
 
 @compiled
-def _count(m: Record, f: Filter, kind: int) -> None:
+def _count(m: MemoryRecord, f: Filter, kind: int) -> None:
     """Count a reset of position or velocity; the changes of one step of the filter are added up."""
     resets = m["resets"]
     resets[kind] += 1.0
@@ -69,13 +71,13 @@ def _count(m: Record, f: Filter, kind: int) -> None:
 
 
 @compiled
-def _add(m: Record, kind: int, axis: int, change: float) -> None:
+def _add_change(m: MemoryRecord, kind: int, axis: int, change: float) -> None:
     m["resets"][kind + RESET_CHANGE + axis] += change
     m["resets"][kind + RESET_SUM + axis] += change
 
 
 @compiled
-def count_yaw_reset(m: Record, turn_rad: float) -> None:
+def count_yaw_reset(m: MemoryRecord, turn_rad: float) -> None:
     """Count a change of the yaw."""
     m["resets"][YAW_RESET] += 1.0
     m["resets"][YAW_RESET + RESET_CHANGE] = turn_rad
@@ -83,7 +85,7 @@ def count_yaw_reset(m: Record, turn_rad: float) -> None:
 
 
 @compiled
-def count_of_resets(m: Record) -> float:
+def count_of_resets(m: MemoryRecord) -> float:
     """Return the number of resets of any kind."""
     total: float = m["resets"][POSITION_RESET] + m["resets"][VELOCITY_RESET] + m["resets"][YAW_RESET]
     return total

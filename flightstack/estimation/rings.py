@@ -94,17 +94,17 @@ def take_mean(mean: FloatArray, row: FloatArray, period_s: float) -> bool:
 
 
 @compiled
-def newest_time(rings: Rings, ring: int, rows: FloatArray) -> float:
-    """Return the time of the newest row, or minus infinity."""
-    count: int = rings.cursors[ring, 1]
+def newest_fix_time(rings: Rings) -> float:
+    """Return the time of the newest row of GNSS, or minus infinity."""
+    count: int = rings.cursors[GNSS_RING, 1]
     if count == 0:
         return -math.inf
-    newest_s: float = rows[slot_of(rings, ring, rows.shape[0], count - 1), 0]
+    newest_s: float = rings.gnss[slot_of(rings, GNSS_RING, GNSS_ROWS, count - 1), 0]
     return newest_s
 
 
 @compiled
-def write_row(rows: FloatArray, slot: int, values: FloatArray) -> None:
-    """Copy ``values`` to a row."""
-    for column in range(rows.shape[1]):
-        rows[slot, column] = values[column]
+def write_row(row: FloatArray, values: FloatArray) -> None:
+    """Copy the first ``values`` to a row."""
+    for column in range(row.size):
+        row[column] = values[column]

@@ -10,6 +10,7 @@ from flightstack.estimation.estimator_report import EstimatorReport, estimator_r
 from flightstack.estimation.health import STUCK_SAMPLES
 from flightstack.estimation.imu_track import IMU_MISSING_S
 from flightstack.estimation.motion_covariance import motion_covariance, pose_covariance, twist_covariance
+from flightstack.estimation.selector import LaneReport
 from flightstack.estimation.sensor_feed import NewestSamples
 from flightstack.estimation.vibration import Vibration, vibration_of
 
@@ -23,12 +24,15 @@ class Sensed:
         samples: NewestSamples,
         has_origin: bool = True,
         time_s: float | None = None,
+        lanes: LaneReport | None = None,
     ) -> None:
         """``memory`` is the estimator's record; both change with time, so read this before the next sample.
 
         ``has_origin`` is True after the first fix. ``time_s`` is the time of the newest message of sensors, which
-        advances without samples; None means the time of the newest sample of the inertial sensor.
+        advances without samples; None means the time of the newest sample of the inertial sensor. ``lanes`` is None for
+        a single inertial sensor.
         """
+        self.lanes = lanes
         self.memory = memory
         self.samples = samples
         self.has_origin = has_origin

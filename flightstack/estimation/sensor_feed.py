@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
+import numpy as np
+
 from flightstack.core.contract import FloatArray, Vector3
 from flightstack.core.geodesy import LocalFrame
-from flightstack.estimation.imu_track import ImuTrack
+from flightstack.estimation.imu_track import RECORD_SIZE, ImuTrack, SingleArray
 from flightstack.estimation.sensor_samples import (
     BaroSample,
     FlowSample,
@@ -76,8 +78,8 @@ class StateEstimator(Protocol):
 class SampleRecorder(Protocol):
     """Records the samples that an estimator takes."""
 
-    def imu(self, time_us: int, dt_us: int, row: FloatArray) -> None:
-        """Record a sample of the inertial sensor in its array form, shape (8,)."""
+    def imu_row(self, time_us: int) -> FloatArray:
+        """Return the row for a sample of the inertial sensor, shape (7,), as ``imu_track`` describes it."""
         ...
 
     def sample(self, sample: Sample) -> None:
@@ -88,8 +90,12 @@ class SampleRecorder(Protocol):
 class NoRecorder:
     """Records nothing."""
 
-    def imu(self, time_us: int, dt_us: int, row: FloatArray) -> None:
-        """Leave out a sample of the inertial sensor."""
+    def __init__(self) -> None:
+        self._scratch = np.zeros(RECORD_SIZE)
+
+    def imu_row(self, _time_us: int) -> FloatArray:
+        """Return a row that is not recorded."""
+        return self._scratch
 
     def sample(self, sample: Sample) -> None:
         """Leave out a sample of another sensor."""
@@ -117,12 +123,19 @@ class NewestSamples:
 
 
 def slow_samples(time_s: float, report: HilReport) -> Iterator[MagSample | BaroSample]:
-    """Yield the samples in a HIL_SENSOR but the inertial one: those of which all bits are set, as PX4 takes them."""
+    """Yield the samples in a HIL_SENSOR but the inertial one: those of which all bits are set, as PX4 takes them.
+
+    One with values that are not finite is none, so that its sensor counts as missing.
+    """
     fields, values = report.fields, report.values
-    if fields & MAG == MAG:
+    if fields & MAG == MAG and _is_finite(values[MAG_AT]):
         yield MagSample(time_s, Vector3(*values[MAG_AT]))
-    if fields & BARO == BARO:
+    if fields & BARO == BARO and math.isfinite(values[ALTITUDE_AT]):
         yield BaroSample(time_s, values[PRESSURE_AT], values[ALTITUDE_AT], values[TEMPERATURE_AT])
+
+
+def _is_finite(values: Sequence[float]) -> bool:
+    return math.isfinite(sum(values))
 
 
 def gnss_sample(time_s: float, gps: HilGps) -> GnssSample:
@@ -150,56 +163,124 @@ def sample_of(time_s: float, content: HilGps | RangeReport | FlowReport) -> Samp
     return FlowSample(time_s, content.dt_s, *content.flow_rad, Vector3(*content.gyro_rad), content.quality)
 
 
+class Lane:
+    """An estimator and the inertial sensor that it follows."""
+
+    def __init__(self, estimator: StateEstimator) -> None:
+        self.estimator = estimator
+        self.newest = NewestSamples()
+        """Newest samples that the estimator took."""
+        self.measured_us = 0
+        """Time of the newest sample of the inertial sensor."""
+        self.step_us = 0
+        """Duration of that sample."""
+
+
 class SensorFeed:
-    """Feeds an estimator with the first sensor of each kind, and writes its state."""
+    """Feeds an estimator for each inertial sensor, and writes the state of the selected one.
+
+    Of other kinds, the first sensor feeds all estimators.
+    """
 
     def __init__(
-        self, estimator: StateEstimator, state: FloatArray, recorder: SampleRecorder = NO_RECORDER
+        self,
+        estimator: StateEstimator,
+        state: FloatArray,
+        recorder: SampleRecorder = NO_RECORDER,
+        spares: Sequence[StateEstimator] = (),
     ) -> None:
-        """``state`` is the array form of ``VehicleState`` to write, in the estimator's local frame."""
-        self._estimator, self._state, self._recorder = estimator, state, recorder
-        self.newest = NewestSamples()
+        """``state`` is the array form of ``VehicleState`` to write, in the local frame of the estimators.
+
+        ``spares`` follow the second and further inertial sensors. ``recorder`` records the selected one.
+        """
+        self.lanes = tuple(Lane(each) for each in (estimator, *spares))
+        """Estimators by the number of their inertial sensor."""
+        self._selected = self.lanes[0]
+        self._state, self._recorder = state, recorder
+        self._has_frame = False
+
+    @property
+    def newest(self) -> NewestSamples:
+        """Newest samples of the selected lane."""
+        return self._selected.newest
+
+    def select(self, number: int) -> None:
+        """Select the lane that writes the state, and write it."""
+        self._selected = self.lanes[number]
+        self._write_state()
 
     def update(self, reports: list[Report]) -> bool:
         """Take the reports; return True if the state is known and was written."""
         for time_us, content in reports:
             if isinstance(content, HilReport):
-                if content.number == 0:
+                if content.number < len(self.lanes):
                     self._take_hil(time_us, content)
             elif not isinstance(content, HilGps) or content.number == 0:
                 self._take(sample_of(time_us * 1e-6, content))
-        estimator = self._estimator
+        return self._write_state()
+
+    def update_imus(self, time_us: int, step_us: int, wires: Sequence[SingleArray]) -> None:
+        """Take a measurement of each inertial sensor alone, as ``update`` does, from the values of their HIL_SENSOR.
+
+        ``step_us`` is the time since the last one.
+        """
+        time_s, selected, recorder = time_us * 1e-6, self._selected, self._recorder
+        for lane, wire in zip(self.lanes, wires, strict=False):
+            record = (recorder if lane is selected else NO_RECORDER).imu_row(time_us)
+            lane.measured_us, lane.step_us = time_us, step_us
+            lane.estimator.imu_row(lane.newest.imu_track.take_wire(time_s, step_us, wire, record))
+        self._write_state()
+
+    def _write_state(self) -> bool:
+        estimator = self._selected.estimator
         if not estimator.aligned:
             return False
         estimator.write_state(self._state)
         return estimator.frame is not None
 
     def _take_hil(self, time_us: int, report: HilReport) -> None:
-        """Take a HIL_SENSOR. The first one has no step, and its inertial measurement no duration: it is left out."""
-        _, fields, values, step_us = report
-        time_s = time_us * 1e-6
-        if fields & _IMU == _IMU and step_us > 0:
-            row = self.newest.imu_track.take(time_s, step_us * 1e-6, values[GYRO_AT], values[ACCEL_AT])
-            self._estimator.imu_row(row)
-            self._recorder.imu(time_us, step_us, row)
-        if fields & ~_IMU:
+        """Take a HIL_SENSOR. The first one has no step, and its inertial measurement no duration: it is left out.
+
+        So is one that is not finite: the sensor counts as missing.
+        """
+        number, fields, values, step_us = report
+        time_s, lane = time_us * 1e-6, self.lanes[number]
+        is_measured = fields & _IMU == _IMU and _is_finite(values[GYRO_AT]) and _is_finite(values[ACCEL_AT])
+        if is_measured and step_us > 0:
+            row = lane.newest.imu_track.take(time_s, step_us * 1e-6, values[GYRO_AT], values[ACCEL_AT])
+            lane.measured_us, lane.step_us = time_us, step_us
+            lane.estimator.imu_row(row)
+            if lane is self._selected:
+                record = self._recorder.imu_row(time_us)
+                record[:] = row[1:]
+                record[0] = step_us
+        if fields & ~_IMU and number == 0:
             for sample in slow_samples(time_s, report):
                 self._take(sample)
 
     def _take(self, sample: Sample) -> None:
-        estimator, newest = self._estimator, self.newest
-        if isinstance(sample, MagSample):
-            newest.mag = sample
-            estimator.mag(sample)
-        elif isinstance(sample, BaroSample):
-            newest.baro = sample
-            estimator.baro(sample)
-        elif isinstance(sample, GnssSample):
-            newest.gnss = sample
-            estimator.gnss(sample)
-        elif isinstance(sample, RangeSample):
-            newest.range = sample
-            estimator.range(sample)
-        else:
-            newest.flow = sample
+        for lane in self.lanes:
+            estimator, newest = lane.estimator, lane.newest
+            if isinstance(sample, MagSample):
+                newest.mag = sample
+                estimator.mag(sample)
+            elif isinstance(sample, BaroSample):
+                newest.baro = sample
+                estimator.baro(sample)
+            elif isinstance(sample, GnssSample):
+                newest.gnss = sample
+                estimator.gnss(sample)
+                if not self._has_frame and estimator.frame is not None:
+                    self._share_frame(estimator.frame)
+            elif isinstance(sample, RangeSample):
+                newest.range = sample
+                estimator.range(sample)
+            else:
+                newest.flow = sample
         self._recorder.sample(sample)
+
+    def _share_frame(self, frame: LocalFrame) -> None:
+        """Give all estimators the local frame of the first one that has one."""
+        self._has_frame = True
+        for lane in self.lanes:
+            lane.estimator.frame = frame

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray, Record, Vector3
+from flightstack.core.contract import FloatArray, Vector3
 from flightstack.core.geometry import rotate, wrap_pi
 from flightstack.core.portable_math import atan2, sin_cos
 from flightstack.estimation.alignment import align_yaw, set_field
@@ -28,6 +28,7 @@ from flightstack.estimation.memory import (
     YAW_UPDATES,
     YAW_VARIANCE,
     YAW_WRONG_S,
+    MemoryRecord,
 )
 from flightstack.estimation.prediction import DeltaSample, less_bias
 from flightstack.estimation.resets import count_yaw_reset, reset_position, reset_velocity
@@ -56,7 +57,7 @@ _REFUSED_S = 1.0
 
 
 @compiled
-def take_field(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
+def take_field(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
     """Fuse a magnetic field; the first one after the alignment gives the yaw if that is unknown."""
     field, earth = read_vector(row, 1), m["earth"]
     if m["flags"][MAG_FAULT] == 1:
@@ -65,7 +66,8 @@ def take_field(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) -
     if m["flags"][HAS_MAG] == 0:
         m["flags"][HAS_MAG] = 1
         if m["flags"][HAS_YAW] == 0:
-            count_yaw_reset(m, align_yaw(f, field, read_vector(earth, 0), earth[3], params))
+            turn_rad = align_yaw(f, field, read_vector(earth, 0), earth[3], params)
+            count_yaw_reset(m, turn_rad)
             m["flags"][HAS_YAW] = 1
         else:
             level = rotate(read_nominal(f.nominal).attitude, field)
@@ -74,7 +76,7 @@ def take_field(m: Record, f: Filter, row: FloatArray, params: EstimatorParams) -
 
 
 @compiled
-def take_earth_field(m: Record, f: Filter, params: EstimatorParams) -> None:
+def take_earth_field(m: MemoryRecord, f: Filter, params: EstimatorParams) -> None:
     """Correct yaw and field with the Earth's field, now known.
 
     On the ground, or if it is far off, the yaw is aligned again. In flight it changes as far as it depends on the
@@ -121,7 +123,7 @@ def _fuse_declination(f: Filter, was_rad: float, change_rad: float) -> None:
 
 
 @compiled
-def predict_yaw(m: Record, f: Filter, step: DeltaSample) -> None:
+def predict_yaw(m: MemoryRecord, f: Filter, step: DeltaSample) -> None:
     """Move the models over a step of the flight."""
     if m["yaw_fix"][YAW_UPDATES] > 0.0:
         angle = less_bias(step.angle_rad, read_vector(f.nominal, 10), step.dt_s)
@@ -130,7 +132,7 @@ def predict_yaw(m: Record, f: Filter, step: DeltaSample) -> None:
 
 
 @compiled
-def take_velocity(m: Record, f: Filter, row: FloatArray) -> None:
+def take_velocity(m: MemoryRecord, f: Filter, row: FloatArray) -> None:
     """Weigh the models with a GNSS velocity; reset the yaw if it is unknown, or wrong."""
     models, fix, flags = m["yaw_models"], m["yaw_fix"], m["flags"]
     if flags[LANDED] == 1 or flags[HAS_GNSS] == 0:
@@ -154,7 +156,7 @@ def take_velocity(m: Record, f: Filter, row: FloatArray) -> None:
 
 
 @compiled
-def _is_wrong(m: Record, time_s: float) -> bool:
+def _is_wrong(m: MemoryRecord, time_s: float) -> bool:
     """Return True if the models have contradicted the yaw for a second, or do while GNSS velocities are refused."""
     fix, refused = m["yaw_fix"], m["refused_s"]
     differs = abs(fix[YAW_TURN]) > _WRONG_YAW_RAD
@@ -168,7 +170,7 @@ def _is_wrong(m: Record, time_s: float) -> bool:
 
 
 @compiled
-def _reset_to_models(m: Record, f: Filter, row: FloatArray) -> None:
+def _reset_to_models(m: MemoryRecord, f: Filter, row: FloatArray) -> None:
     """Take tilt and yaw from the models, velocity and position from GNSS."""
     m["yaw_fix"][YAW_WRONG_S] = 0.0
     models, before = m["yaw_models"], read_nominal(f.nominal).attitude

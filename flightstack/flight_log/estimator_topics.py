@@ -12,6 +12,7 @@ from flightstack.core.contract import FloatArray
 from flightstack.estimation.error_state import NOMINAL_SIZE
 from flightstack.estimation.estimator_report import ControlFlags, RejectionFlags
 from flightstack.estimation.kalman import BARO, GNSS_POSITION, GNSS_VELOCITY, MAG, OBSERVATIONS, RANGE
+from flightstack.estimation.selector import SPEED_M_S, TURN_RAD, LaneReport
 from flightstack.estimation.sensed import Sensed
 from flightstack.flight_log.topics import Derived, Field, Group, Topic
 
@@ -243,6 +244,82 @@ WIND_GROUP = Group(
         ),
     ),
 )
+
+
+_MOST_LANES, _MOST_SENSORS = 9, 4
+"""Sizes of the arrays in PX4's topic."""
+
+
+class SelectorColumns(NamedTuple):
+    """First column of each part of a selector's row."""
+
+    changed_us: int = 0
+    changes: int = 1
+    selected: int = 2
+    available: int = 3
+    faults: int = 4  # gyro, accelerometer
+    ratios: int = 6
+    relative: int = 6 + _MOST_LANES
+    healthy: int = 6 + 2 * _MOST_LANES
+    turns: int = 6 + 3 * _MOST_LANES
+    speeds: int = 6 + 3 * _MOST_LANES + _MOST_SENSORS
+    size: int = 6 + 3 * _MOST_LANES + 2 * _MOST_SENSORS
+
+
+SELECT_AT = SelectorColumns()
+
+
+def _device(rows: FloatArray) -> FloatArray:
+    """Device id of the selected inertial sensor: its number from 1."""
+    numbers: FloatArray = rows[:, SELECT_AT.selected] + 1.0
+    return numbers
+
+
+SELECTOR_GROUP = Group(
+    "selector",
+    SELECT_AT.size,
+    (
+        Topic(
+            "estimator_selector_status",
+            (
+                Field("uint64_t", "last_instance_change", 0, SELECT_AT.changed_us),
+                Field("uint32_t", "instance_changed_count", 0, SELECT_AT.changes),
+                Field("uint32_t", "accel_device_id", 0, _device),
+                Field("uint32_t", "baro_device_id", default=_DEVICE),
+                Field("uint32_t", "gyro_device_id", 0, _device),
+                Field("uint32_t", "mag_device_id", default=_DEVICE),
+                Field("float", "combined_test_ratio", _MOST_LANES, SELECT_AT.ratios),
+                Field("float", "relative_test_ratio", _MOST_LANES, SELECT_AT.relative),
+                Field("float", "accumulated_gyro_error", _MOST_SENSORS, SELECT_AT.turns),
+                Field("float", "accumulated_accel_error", _MOST_SENSORS, SELECT_AT.speeds),
+                Field("uint8_t", "primary_instance", 0, SELECT_AT.selected),
+                Field("uint8_t", "instances_available", 0, SELECT_AT.available),
+                Field("bool", "healthy", _MOST_LANES, SELECT_AT.healthy),
+                Field("bool", "gyro_fault_detected", 0, SELECT_AT.faults),
+                Field("bool", "accel_fault_detected", 0, SELECT_AT.faults + 1),
+            ),
+        ),
+    ),
+)
+"""Of a vehicle with several inertial sensors; the estimators are PX4's instances."""
+
+
+def fill_selector(row: FloatArray, report: LaneReport) -> None:
+    """Fill a row of ``SELECTOR_GROUP``; estimators that the vehicle does not have are zero."""
+    selection, facts, count = report.selection, report.facts, len(report.facts)
+    records = selection.lanes
+    row[:] = 0.0
+    row[: SELECT_AT.faults] = _us(selection.changed_s), selection.changes, selection.selected, count
+    row[SELECT_AT.faults] = any(record.turn_rad >= TURN_RAD for record in records)
+    row[SELECT_AT.faults + 1] = any(record.speed_m_s >= SPEED_M_S for record in records)
+    for at, values in (
+        (SELECT_AT.ratios, [lane.ratio for lane in facts]),
+        (SELECT_AT.relative, [record.relative for record in records]),
+        (SELECT_AT.healthy, [lane.is_usable for lane in facts]),
+        (SELECT_AT.turns, [record.turn_rad for record in records]),
+        (SELECT_AT.speeds, [record.speed_m_s for record in records]),
+    ):
+        row[at : at + count] = values
 
 
 def fill_wind(row: FloatArray, sensed: Sensed) -> None:

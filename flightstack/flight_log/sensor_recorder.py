@@ -5,13 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from flightstack.core.contract import FloatArray, Vector3
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import Sample
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, MagSample, RangeSample
 from flightstack.estimation.snapshot import ESTIMATOR_START
-from flightstack.flight_log.estimator_topics import ESTIMATOR, WIND_GROUP, fill_estimator, fill_wind
+from flightstack.flight_log.estimator_topics import (
+    ESTIMATOR,
+    SELECTOR_GROUP,
+    WIND_GROUP,
+    fill_estimator,
+    fill_selector,
+    fill_wind,
+)
 from flightstack.flight_log.flight_log import FlightLog
 from flightstack.flight_log.local_position import fill_local_position
 from flightstack.flight_log.recorder import FlightRecorder
@@ -25,15 +34,14 @@ from flightstack.flight_log.sensor_topics import (
     TRUTH_GROUP,
     fill_baro,
     fill_gnss,
-    fill_imu,
     fill_mag,
     fill_range,
 )
 from flightstack.flight_log.topics import Group
 
 SENSOR_GROUPS = (
-    IMU_GROUP, MAG_GROUP, BARO_GROUP, GNSS_GROUP, RANGE_GROUP, ESTIMATOR, WIND_GROUP, TRUTH_GROUP,
-    TRUTH_GLOBAL_GROUP,
+    IMU_GROUP, MAG_GROUP, BARO_GROUP, GNSS_GROUP, RANGE_GROUP, ESTIMATOR, SELECTOR_GROUP, WIND_GROUP,
+    TRUTH_GROUP, TRUTH_GLOBAL_GROUP,
 )  # fmt: skip
 TRUTH_INTERVAL_US, GLOBAL_INTERVAL_US, ESTIMATOR_INTERVAL_US = 10_000, 100_000, 500_000
 """Intervals of PX4's logger."""
@@ -54,8 +62,13 @@ class SensorRecorder:
         """``frame`` is the vehicle's local frame; ``home`` is the origin of the true position."""
         self._recorder = recorder
         self._frame, self._true_frame = frame, LocalFrame(home)
-        self._offset_m = Vector3(0.0, 0.0, 0.0)  # of the true frame's origin in the vehicle's
+        # of the true frame's origin in the vehicle's; heights of both count from the ground at the start, so that the
+        # altitude of GNSS at the first fix is no error of the height
+        self._offset_m = np.zeros(3)
         self._log: FlightLog | None = None
+        scratch: FloatArray = np.zeros(IMU_GROUP.columns)
+        self._no_row: Callable[[int], FloatArray] = lambda _: scratch
+        self._imu_row: Callable[[int], FloatArray] = self._no_row
         self._truth_us = self._global_us = self._estimator_us = self._local_us = 0
 
     def begin(self, estimator: Callable[[], bytes]) -> None:
@@ -63,16 +76,22 @@ class SensorRecorder:
         log = self._recorder.log
         if log is not self._log:
             self._log = log
+            self._imu_row = self._no_row if log is None else log.sampled[IMU_GROUP.name].append
             if log is not None:
-                self._offset_m = self._frame.to_ned(self._true_frame.origin)
+                self._offset_m[:2] = self._frame.to_ned(self._true_frame.origin)[:2]
                 self._truth_us = self._global_us = self._estimator_us = 0
                 log.binary_information(ESTIMATOR_START, estimator())
 
-    def imu(self, time_us: int, dt_us: int, row: FloatArray) -> None:
-        """Record a sample of the inertial sensor that the estimator takes, in its array form."""
-        log = self._log
-        if log is not None:
-            fill_imu(log.sampled[IMU_GROUP.name].append(time_us), dt_us, row)
+    def imu_row(self, time_us: int) -> FloatArray:
+        """Return the row of ``IMU_GROUP`` for a sample that the estimator takes; without a log a scratch row."""
+        return self._imu_row(time_us)
+
+    @property
+    def due_us(self) -> int:
+        """Time from which ``state`` records something; 0 for a new log."""
+        if self._recorder.log is not self._log:
+            return 0
+        return self._local_us if self._log is None else min(self._local_us, self._truth_us)
 
     def sample(self, sample: Sample) -> None:
         """Record a sample of another sensor that the estimator takes."""
@@ -103,6 +122,12 @@ class SensorRecorder:
             fill_estimator(log.sampled[ESTIMATOR.name].append(time_us), sensed)
             if sensed.report.wind_is_observed:
                 fill_wind(log.sampled[WIND_GROUP.name].append(time_us), sensed)
+            self.selection(time_us, sensed)
+
+    def selection(self, time_us: int, sensed: Sensed) -> None:
+        """Record the selection of several estimators; also call after a change."""
+        if self._log is not None and sensed.lanes is not None:
+            fill_selector(self._log.sampled[SELECTOR_GROUP.name].append(time_us), sensed.lanes)
 
     def local_position(self, time_us: int, sensed: Sensed) -> None:
         """Update what the next rows of the outer loop record of the estimate; also call after a reset."""

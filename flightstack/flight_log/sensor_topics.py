@@ -130,12 +130,6 @@ RANGE_GROUP = Group(
 )
 
 
-def fill_imu(row: FloatArray, dt_us: int, sample: FloatArray) -> None:
-    """Fill a row of ``IMU_GROUP`` from the array form of a sample."""
-    row[:] = sample[1:]
-    row[0] = dt_us
-
-
 def fill_mag(row: FloatArray, sample: MagSample) -> None:
     """Fill a row of ``MAG_GROUP``."""
     row[0], row[1:4] = round(sample.time_s * 1e6), sample.field_frd_gauss

@@ -24,17 +24,20 @@ class EstimatorParam(NamedTuple):
 
 def _param(
     name: str, default: float, low: float, high: float, unit: str, text: str, field: str, factor: float = 1.0,
-    decimals: int = 3, integer: bool = False,
+    decimals: int = 3, integer: bool = False, group: str = GROUP,
 ) -> EstimatorParam:  # fmt: skip
-    spec = ParamSpec(name, default, low, high, unit, text, integer, GROUP, 0 if integer else decimals)
+    spec = ParamSpec(name, default, low, high, unit, text, integer, group, 0 if integer else decimals)
     return EstimatorParam(spec, field, factor)
 
 
 ESTIMATOR_PARAMS = (
     _param("EKF2_PREDICT_US", 8000, 1000, 20000, "us",
            "Least time between two predictions; at least 1/48 of the longest delay", "period_s", _US, integer=True),
-    _param("EKF2_TAU_VEL", 0.0, 0.0, 1.0, "s", "Time constant with which the output follows the filter; 0 at once",
+    _param("EKF2_TAU_VEL", 0.15, 0.0, 1.0, "s", "Time constant with which the output follows the filter; 0 at once",
            "output_s"),
+    # control
+    _param("IMU_GYRO_CUTOFF", 40.0, 0.0, 1000.0, "Hz", "Cutoff of the low-pass filter of the rates that the loops use;"
+           " 0 for none", "gyro_cutoff_hz", 1.0, 1, group="Sensors"),
     # process
     _param("EKF2_GYR_NOISE", 0.009, 1e-4, 0.1, "rad/s", "Gyro noise for the prediction", "gyro_noise", _STEP, 4),
     _param("EKF2_ACC_NOISE", 0.135, 0.01, 1.0, "m/s^2", "Accelerometer noise for the prediction", "accel_noise", _STEP),
@@ -87,7 +90,15 @@ ESTIMATOR_PARAMS = (
     _param("EKF2_REQ_NSATS", 6, 4, 12, "", "Satellites that the first fix needs", "satellites", integer=True),
 )  # fmt: skip
 
-ESTIMATOR_SPECS: Mapping[str, ParamSpec] = {param.spec.name: param.spec for param in ESTIMATOR_PARAMS}
+MULTI_IMU = ParamSpec(
+    "EKF2_MULTI_IMU", 3, 1, 3, "", "Largest number of inertial sensors that have an estimator of their own, of which"
+    " the best one flies the vehicle", True, GROUP, 0, reboot_required=True,
+)  # fmt: skip
+
+ESTIMATOR_SPECS: Mapping[str, ParamSpec] = {
+    **{param.spec.name: param.spec for param in ESTIMATOR_PARAMS},
+    MULTI_IMU.name: MULTI_IMU,
+}
 """Declarations by name."""
 
 _DEFAULTS = {param.field: param.spec.default * param.factor for param in ESTIMATOR_PARAMS}

@@ -139,7 +139,7 @@ _GNSS = (
 
 _RANGE = (
     Number("rate_hz", "Hz", "rate", 1.0, 1000.0, 50.0, 50.0, f"{_CLASS}; {_LL40LS} reads at 20 Hz"),
-    Number("position_frd_m", "m", "mounting; it looks along +z", -5.0, 5.0, _HERE, _HERE),
+    Number("position_frd_m", "m", "mounting; it points along +z", -5.0, 5.0, _HERE, _HERE),
     Number("noise_m", "m", "standard deviation", 0.0, 10.0, 0.01, 0.0, _CLASS),
     Number("noise_share", "", "standard deviation over the distance", 0.0, 1.0, 0.01, 0.0, _CLASS),
     Number("min_m", "m", "shortest distance", 0.0, 100.0, 0.05, 0.0, _LL40LS),

@@ -10,6 +10,7 @@ state: a simulator that speaks PX4's contract alone is answered with HIL_ACTUATO
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +23,7 @@ from flightstack.mavlink.link import Link, Message
 from flightstack.params.vehicle import Vehicle, system_type
 from flightstack.simulator_link.battery_frame import UNUSED_CELL, BatteryReport, decode_battery, report_of
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame, PlantStateFrame
-from flightstack.simulator_link.sensor_frames import HIL_SENSOR_ID
+from flightstack.simulator_link.sensor_frames import HIL_SENSOR_ID, HilMeasurement
 from flightstack.simulator_link.sensor_inbox import SensorInbox
 from flightstack.simulator_link.state_steps import StateSteps
 
@@ -165,6 +166,36 @@ class SimulatorEndpoint:
             return True
         return self._receive_with_battery(data) or self._receive_any(data)
 
+    def is_quiet(self, time_us: int) -> bool:
+        """Return True if the newest state is that of ``time_us``, and nothing else of the simulator is pending."""
+        is_plain = self.has_state and not (self._uses_hil or self.finder.partial_size)
+        return is_plain and self.time_us == time_us
+
+    @property
+    def answers_exactly(self) -> bool:
+        """True if the answers are FS_ACTUATORS."""
+        return not self._uses_hil
+
+    def take(self, time_us: int, frame: PlantStateFrame, sensors: Sequence[HilMeasurement]) -> None:
+        """Take what ``receive`` would decode of the bytes of a simulator in this process; ``frame`` is not sealed."""
+        self._plant.frame[:] = frame.frame
+        if self.sensors is None:
+            self._take_time(time_us)
+        elif sensors:
+            self.sensors.take_measurements(time_us, sensors)
+            self._take_clock(self.sensors)
+
+    def take_next(self, frame: PlantStateFrame) -> None:
+        """Take a state as ``take`` does, one interval after the last one, whose sensors are read directly."""
+        self._plant.frame[:] = frame.frame
+        self._state_us += self._interval_us
+        self.time_us += self._interval_us
+        self.has_arrived = True
+
+    def flags(self, armed: bool) -> int:
+        """Return the flags of an answer with FS_ACTUATORS."""
+        return self._lockstep | (ARMED_FLAG if armed else 0)
+
     def _receive_with_battery(self, data: memoryview) -> bool:
         """Process a battery report directly followed by a state; return False and do nothing for anything else."""
         split = len(data) - self._plant.size
@@ -264,7 +295,7 @@ class SimulatorEndpoint:
 
     @property
     def step_refusal(self) -> str:
-        """Reason why the simulator's steps prevent arming; empty if they do not."""
+        """Reason that the simulator's steps prevent arming; empty if they do not."""
         return self.steps.refusal(self.time_us)
 
     def freshness(self, now_us: int) -> Freshness:
@@ -343,7 +374,7 @@ class SimulatorEndpoint:
         if self._uses_hil:
             return self._hil_answer(rotor_speed_rad_s, armed)
         self._actuators.rotor_speed_rad_s[:] = rotor_speed_rad_s
-        return self._actuators.seal(self._state_us, self._lockstep | (ARMED_FLAG if armed else 0))
+        return self._actuators.seal(self._state_us, self.flags(armed))
 
     def _hil_answer(self, rotor_speed_rad_s: FloatArray, armed: bool) -> bytes:
         count = self._max_speed_rad_s.size

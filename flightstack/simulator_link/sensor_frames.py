@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import struct
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from fastcrc import crc16
@@ -47,6 +47,13 @@ _HEAD = struct.Struct("<BBB4x3s")  # magic, size, incompatible flags, message
 _SENSOR_EXTRA: int = mavlink.MAVLink_hil_sensor_message.crc_extra
 _SENSOR_EXTRA_BYTE = bytes([_SENSOR_EXTRA])
 _crc16 = crc16.mcrf4xx
+
+
+class HilMeasurement(NamedTuple):
+    """Content of HIL_SENSOR of the first inertial sensor, as in ``HilSensorFrame``."""
+
+    values: np.ndarray[Any, np.dtype[np.float32]]
+    fields: int
 
 
 class HilSensorFrame:
@@ -106,6 +113,11 @@ class HilSensorFrame:
         (self.time_us,) = _TIME.unpack_from(payload)
         self.fields, self.number = _FIELDS.unpack_from(payload, _FIELDS_AT)
         return True
+
+    def set(self, time_us: int, measurement: HilMeasurement) -> None:
+        """Copy the content of a frame that was not sealed."""
+        self.values[:] = measurement.values
+        self.time_us, self.fields, self.number = time_us, measurement.fields, 0
 
     def take(self, message: Message) -> None:
         """Copy a message of the general decoder: its frame may be signed, or of MAVLink 1."""

@@ -7,6 +7,7 @@ the same stamp, as a simulator for PX4 sends it, gets the time of this clock.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
 from flightstack.mavlink.dialect import mavlink
@@ -17,6 +18,7 @@ from flightstack.simulator_link.sensor_frames import (
     HIL_GPS_ID,
     HIL_SENSOR_ID,
     HilGps,
+    HilMeasurement,
     HilSensorFrame,
     decode_gps,
     gps_of,
@@ -96,6 +98,13 @@ class SensorInbox:
             return False
         return None
 
+    def take_measurements(self, time_us: int, measurements: Sequence[HilMeasurement]) -> None:
+        """Take the contents of HIL_SENSOR by their id; then call ``stamp``, for the first one is the clock."""
+        for number in range(len(measurements) - 1, 0, -1):
+            values, fields = measurements[number]
+            self._wait(HilReport(number, fields, tuple(values.tolist()), 0))
+        self._frame.set(time_us, measurements[0])
+
     def take_message(self, message: Message) -> bool:
         """Take a message of the general decoder; return True for the clock. After True call ``stamp``."""
         kind = message.get_msgId()
@@ -117,6 +126,17 @@ class SensorInbox:
             )
             self._wait(FlowReport(m.integration_time_us * 1e-6, flow, gyro, m.quality / 255.0))
         return False
+
+    @property
+    def is_quiet(self) -> bool:
+        """True if no message waits, and the inertial sensors have measured at the last clock."""
+        waits, measured_us = self._waiting or self._reports, self._measured_us
+        return not waits and 0 in measured_us and set(measured_us.values()) == {self._time_us}
+
+    def pass_by(self, time_us: int, stamp_us: int) -> None:
+        """Count the measurements of the inertial sensors to a clock as taken: they went to the estimator directly."""
+        self._time_us, self._stamp_us = time_us, stamp_us
+        self._measured_us = dict.fromkeys(self._measured_us, time_us)
 
     def _take_sensor(self) -> bool:
         frame = self._frame

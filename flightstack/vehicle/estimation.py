@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from flightstack.commander.estimate_checks import estimate_refusals
+from flightstack.commander.estimate_checks import MISSING_S, estimate_refusals
 from flightstack.commander.failsafe_monitor import FailsafeMonitor
 from flightstack.control.backend import ControlBackend
 from flightstack.core.contract import FloatArray, Vector3
-from flightstack.core.earth_field import earth_field_ned_gauss
 from flightstack.core.enums import Severity
+from flightstack.core.geodesy import earth_field_ned_gauss
 from flightstack.core.portable_math import distance
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits, tuning_of
-from flightstack.estimation.health import NO_HEALTH, HealthMonitor
+from flightstack.estimation.filter_core import FilterCore
+from flightstack.estimation.health import NO_HEALTH
+from flightstack.estimation.imu_track import SingleArray
+from flightstack.estimation.lanes import Lanes
 from flightstack.estimation.memory import (
     MAG_FAULT,
     POSITION_RESET,
@@ -30,17 +33,20 @@ from flightstack.estimation.sensor_samples import BaroSample, ImuSample
 from flightstack.estimation.snapshot import snapshot
 from flightstack.flight_log.sensor_recorder import SensorRecorder
 from flightstack.guidance.navigator import Navigator
-from flightstack.params.estimator import ESTIMATOR_SPECS
+from flightstack.params.estimator import ESTIMATOR_SPECS, MULTI_IMU
 from flightstack.params.store import ParamStore
 from flightstack.params.vehicle import GRAVITY_M_S2
 from flightstack.simulator_link.sensor_inbox import SensorInbox
 from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.autopilot import Autopilot
-from flightstack.vehicle.flight_state import FlightState
-from flightstack.vehicle.journal import Journal
+from flightstack.vehicle.flight_state import FlightState, Journal
 
 HEALTH_US = 50_000
 """Interval of the health, in the time of the sensors."""
+_SMALL_TURN_RAD = math.radians(2.0)
+"""Reset of the yaw that the attitude loop follows without a reset of its own."""
+_TOLD_S = 1.0
+"""Time after a change of the inertial sensor in which the failure of the former one is not reported again."""
 _ZERO = Vector3(0.0, 0.0, 0.0)
 
 
@@ -75,12 +81,16 @@ class Estimation:
         params: ParamStore,
         recorder: SensorRecorder,
         truth: Callable[[], FloatArray | None],
+        imu_count: int = 1,
+        core: FilterCore | None = None,
     ) -> None:
         """``now.state`` is written in place. ``truth`` returns the simulator's state or None, for ``recorder``.
 
-        ``params`` has the parameters of the estimator (EKF2_…).
+        ``params`` has the parameters of the estimator (EKF2_…), ``imu_count`` is the vehicle's. ``core`` runs the
+        filter of the first inertial sensor alone; by default, filters run in this process, compiled from Python.
         """
-        self.estimator = Estimator(*_tuning(params.values()))
+        count = 1 if core is not None else max(1, min(imu_count, int(params.value(MULTI_IMU.name))))
+        first, *spares = estimators = [Estimator(*_tuning(params.values()), core) for _ in range(count)]
         self._params = params
         params.subscribe(self._on_parameter)
         self.health = NO_HEALTH
@@ -89,16 +99,25 @@ class Estimation:
         self._now = now
         self._users = users
         self._recorder, self._truth = recorder, truth
-        self._feed = SensorFeed(self.estimator, now.state, recorder)
-        self._monitor = HealthMonitor(self.estimator.memory)
+        self._feed = SensorFeed(first, now.state, recorder, spares)
+        self._lanes = Lanes(self._feed, estimators)
         self._landed = False
         self._health_due_us = 0
         self._time_us = 0  # of the newest message of the sensors
+        self._read_selected()
+        self._seen, self._counts = self._resets.tolist(), (0.0, 0.0, 0.0)
+        self._mag_has_failed = self._baro_has_failed = self._spare_has_failed = False
+
+    def _read_selected(self) -> None:
+        """Read resets and flags of the selected estimator from now on."""
         # as memory: a number of an array takes four times as long to read
         self._resets = self.estimator.memory["resets"][0].data
-        self._seen, self._counts = self._resets.tolist(), (0.0, 0.0, 0.0)
         self._flags = self.estimator.memory["flags"][0].data
-        self._mag_has_failed = False
+
+    @property
+    def estimator(self) -> Estimator:
+        """The estimator that flies the vehicle."""
+        return self._lanes.estimator
 
     @property
     def samples(self) -> NewestSamples:
@@ -107,11 +126,14 @@ class Estimation:
 
     def sensed(self) -> Sensed:
         """Return what the estimator and its sensors know now; valid until the next update."""
-        return Sensed(self.estimator.memory[0], self._feed.newest, self._now.has_state, self._time_us * 1e-6)
+        self.estimator.refresh()
+        now_s, memory = self._time_us * 1e-6, self.estimator.memory[0]
+        return Sensed(memory, self._feed.newest, self._now.has_state, now_s, self._lanes.report)
 
     def _on_parameter(self, name: str, value: float) -> None:
         if name in ESTIMATOR_SPECS:
-            self.estimator.set_params(*_tuning({**self._params.values(), name: value}))
+            for estimator in self._lanes.estimators:
+                estimator.set_params(*_tuning({**self._params.values(), name: value}))
 
     def warm_up(self) -> None:
         """Compile the kernels of the estimator, or load them from the cache."""
@@ -122,6 +144,7 @@ class Estimation:
         estimator.set_earth_field(_ZERO)
 
     def _snapshot(self) -> bytes:
+        self.estimator.refresh()
         return snapshot(self.estimator)
 
     def is_ready(self) -> bool:
@@ -130,28 +153,54 @@ class Estimation:
 
     def update(self, time_us: int) -> None:
         """Take the measurements since the last call; once per tick, at the time of the tick."""
-        now, resets = self._now, self._resets
+        now = self._now
         self._recorder.begin(self._snapshot)
         if now.landed is not self._landed:
             self._landed = now.landed
-            self.estimator.set_landed(now.landed)
+            for estimator in self._lanes.estimators:
+                estimator.set_landed(now.landed)
         reports = self._sensors.take()
         if reports:
             self._time_us = reports[-1].time_us
         is_known = self._feed.update(reports)
+        if reports and not self._lanes.is_alone and self._lanes.replace_lost(self._time_us):
+            self._follow_selection()
         if is_known and not now.has_state:
             self._find_origin()
         self._recorder.state(time_us, self._truth, self.sensed)
+        self._check_resets(time_us)
+        if reports and self._time_us >= self._health_due_us:
+            self._update_health(self._time_us)
+
+    @property
+    def quiet_until_us(self) -> int:
+        """Time from which a tick has more to do than ``update_imus``; 0 if the next one has."""
+        now = self._now
+        finds_origin = not now.has_state and self.estimator.frame is not None
+        if finds_origin or now.landed is not self._landed or not self._sensors.is_quiet:
+            return 0
+        return min(self._health_due_us, self._recorder.due_us)
+
+    def update_imus(self, time_us: int, step_us: int, wires: Sequence[SingleArray]) -> None:
+        """Take a measurement of each inertial sensor, the only messages of a tick before ``quiet_until_us``.
+
+        ``wires`` have the values of HIL_SENSOR, ``step_us`` is the time since the last tick.
+        """
+        self._time_us = time_us
+        self._feed.update_imus(time_us, step_us, wires)
+        self._check_resets(time_us)
+
+    def _check_resets(self, time_us: int) -> None:
+        resets = self._resets
         if (resets[POSITION_RESET], resets[VELOCITY_RESET], resets[YAW_RESET]) != self._counts:
             self._follow_resets()
             self._recorder.local_position(time_us, self.sensed())
-        if reports and self._time_us >= self._health_due_us:
-            self._update_health(self._time_us)
 
     def _find_origin(self) -> None:
         frame = self.estimator.frame
         if frame is not None:
-            self.estimator.set_earth_field(earth_field_ned_gauss(frame.origin))
+            for estimator in self._lanes.estimators:
+                estimator.set_earth_field(earth_field_ned_gauss(frame.origin))
             self._users.area.move_origin(frame.origin)
             self._now.has_state = True
             self._health_due_us = 0  # at once: the vehicle counts as healthy now, and a client may arm it
@@ -170,10 +219,18 @@ class Estimation:
         )
         yaw_rad = change[YAW_RESET_SUM]
         users.navigator.shift(position_m, velocity_m_s, yaw_rad)
-        if change[YAW_RESET]:  # the reference attitude of the loops has the old yaw
+        if abs(yaw_rad) > _SMALL_TURN_RAD:  # the reference attitude of the loops has the old yaw
             self._reset_loops()
         step = f"{distance(*position_m):.1f} m, {distance(*velocity_m_s):.1f} m/s, {math.degrees(yaw_rad):.0f} degrees"
         users.journal.say(Severity.NOTICE, f"Estimate reset by {step}")
+
+    def _follow_selection(self) -> None:
+        """Fly on the estimator that was selected just now."""
+        self._read_selected()
+        selection = self._lanes.selection
+        text = f"Inertial sensor {selection.left + 1} {selection.reason}: flying on {selection.selected + 1}"
+        self._users.journal.say(Severity.WARNING, text)
+        self._recorder.selection(self._now.time_us, self.sensed())
 
     def _reset_loops(self) -> None:
         self._users.backend.reset(self._now.state)
@@ -183,16 +240,35 @@ class Estimation:
         now, users = self._now, self._users
         self._health_due_us = time_us + HEALTH_US
         limit_m = now.behaviour.position_accuracy_m
-        self.health = self._monitor.update(self._feed.newest, now.has_state, limit_m, time_us * 1e-6)
+        self.health, is_selected = self._lanes.update(now.has_state, limit_m, time_us)
+        if is_selected:
+            self._follow_selection()
+        has_failed, had_failed = self.health.spare_imu_has_failed, self._spare_has_failed
+        self._spare_has_failed = has_failed
+        since_change_s = time_us * 1e-6 - self._lanes.selection.changed_s
+        if has_failed and not had_failed and now.has_state and since_change_s > _TOLD_S:
+            users.journal.say(Severity.WARNING, "A spare inertial sensor has failed")
         users.failsafes.take_health(self.health)
         if self._flags[MAG_FAULT] and not self._mag_has_failed:
             self._mag_has_failed = True
             users.journal.say(Severity.WARNING, "Compass disagrees with GNSS and is no longer used")
+        self._tell_of_barometer()
         failsafes = users.failsafes
         changed = users.navigator.set_known(failsafes.position_is_known, failsafes.velocity_is_known)
         if changed and now.flying:  # reference and integrators hold what followed from the position
             users.navigator.reset_reference(now.state)
             self._reset_loops()
+
+    def _tell_of_barometer(self) -> None:
+        """Report a barometer that fails in flight, and its return."""
+        has_failed = self._now.flying and (self.health.baro_is_stuck or self.health.baro_age_s > MISSING_S)
+        if has_failed is self._baro_has_failed:
+            return
+        self._baro_has_failed = has_failed
+        if has_failed:
+            self._users.journal.say(Severity.WARNING, "Barometer is stuck or missing and not used")
+        elif self._now.flying:
+            self._users.journal.say(Severity.NOTICE, "Barometer is used again")
 
 
 class SensorAutopilot:

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from flightstack.core.contract import FloatArray, RecordArray, Vector3
-from sim_bridge.plant.fault_table import Fault, Kind
+from sim_bridge.plant.faults.table import Fault, Kind
 from sim_bridge.sensors.noise import UniformStream
 
 T = TypeVar("T")
@@ -76,7 +76,7 @@ def channels_of(sensor: str, imu_count: int) -> list[tuple[str, int]]:
 
 
 def without(fault: Fault, sensor: str, imu_count: int) -> list[Fault]:
-    """Return what is left of a fault when it ends on ``sensor``: the fault, or one for each other sensor, or none."""
+    """Return the remainder of a fault when it ends on ``sensor``: the fault, or one for each other sensor, or none."""
     channels, ended = channels_of(fault.sensor, imu_count), channels_of(sensor, imu_count)
     if not set(channels).intersection(ended):
         return [fault]
@@ -110,6 +110,7 @@ class Channel:
         self._flat = (records["fault_noise"], records["is_frozen"], at)
         self._scale, self._latency_us = scale, latency_us
         self._fault = HEALTHY
+        self._passes_at_once = latency_us == 0  # and has no fault
         self._waiting: deque[tuple[int, Any]] = deque()
         self.next_due_us = NEVER_US
         """Time of the next message that waits."""
@@ -118,11 +119,12 @@ class Channel:
     @property
     def is_direct(self) -> bool:
         """True if each measurement is sent at once, and none waits."""
-        return self._fault == HEALTHY and self._latency_us == 0 and not self._waiting
+        return self._passes_at_once and not self._waiting
 
     def set(self, fault: ChannelFault, time_us: int) -> None:
         """Begin, change or end the fault at ``time_us``."""
         self._fault = fault
+        self._passes_at_once = self._latency_us == 0 and fault == HEALTHY
         noise, frozen, at = self._flat
         noise[at], frozen[at] = fault.noise * self._scale, fault.is_frozen
         self.update(time_us)

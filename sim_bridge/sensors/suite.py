@@ -1,8 +1,8 @@
 """The sensors of a vehicle in one simulation: their rates, faults and messages.
 
 The inertial sensors measure in each exchange, the others at their own rates, at the first exchange at or after each
-multiple of their period. The messages are those that PX4 expects of a simulator: HIL_SENSOR with the bits of what is
-new, HIL_GPS, DISTANCE_SENSOR and HIL_OPTICAL_FLOW.
+multiple of their period. The messages are those that PX4 expects of a simulator: HIL_SENSOR with the bits of its
+new fields, HIL_GPS, DISTANCE_SENSOR and HIL_OPTICAL_FLOW.
 
 The time of HIL_SENSOR of the first inertial sensor is the clock of the vehicle. The flight stack gives all messages
 before it the same time, so that it comes last. PX4 sets its clock on this message and stamps the other ones with its
@@ -13,14 +13,13 @@ last, a second inertial sensor would be one step old.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from flightstack.core.contract import FloatArray, RecordArray
-from flightstack.core.earth_field import earth_field_ned_gauss
-from flightstack.core.geodesy import GeoPoint, LocalFrame
+from flightstack.core.geodesy import GeoPoint, LocalFrame, earth_field_ned_gauss
 from flightstack.core.portable_math import sin_cos
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.fields import whole
@@ -39,10 +38,11 @@ from flightstack.simulator_link.sensor_frames import (
     PRESSURE_AT,
     TEMPERATURE_AT,
     HilGps,
+    HilMeasurement,
     HilSensorFrame,
     encode_gps,
 )
-from sim_bridge.plant.fault_table import Fault, Kind
+from sim_bridge.plant.faults.table import Fault, Kind
 from sim_bridge.plant.plant import Plant, PlantOptions
 from sim_bridge.sensors.barometer import Barometer
 from sim_bridge.sensors.faults import HEALTHY, NEVER_US, Channel, channel_faults
@@ -90,14 +90,16 @@ class SensorSuite:
         seed = options.seed
         self._link = Link(*sender)
         self._frame = LocalFrame(home)
-        numbers = vehicle.sensors.numbers
         self.imus = ImuSet(vehicle, seed, truth.state)
         count = len(self.imus.records)
         self._frames = [HilSensorFrame(*sender) for _ in range(count)]
         self._values = self._frames[0].values
-        self._fields = [_IMU] * count
+        self._all_imus = [_IMU] * count
+        self._fields = self._all_imus.copy()
         self._apart: SingleArray = np.zeros((count, 6), "<f4")  # measurements that go through channels
         self._wires = self._values[:6].reshape(1, 6) if count == 1 else self._apart
+        self.imu_wires: tuple[SingleArray, ...] = tuple(self._wires)
+        """Newest measurement of each inertial sensor as in HIL_SENSOR: specific force and rates, shape (6,)."""
         self._gps_seq = 0
         self._messages: list[bytes] = []
         self._channels: dict[tuple[str, int], Channel] = {}
@@ -109,6 +111,13 @@ class SensorSuite:
         self._is_apart = False  # measurements of the inertial sensors go through their channels
         self._imbalance = float(self.imus.motion[0]["imbalance"])
         self._sensors: list[_Sensor] = []
+        self._add_slow_sensors(vehicle, home, options)
+        self._due_us = [0] * len(self._sensors)
+        self._next_us = 0
+
+    def _add_slow_sensors(self, vehicle: Vehicle, home: GeoPoint, options: PlantOptions) -> None:
+        """Add the sensors besides the IMU that the vehicle's file has."""
+        numbers, seed = vehicle.sensors.numbers, self._seed
         if "mag" in numbers:
             self.mag = Magnetometer(vehicle, seed, earth_field_ned_gauss(home))
             self._mag_matrix: FloatArray = self.mag.records[0]["matrix"].copy()
@@ -125,8 +134,6 @@ class SensorSuite:
         if "flow" in numbers:
             self.flow = OpticalFlow(vehicle, options)
             self._add("flow", self.flow.records, self._measure_flow, self._send_flow)
-        self._due_us = [0] * len(self._sensors)
-        self._next_us = 0
 
     def _add(
         self,
@@ -191,12 +198,36 @@ class SensorSuite:
                 self._pass_on_imu(time_us, index)
         else:
             self.imus.measure(truth.state, truth.rotor_speed_rad_s, self._wires)
-            self._fields[0] = _IMU
-            if len(self._frames) > 1:
-                for index, frame in enumerate(self._frames):
-                    frame.values[:6], self._fields[index] = self._wires[index], _IMU
+            self._fields[:] = self._all_imus
         if time_us >= self._next_us:
             self._measure_slow(time_us)
+
+    @property
+    def is_quiet(self) -> bool:
+        """True while ``measure`` before ``next_us`` changes ``imu_wires`` alone: there are no faults."""
+        return not (self._has_faults or self._is_apart or self._messages)
+
+    @property
+    def next_us(self) -> int:
+        """Time of the next measurement of a sensor that is not inertial."""
+        return self._next_us
+
+    @property
+    def measurements(self) -> Sequence[HilMeasurement]:
+        """Contents of HIL_SENSOR of each inertial sensor; none if there are other messages."""
+        if self._messages:
+            return ()
+        self._fill_frames()
+        return [
+            HilMeasurement(frame.values, fields)
+            for frame, fields in zip(self._frames, self._fields, strict=True)
+        ]
+
+    def _fill_frames(self) -> None:
+        """Copy measurements that go through no channels to the frames of several sensors."""
+        if len(self._frames) > 1 and not self._is_apart:
+            for frame, wire in zip(self._frames, self.imu_wires, strict=True):
+                frame.values[:6] = wire
 
     def _pass_on_imu(self, time_us: int, index: int) -> None:
         """Send the measurement of an inertial sensor that its faults leave."""
@@ -214,18 +245,18 @@ class SensorSuite:
     def _measure_slow(self, time_us: int) -> None:
         next_us = NEVER_US
         for index, (period_us, channel, measure, send) in enumerate(self._sensors):
-            out = None
+            out, is_direct = None, channel.is_direct
             if time_us >= self._due_us[index]:
                 self._due_us[index] = (time_us // period_us + 1) * period_us
                 out = measure(time_us)
-                if not channel.is_direct:
+                if not is_direct:
                     out = channel.pass_on(time_us, out if isinstance(out, tuple) else out.copy())
-            elif not channel.is_direct:
+            elif not is_direct:
                 out = channel.due(time_us)
             if out is not None:
                 send(time_us, out)
             next_us = min(next_us, self._due_us[index])
-            if not channel.is_direct:
+            if not is_direct:
                 next_us = min(next_us, channel.next_due_us)
         self._next_us = next_us
 
@@ -307,6 +338,7 @@ class SensorSuite:
         """
         if not self._messages and len(self._frames) == 1:
             return self._frames[0].seal(stamp_us, self._fields[0], 0)
+        self._fill_frames()
         others, self._messages = self._messages, []
         imus = [
             bytes(frame.seal(stamp_us, fields, number))

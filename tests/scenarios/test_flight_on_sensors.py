@@ -13,8 +13,10 @@ from flightstack.core.contract import Quaternion
 from flightstack.core.errors import ConfigError
 from flightstack.estimation.error_state import WIND, turn_between
 from flightstack.estimation.memory import MAG_FAULT
+from flightstack.mavlink.dialect import mavlink
 from flightstack.testing import World
 from tests.support.estimate_errors import Watch
+from tests.support.refusals import refused
 
 
 def test_square_on_sensors_is_completed_within_the_limits_of_gnss() -> None:
@@ -29,6 +31,20 @@ def test_square_on_sensors_is_completed_within_the_limits_of_gnss() -> None:
     assert errors.horizontal_m < 0.7
     assert errors.vertical_m < 0.4
     assert errors.landing_m < 1.5
+
+
+def test_rotors_are_quiet_in_hover_on_sensors() -> None:
+    with World(vehicle="x_quad", state="estimated", seed=3) as world:
+        world.wait_until_ready()
+        world.takeoff(3.0)
+        world.run_for(8.0)
+        commands = []
+        for _ in range(1000):
+            world.tick()
+            commands.append(world.engine.actuators.rotor_speed_rad_s[:4].copy())
+    changes = np.diff(np.array(commands), axis=0)
+    rms_rad_s = float(np.sqrt(np.mean(np.square(changes))))
+    assert rms_rad_s < 2.0  # measured 1.4; 11 without EKF2_TAU_VEL and IMU_GYRO_CUTOFF
 
 
 DRAG = {"EKF2_DRAG_CTRL": 1, "EKF2_DRAG_NOISE": 0.1, "EKF2_MCOEF": 0.2, "EKF2_BCOEF_X": 0, "EKF2_BCOEF_Y": 0}
@@ -81,6 +97,28 @@ def test_vehicle_on_sensors_refuses_to_arm_before_its_position_is_known() -> Non
         world.wait_until_ready()
         assert 0.4 < world.time_s < 5.0
         world.arm()
+
+
+def test_barometer_that_freezes_on_the_ground_refuses_arming() -> None:
+    with World(vehicle="x_quad", state="estimated") as world:
+        world.wait_until_ready()
+        world.run_for(3.0)
+        world.fault("sensor:baro:freeze")
+        world.run_for(1.5)
+        with refused(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "the barometer is stuck"):
+            world.arm()
+
+
+def test_barometer_that_freezes_in_the_air_is_reported_and_so_is_its_return() -> None:
+    with World(vehicle="x_quad", state="estimated") as world:
+        world.wait_until_ready()
+        world.takeoff(4.0)
+        world.run_for(6.0)
+        world.fault("sensor:baro:freeze", for_s=3.0)
+        world.run_for(2.0)
+        assert "Barometer is stuck or missing and not used" in world.texts
+        world.run_for(3.0)
+        assert "Barometer is used again" in world.texts
 
 
 @pytest.mark.parametrize(

@@ -85,7 +85,7 @@ def test_estimator_topics_agree_with_each_other(log: ULog) -> None:
 
 
 def test_log_with_the_true_state_has_no_topics_of_sensors() -> None:
-    with World(vehicle="x_quad") as world:
+    with World(vehicle="x_quad", state="truth") as world:
         world.arm()
         world.run_for(0.5)
         names = {data.name for data in ULog(io.BytesIO(world.engine.newest_log())).data_list}

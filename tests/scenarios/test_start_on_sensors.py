@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from flightstack.core.geodesy import GeoPoint
+from flightstack.params.config import DEFAULT_HOME
 from flightstack.testing import World
 from tests.support.estimate_errors import Errors, Watch
 
@@ -53,3 +54,24 @@ def test_vehicle_starts_from_a_boat_that_moves_slowly() -> None:
     """The filter takes a landed vehicle for still: its velocity is off by that of the boat, 0.5 m/s, at first."""
     slow = Errors(1.5, 2.5, 0.4, 1.5, 0.4, 2.0)  # measured: 0.80°, 1.01°, 0.24 m/s, 0.89 m, 0.18 m, 1.14 m
     assert_within(slow, hop(boat=(0.4, -0.3)))
+
+
+def test_home_far_from_the_default_origin_is_kept_if_the_first_fix_is_near() -> None:
+    """The vehicle assumes that it is in Zürich until then, and stands on the equator."""
+    there = PLACES["equator"]
+    with World(vehicle="x_quad", home=there) as world:
+        area, places = world.engine.stack.area, world.engine.stack.places
+        places.frame.move_to(DEFAULT_HOME)
+        assert area.set_home(there._replace(latitude_deg=0.001)) is None
+        world.wait_until_ready()
+        assert places.home_point.latitude_deg == 0.001
+        assert "km from where the vehicle started" in str(area.set_home(DEFAULT_HOME))
+
+
+def test_home_far_from_the_first_fix_moves_there() -> None:
+    with World(vehicle="x_quad") as world:
+        area, places = world.engine.stack.area, world.engine.stack.places
+        assert area.set_home(PLACES["equator"]) is None
+        world.wait_until_ready()
+        assert places.home_point.latitude_deg == pytest.approx(DEFAULT_HOME.latitude_deg, abs=1e-3)
+        assert any("Home moved to the origin: home is more than 100 km" in text for text in world.texts)

@@ -8,14 +8,22 @@ import pytest
 
 from flightstack.commander.estimate_checks import PREFLIGHT, estimate_failsafes, estimate_refusals
 from flightstack.commander.failsafe import Failsafe
-from flightstack.estimation.health import NO_HEALTH, Accuracy, EstimateHealth, accuracy_step
+from flightstack.estimation.health import (
+    NO_HEALTH,
+    NOISY,
+    Accuracy,
+    EstimateHealth,
+    PressureTrack,
+    accuracy_step,
+    pressure_step,
+)
 from flightstack.params.behaviour import Behaviour
 
 GOOD = EstimateHealth(
-    aligned=True, has_origin=True, imu_age_s=0.0, imu_is_stuck=False, mag_age_s=0.01, baro_age_s=0.02, fix_age_s=0.1,
-    unaided_s=0.1, refused_s=0.0, is_inaccurate=False, lag_s=0.13, horizontal_m=0.5, velocity_m_s=0.1, tilt_rad=0.005,
-    gyro_bias_rad_s=0.005, accel_bias_m_s2=0.05, velocity_ratio=0.2, position_ratio=0.2, height_ratio=0.2,
-    heading_ratio=0.3,
+    aligned=True, has_origin=True, imu_age_s=0.0, imu_is_stuck=False, mag_age_s=0.01, baro_age_s=0.02,
+    baro_is_stuck=False, fix_age_s=0.1, unaided_s=0.1, refused_s=0.0, is_inaccurate=False, lag_s=0.13,
+    horizontal_m=0.5, velocity_m_s=0.1, tilt_rad=0.005, gyro_bias_rad_s=0.005, accel_bias_m_s2=0.05,
+    velocity_ratio=0.2, position_ratio=0.2, height_ratio=0.2, heading_ratio=0.3,
 )  # fmt: skip
 
 
@@ -25,8 +33,11 @@ def test_good_estimate_has_no_refusal_and_no_failsafe() -> None:
 
 
 REFUSED = [
+    ({"spare_imu_has_failed": True}, "an inertial sensor has failed"),
+    ({"imus_disagree": True}, "the inertial sensors disagree"),
     ({"mag_age_s": math.inf}, "the compass is missing"),
     ({"baro_age_s": 1.5}, "the barometer is missing"),
+    ({"baro_is_stuck": True}, "the barometer is stuck"),
     ({"fix_age_s": 3.0}, "GNSS has no fix"),
     ({"aligned": False}, "the attitude is not aligned yet"),
     ({"has_origin": False}, "the GNSS fix is not accurate enough yet"),
@@ -107,3 +118,17 @@ def test_position_is_accurate_again_well_below_its_limit_for_a_second() -> None:
 
 def test_position_without_a_limit_is_never_inaccurate() -> None:
     assert _times_inaccurate([90.0, math.inf], -1.0) == []
+
+
+@pytest.mark.parametrize(
+    ("landed", "noise_hpa", "is_noisy"), [(True, 0.01, True), (True, 0.0, False), (False, 0.01, False)]
+)
+def test_pressure_that_changes_at_rest_has_noise(landed: bool, noise_hpa: float, is_noisy: bool) -> None:
+    memory = PressureTrack()
+    for step in range(2 * NOISY):
+        memory = pressure_step(memory, 955.0 + noise_hpa * (step % 3), landed, 0.05 * step)
+    assert (memory.changes == NOISY) is is_noisy
+    for step in range(10):
+        memory = pressure_step(memory, 950.0, landed, 10.0 + 0.05 * step)
+    assert memory.equal_since_s == 10.0
+    assert (memory.changes == NOISY) is is_noisy

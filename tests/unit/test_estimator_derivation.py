@@ -1,4 +1,7 @@
-"""The derived covariance prediction and Jacobians against finite differences of the nominal model."""
+"""The derived covariance prediction and Jacobians against finite differences of the nominal model.
+
+They run as plain Python: to compile them alone takes 20 s, and tests/parity compares compiled code with plain Python.
+"""
 
 from __future__ import annotations
 
@@ -16,21 +19,18 @@ from flightstack.core.geometry import (
     rotation_vector,
 )
 from flightstack.estimation import derived_generated as derived
-from flightstack.estimation.error_state import (
-    ERROR_STATES,
-    NOMINAL_SIZE,
-    Nominal,
-    corrected,
-    read_nominal,
-    write_nominal,
-)
-from flightstack.estimation.prediction import less_bias, motion_of, moved, with_motion
+from flightstack.estimation import error_state, prediction
+from flightstack.estimation.error_state import ERROR_STATES, NOMINAL_SIZE, Nominal
+from tests.support.generated_c import in_python
 from tools import derive_estimator
-
-pytestmark = pytest.mark.long
 
 ANGLE, VELOCITY, DT_S, GRAVITY = Vector3(0.004, -0.007, 0.003), Vector3(0.02, -0.03, -0.08), 0.008, 9.80665
 STEP = 1e-6
+read_nominal, write_nominal = in_python(error_state.read_nominal), in_python(error_state.write_nominal)
+corrected, less_bias = in_python(error_state.corrected), in_python(prediction.less_bias)
+motion_of, with_motion = in_python(prediction.motion_of), in_python(prediction.with_motion)
+moved = in_python(prediction.moved)
+predict_covariance = in_python(derived.predict_covariance)
 
 
 def nominal() -> Nominal:
@@ -68,7 +68,7 @@ def test_covariance_prediction_is_that_of_the_propagated_state() -> None:
     root = np.random.default_rng(7).normal(size=(ERROR_STATES, ERROR_STATES))
     p = root @ root.T
     expected = numeric @ p @ numeric.T
-    derived.predict_covariance(p, n.attitude, less_bias(VELOCITY, n.accel_bias_m_s2, DT_S), DT_S)
+    predict_covariance(p, n.attitude, less_bias(VELOCITY, n.accel_bias_m_s2, DT_S), DT_S)
     upper = np.triu_indices(ERROR_STATES)
     # first order in the step: 7.5e-3 of values around 25; an element read after its change would give 0.2
     assert np.abs(p[upper] - expected[upper]).max() < 1e-2
@@ -81,7 +81,7 @@ def test_field_jacobian_is_the_derivative_of_the_field(axis: int) -> None:
         return float(body[axis] + n.body_field_frd_gauss[axis])
 
     n, h = nominal(), np.zeros(ERROR_STATES)
-    jacobian = getattr(derived, f"field_{'xyz'[axis]}_jacobian")
+    jacobian = in_python(getattr(derived, f"field_{'xyz'[axis]}_jacobian"))
     predicted = jacobian(n.attitude, n.earth_field_ned_gauss, n.body_field_frd_gauss, h)
     numeric = [
         (field(perturbed(n, i, STEP)) - field(perturbed(n, i, -STEP))) / (2.0 * STEP)
@@ -101,7 +101,7 @@ def test_drag_jacobian_is_the_derivative_of_the_drag(axis: int) -> None:
         return float(n.accel_bias_m_s2[axis] - rate * relative[axis])
 
     n, h = nominal(), np.zeros(ERROR_STATES)
-    jacobian = getattr(derived, f"drag_{'xy'[axis]}_jacobian")
+    jacobian = in_python(getattr(derived, f"drag_{'xy'[axis]}_jacobian"))
     predicted = jacobian(
         n.attitude, n.velocity_ned_m_s, n.accel_bias_m_s2, n.wind_north_m_s, n.wind_east_m_s, rate, h
     )
@@ -120,5 +120,6 @@ def test_nominal_state_survives_its_array_form() -> None:
     assert isinstance(n.attitude, Quaternion)
 
 
+@pytest.mark.long
 def test_derived_module_is_up_to_date() -> None:
     assert derive_estimator.MODULE.read_text(encoding="utf-8") == derive_estimator.generated()

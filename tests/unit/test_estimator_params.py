@@ -7,8 +7,8 @@ import pytest
 from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits, tuning_of
 from flightstack.params.config import StackConfig
 from flightstack.params.estimator import ESTIMATOR_PARAMS, ESTIMATOR_SPECS
-from flightstack.testing import World
 from flightstack.vehicle.parameters import declared
+from tests.support.truth import World
 
 
 def test_defaults_of_parameters_are_those_of_the_filter() -> None:

@@ -31,8 +31,8 @@ from flightstack.simulator_link.sensor_frames import (
     HilGps,
 )
 from flightstack.simulator_link.sensor_inbox import FlowReport, HilReport, RangeReport, SensorInbox
-from sim_bridge.plant.fault_schedule import parse_fault
-from sim_bridge.plant.fault_table import SENSORS
+from sim_bridge.plant.faults.schedule import parse_fault
+from sim_bridge.plant.faults.table import SENSORS
 from sim_bridge.plant.plant import InitialState, PlantOptions
 from sim_bridge.server.failure_command import inject_failure
 from sim_bridge.simulator import Simulator

@@ -9,8 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from flightstack.core.contract import Vector3
-from flightstack.core.earth_field import earth_field_ned_gauss
-from flightstack.core.geodesy import GeoPoint
+from flightstack.core.geodesy import GeoPoint, earth_field_ned_gauss
 from flightstack.mavlink.dialect import mavlink
 from sim_bridge.plant.dimensions import foot_z_m, propeller_radius_m
 from sim_bridge.sensors.barometer import Barometer, pressure_altitude_m, standard_pressure_hpa

@@ -13,7 +13,7 @@ from flightstack.mavlink.link import Link
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, ActuatorsFrame
 from flightstack.simulator_link.sensor_frames import ACCEL, BARO, GYRO, MAG
 from sim_bridge.errors import UsageProblemError
-from sim_bridge.plant.fault_schedule import parse_fault
+from sim_bridge.plant.faults.schedule import parse_fault
 from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.sensors.faults import channels_of
 from sim_bridge.server.failure_command import inject_failure

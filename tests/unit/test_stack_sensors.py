@@ -375,3 +375,26 @@ def test_feed_takes_the_first_sensor_of_each_kind() -> None:
         feed.update(link.sensors.take())
     assert [type(sample) for sample in notebook.samples].count(ImuSample) == 2
     assert [type(sample) for sample in notebook.samples].count(MagSample) == 3
+
+
+@pytest.mark.parametrize(
+    ("field", "kind"),
+    [("xgyro", ImuSample), ("zacc", ImuSample), ("ymag", MagSample), ("pressure_alt", BaroSample)],
+)
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_measurement_that_is_not_finite_is_none(field: str, kind: type, value: float) -> None:
+    """The filter would drop it and the sensor would not count as missing: the estimate stood still in flight."""
+    link, codec, notebook = stack(), Link(1, 51), Notebook()
+    feed = SensorFeed(notebook, link.state)
+    for step in range(1, 5):
+        message = hil_sensor(4000 * step)
+        if step == 3:
+            setattr(message, field, value)
+        receive(link, codec.encode(message))
+        assert link.sensors is not None
+        feed.update(link.sensors.take())
+        if step == 3:
+            assert feed.lanes[0].measured_us == (4000 if kind is ImuSample else 8000)
+    times = [sample.time_s for sample in notebook.samples if isinstance(sample, kind)]
+    assert 0.008 not in times  # the first one is at 0
+    assert times[-1] == 0.012

@@ -1,0 +1,40 @@
+/* Generated from Python by flightstack.firmware.generator: do not edit. */
+/*
+ * Yaw from GNSS velocity: a bank of models that start at yaws all around, weighed by how well each predicts velocity.
+ * flightstack/estimation/yaw_estimator.py
+ */
+#ifndef FS_YAW_ESTIMATOR_H
+#define FS_YAW_ESTIMATOR_H
+
+#include "fs_types.h"
+
+/* Return the attitude of a model. yaw_estimator.py:34 */
+fs_quaternion fs_attitude_of(const fs_real models[5][32], int32_t number);
+
+/*
+ * Move all models over a step: rotation vector and velocity change in the body frame, biases removed.
+ * yaw_estimator.py:68
+ */
+void fs_predict_models(fs_real models[5][32], const fs_vector3 *angle, const fs_vector3 *delta_velocity,
+                       fs_real dt_s);
+
+/* Start with the tilt of attitude, yaws all around it, and a measured velocity. yaw_estimator.py:52 */
+void fs_start_models(fs_real models[5][32], const fs_quaternion *attitude, fs_real north_m_s, fs_real east_m_s,
+                     fs_real variance);
+
+/* Fuse a velocity with all models, and multiply the weight of each by its likelihood. yaw_estimator.py:123 */
+void fs_update_models(fs_real models[5][32], fs_real north_m_s, fs_real east_m_s, fs_real variance);
+
+/* Return the angle [rad] about the vertical from attitude to the weighted mean of the models. yaw_estimator.py:138 */
+fs_real fs_mean_turn(const fs_real models[5][32], const fs_quaternion *attitude);
+
+/* Return the variance [rad^2] of the models' yaw about turn_rad. yaw_estimator.py:149 */
+fs_real fs_variance_of(const fs_real models[5][32], const fs_quaternion *attitude, fs_real turn_rad);
+
+/* Return the number of the model with the largest weight. yaw_estimator.py:159 */
+int32_t fs_likeliest(const fs_real models[5][32]);
+
+/* Return the variance [rad^2] of a model's tilt about north (0) or east (1). yaw_estimator.py:40 */
+fs_real fs_tilt_variance(const fs_real models[5][32], int32_t number, int32_t axis);
+
+#endif

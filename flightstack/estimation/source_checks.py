@@ -1,0 +1,186 @@
+"""Checks of the sensors against each other: accelerometer, barometer, GNSS velocity and GNSS position.
+
+The mean of the normalised innovations of a sensor is near zero if filter and sensor agree, whatever the noise. A fault
+shows in the signs of several means, as in PX4's check of the vertical acceleration
+(``Ekf::estimateInertialNavFallingLikelihood``): if GNSS and barometer contradict the prediction alike, the
+accelerometer is wrong; if GNSS velocity contradicts it alone for 2 s, the barometer, which then holds the prediction,
+drifts. Position and velocity of GNSS are compared with each other.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, TypeAlias
+
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import FloatArray
+from flightstack.estimation.error_state import ACCEL_BIAS, BARO_BIAS, POSITION, VELOCITY
+from flightstack.estimation.kalman import (
+    BARO,
+    GNSS_POSITION,
+    GNSS_VELOCITY,
+    INNOVATION,
+    INNOVATION_VARIANCE,
+    NOISE,
+    Filter,
+)
+
+CHECKS_SIZE = 25
+"""Means of the innovations upwards (3); times until which the accelerometer and the barometer count as wrong; altitude
+of the barometer, and the time since which it is equal; time, position and velocity of the last GNSS measurement (7),
+drift of its position from its velocity (3), fault of each axis (3); time since which GNSS velocity contradicts the
+prediction alone, 0 if it does not; means of the innovations of GNSS velocity along north and east, and the time at
+which it contradicted the prediction last, with the sign of its error."""
+Checks: TypeAlias = Annotated[FloatArray, CHECKS_SIZE]
+
+_SPEED, _HEIGHT, _PRESSURE, ACCEL_UNTIL_S, BARO_UNTIL_S = 0, 1, 2, 3, 4
+_ALTITUDE, _EQUAL_SINCE_S, _GNSS_S, _PLACE, _MOTION, _DRIFT = 5, 6, 7, 8, 11, 14
+GNSS_FAULT, _ALONE_SINCE_S, _SIDEWAYS, _ONSET_S = 17, 20, 21, 23
+CONSISTENT, POSITION_DRIFTS, VELOCITY_IS_WRONG = 0.0, 1.0, 2.0
+"""Faults of GNSS along an axis."""
+
+_LEAST_VARIANCE = 1e-12
+_MEAN_S, _LARGEST = 1.0, 3.0
+"""Time constant of a mean, and the largest normalised innovation that counts."""
+_LIMIT, _AGREES = 1.0, 0.3
+"""Mean of white innovations: 0.22 (GNSS, 10 Hz) or 0.1 (barometer, 50 Hz)."""
+_ALONE_S, _ACCEL_HOLD_S, _BARO_HOLD_S = 2.0, 1.0, 10.0
+_ACCEL_DENSITY, _ACCEL_BIAS_DENSITY, _BARO_DENSITY = 1.0, 0.25, 0.25
+"""Variance per second that a wrong sensor adds to vertical velocity, accelerometer bias and barometer bias."""
+WRONG_VELOCITY_M_S = 2.0
+"""Noise of a GNSS velocity that contradicts other sensors; the filter learns the smaller one again."""
+_STUCK_S, _EQUAL_M = 1.0, 1e-9
+_DRIFT_S, _LONGEST_GAP_S, _DRIFT_ACCURACIES, _LEAST_ACCURACY_M = 20.0, 2.0, 4.0, 0.5
+"""The least accuracy keeps the errors of the velocity of a receiver with centimetres from counting as a drift."""
+_ONSET_LASTS_S = 40.0
+"""Time for which a contradiction of GNSS velocity counts as the start of a drift: that of the slowest one, which
+takes so long to exceed the limit."""
+
+
+@compiled
+def _take(c: Checks, at: int, f: Filter, row: int, sign: float, dt_s: float) -> None:
+    """Add the newest innovation of a row to its mean, upwards."""
+    variance = max(f.observations[row, INNOVATION_VARIANCE], _LEAST_VARIANCE)  # 0 before the first fusion
+    value = sign * f.observations[row, INNOVATION] / math.sqrt(variance)
+    value = min(max(value, -_LARGEST), _LARGEST)
+    c[at] += min(dt_s / _MEAN_S, 1.0) * (value - c[at])
+
+
+@compiled
+def take_pressure_innovation(c: Checks, f: Filter, dt_s: float) -> None:
+    """Take the barometer's newest innovation, ``dt_s`` after the one before."""
+    _take(c, _PRESSURE, f, BARO, 1.0, dt_s)
+
+
+@compiled
+def take_horizontal_innovations(c: Checks, f: Filter, dt_s: float) -> None:
+    """Take the horizontal innovations of GNSS velocity, and note when they contradict the prediction."""
+    for axis in range(2):
+        _take(c, _SIDEWAYS + axis, f, GNSS_VELOCITY + axis, 1.0, dt_s)
+        if abs(c[_SIDEWAYS + axis]) > _LIMIT:
+            c[_ONSET_S + axis] = f.clock[0] if c[_SIDEWAYS + axis] > 0.0 else -f.clock[0]
+
+
+@compiled
+def take_gnss_innovations(c: Checks, f: Filter, dt_s: float, has_baro: bool) -> None:
+    """Take the vertical innovations of GNSS, and decide which sensor is wrong."""
+    _take(c, _SPEED, f, GNSS_VELOCITY + 2, -1.0, dt_s)
+    _take(c, _HEIGHT, f, GNSS_POSITION + 2, -1.0, dt_s)
+    up = 1.0 if c[_SPEED] >= 0.0 else -1.0
+    if up * c[_SPEED] < _LIMIT:
+        c[_ALONE_SINCE_S] = 0.0
+        return
+    second = up * (c[_PRESSURE] if has_baro else c[_HEIGHT])
+    if second > _LIMIT:
+        c[ACCEL_UNTIL_S], c[_ALONE_SINCE_S] = f.clock[0] + _ACCEL_HOLD_S, 0.0
+    elif c[_ALONE_SINCE_S] == 0.0:
+        c[_ALONE_SINCE_S] = f.clock[0]
+    elif f.clock[0] - c[_ALONE_SINCE_S] > _ALONE_S:
+        if (
+            min(_AGREES - second, up * c[_HEIGHT] - _AGREES) > 0.0
+        ):  # GNSS height sides with it, and the other does not
+            c[BARO_UNTIL_S] = f.clock[0] + _BARO_HOLD_S
+        else:  # nothing sides with the velocity
+            f.observations[GNSS_VELOCITY + 2, NOISE] = WRONG_VELOCITY_M_S * WRONG_VELOCITY_M_S
+
+
+@compiled
+def add_fault_noise(c: Checks, f: Filter, dt_s: float) -> None:
+    """Add the uncertainty of the sensors that count as wrong, so that the filter learns their error anew."""
+    p = f.covariance
+    if f.clock[0] < c[ACCEL_UNTIL_S]:
+        p[VELOCITY + 2, VELOCITY + 2] += _ACCEL_DENSITY * dt_s
+        p[ACCEL_BIAS + 2, ACCEL_BIAS + 2] += _ACCEL_BIAS_DENSITY * dt_s
+    if f.clock[0] < c[BARO_UNTIL_S]:
+        p[BARO_BIAS, BARO_BIAS] += _BARO_DENSITY * dt_s
+
+
+@compiled
+def is_stuck(c: Checks, altitude_m: float, now_s: float) -> bool:
+    """Return True if the barometer has repeated its altitude for 1 s; its noise changes each measurement."""
+    if abs(altitude_m - c[_ALTITUDE]) > _EQUAL_M:
+        c[_ALTITUDE], c[_EQUAL_SINCE_S] = altitude_m, now_s
+    equal_s: float = now_s - c[_EQUAL_SINCE_S]
+    return equal_s > _STUCK_S
+
+
+@compiled
+def follow_drift(c: Checks, f: Filter, row: FloatArray, eph_m: float) -> None:
+    """Compare the changes of the position of a GNSS measurement with its velocity, over 20 s.
+
+    A horizontal axis has a fault above four times the accuracy that the receiver states, and until it is below half of
+    that. A jump counts as a change of one accuracy: the gate of the innovation refuses it. The barometer watches the
+    height.
+    """
+    dt_s = row[0] - c[_GNSS_S]
+    accuracy_m = max(eph_m, _LEAST_ACCURACY_M)
+    for axis in range(2):
+        place, speed, fault = row[1 + axis], row[4 + axis], c[GNSS_FAULT + axis]
+        if c[_GNSS_S] == 0.0 or dt_s > _LONGEST_GAP_S:
+            c[_DRIFT + axis] = 0.0
+        else:
+            change = place - c[_PLACE + axis] - 0.5 * dt_s * (speed + c[_MOTION + axis])
+            change = min(max(change, -accuracy_m), accuracy_m)
+            c[_DRIFT + axis] += change - min(dt_s / _DRIFT_S, 1.0) * c[_DRIFT + axis]
+        c[_PLACE + axis], c[_MOTION + axis] = place, speed
+        limit_m = _DRIFT_ACCURACIES * accuracy_m * (1.0 if fault == CONSISTENT else 0.5)
+        if abs(c[_DRIFT + axis]) <= limit_m:
+            c[GNSS_FAULT + axis] = CONSISTENT
+        elif fault == CONSISTENT:
+            _start_fault(c, f, axis)
+        elif fault == POSITION_DRIFTS:
+            _doubt_position(c, f, axis, dt_s)
+    c[_GNSS_S] = row[0]
+
+
+@compiled
+def _start_fault(c: Checks, f: Filter, axis: int) -> None:
+    """Decide which of GNSS position and velocity is wrong along an axis.
+
+    A velocity that becomes wrong contradicts the inertial sensor at that time, a position that begins to drift does
+    not. A wrong velocity has moved position and velocity of the filter by as much as the drift, and has noise from now
+    on.
+    """
+    drift_m, onset_s, p = c[_DRIFT + axis], c[_ONSET_S + axis], f.covariance
+    left_s = _ONSET_LASTS_S - (f.clock[0] - abs(onset_s))
+    if min(left_s, -onset_s * drift_m) > 0.0:
+        c[GNSS_FAULT + axis] = VELOCITY_IS_WRONG
+        p[VELOCITY + axis, VELOCITY + axis] += drift_m * drift_m / (_DRIFT_S * _DRIFT_S)
+        p[POSITION + axis, POSITION + axis] += drift_m * drift_m
+    else:
+        c[GNSS_FAULT + axis] = POSITION_DRIFTS
+
+
+@compiled
+def _doubt_position(c: Checks, f: Filter, axis: int, dt_s: float) -> None:
+    """Let the position become uncertain at the rate of the drift, for the velocity may be wrong instead."""
+    at = POSITION + axis
+    grown_m = math.sqrt(f.covariance[at, at]) + abs(c[_DRIFT + axis]) / _DRIFT_S * dt_s
+    f.covariance[at, at] = grown_m * grown_m
+
+
+@compiled
+def position_drifts(c: Checks) -> bool:
+    """Return True if the GNSS position drifts from its velocity along an axis."""
+    north, east = c[GNSS_FAULT], c[GNSS_FAULT + 1]
+    return bool(min(abs(north - POSITION_DRIFTS), abs(east - POSITION_DRIFTS)) == 0.0)

@@ -1,0 +1,98 @@
+"""Growth of the errors of dead reckoning against its closed form, for a level vehicle that stands still.
+
+With white noise of the densities q_g of the gyro and q_a of the accelerometer, and constant biases b_g and b_a, the
+variances of tilt, velocity and position after t are, with gravity g (Titterton and Weston, Strapdown Inertial
+Navigation Technology, chapter 12):
+
+    tilt      q_g t                       b_g² t²
+    velocity  q_a t + g² q_g t³ / 3       b_a² t² + g² b_g² t⁴ / 4
+    position  q_a t³ / 3 + g² q_g t⁵ / 20 b_a² t⁴ / 4 + g² b_g² t⁶ / 36
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from flightstack.core.contract import Vector3
+from flightstack.estimation.error_state import (
+    ACCEL_BIAS,
+    ATTITUDE,
+    ERROR_STATES,
+    GYRO_BIAS,
+    NOMINAL_SIZE,
+    POSITION,
+    VELOCITY,
+)
+from flightstack.estimation.estimator_params import EstimatorParams
+from flightstack.estimation.kalman import OBSERVATION_COLUMNS, OBSERVATIONS, Filter
+from flightstack.estimation.prediction import DeltaSample, predict
+
+QUIET = EstimatorParams()._replace(
+    gyro_noise=0.0, accel_noise=0.0, gyro_bias_walk=0.0, accel_bias_walk=0.0, gyro_scale_error=0.0
+)
+GRAVITY, STEP_S = QUIET.gravity_m_s2, 0.008
+NONE = Vector3(0.0, 0.0, 0.0)
+
+
+def still(seconds: float, params: EstimatorParams, gyro_bias: float = 0.0, accel_bias: float = 0.0) -> Filter:
+    """Predict a vehicle that stands still, with uncertain biases of these deviations."""
+    vectors = (np.zeros(ERROR_STATES) for _ in range(3))
+    observations = np.zeros((OBSERVATIONS, OBSERVATION_COLUMNS))
+    f = Filter(
+        np.zeros(NOMINAL_SIZE), np.zeros((ERROR_STATES, ERROR_STATES)), observations, *vectors, np.zeros(2)
+    )
+    f.nominal[0] = 1.0
+    for axis in range(3):
+        f.covariance[GYRO_BIAS + axis, GYRO_BIAS + axis] = gyro_bias * gyro_bias
+        f.covariance[ACCEL_BIAS + axis, ACCEL_BIAS + axis] = accel_bias * accel_bias
+    lift = Vector3(0.0, 0.0, -GRAVITY * STEP_S)
+    for step in range(round(seconds / STEP_S)):
+        predict(f, DeltaSample((step + 1) * STEP_S, STEP_S, NONE, lift, NONE, NONE), params)
+    return f
+
+
+def variances(f: Filter) -> list[float]:
+    """Return the variances of tilt, velocity and position along north."""
+    return [float(f.covariance[at, at]) for at in (ATTITUDE, VELOCITY, POSITION)]
+
+
+@pytest.mark.parametrize("t", [1.0, 10.0, 60.0])
+def test_white_noise_grows_as_a_random_walk_and_its_integrals(t: float) -> None:
+    gyro, accel = 8e-4, 0.012
+    found = variances(still(t, QUIET._replace(gyro_noise=gyro, accel_noise=accel)))
+    qg, qa = gyro * gyro, accel * accel
+    expected = [
+        qg * t,
+        qa * t + GRAVITY**2 * qg * t**3 / 3.0,
+        qa * t**3 / 3.0 + GRAVITY**2 * qg * t**5 / 20.0,
+    ]
+    assert found == pytest.approx(expected, rel=0.03)  # of steps of 8 ms: 1.2 % after 1 s, less later
+
+
+@pytest.mark.parametrize("t", [1.0, 10.0, 60.0])
+def test_constant_biases_grow_with_powers_of_the_time(t: float) -> None:
+    gyro, accel = 0.001, 0.05
+    found = variances(still(t, QUIET, gyro, accel))
+    expected = [
+        gyro**2 * t**2,
+        accel**2 * t**2 + GRAVITY**2 * gyro**2 * t**4 / 4.0,
+        accel**2 * t**4 / 4.0 + GRAVITY**2 * gyro**2 * t**6 / 36.0,
+    ]
+    assert found == pytest.approx(expected, rel=0.03)
+
+
+def test_state_moves_by_a_bias_as_the_covariance_says() -> None:
+    """A gyro bias about north by 1 mrad/s accelerates to the east with g b t, and moves by g b t³ / 6."""
+    t, bias = 20.0, 1e-3
+    f = still(0.0, QUIET)
+    for step in range(round(t / STEP_S)):
+        angle = Vector3(bias * STEP_S, 0.0, 0.0)
+        lift = Vector3(0.0, 0.0, -GRAVITY * STEP_S)
+        predict(f, DeltaSample((step + 1) * STEP_S, STEP_S, angle, lift, NONE, NONE), QUIET)
+    assert f.nominal[5] == pytest.approx(0.5 * GRAVITY * bias * t * t, rel=0.01)
+    assert f.nominal[8] == pytest.approx(GRAVITY * bias * t**3 / 6.0, rel=0.01)
+    deviation = math.sqrt(variances(still(t, QUIET, bias))[2])
+    assert f.nominal[8] == pytest.approx(deviation, rel=0.01)
