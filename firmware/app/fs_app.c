@@ -52,6 +52,8 @@ void fs_app_init(fs_app *app, const fs_port *port)
     app->alarm = NULL;
     app->alarm_severity = 0U;
     app->next_listed = fs_param_count();
+    app->sensed.kind = 0UL;
+    app->sensed.has_answer = 0U;
     fs_app_baud_init(app);
     fs_app_free_init(app);
     fs_app_forget_flight(app);
@@ -84,6 +86,9 @@ static void handle(fs_app *app)
     case FS_PIL_STATE_ID:
         fs_app_on_state(app);
         break;
+    case FS_PIL_SENSE_ID:
+        fs_app_on_sense(app);
+        break;
     case FS_PARAM_REQUEST_LIST_ID:
         fs_app_on_param_list(app);
         break;
@@ -99,7 +104,7 @@ static void handle(fs_app *app)
     case FS_PING_ID:
         fs_app_on_ping(app);
         break;
-    default: /* what others tell of themselves */
+    default: /* messages about other systems */
         break;
     }
 }
@@ -175,10 +180,10 @@ void fs_app_poll(fs_app *app, uint32_t now_ms)
     app->is_polled = 1U;
 }
 
-/* Lower *wait_ms to what is left of a period. */
+/* Lower *wait_ms to the rest of a period. */
 static void wait_at_most(const fs_app *app, uint32_t since_ms, uint32_t period_ms, uint32_t *wait_ms)
 {
-    uint32_t left_ms = period_ms - (app->now_ms - since_ms); /* what is overdue was done by the last fs_app_poll */
+    uint32_t left_ms = period_ms - (app->now_ms - since_ms); /* overdue tasks ran in the last fs_app_poll */
 
     if (left_ms < *wait_ms) {
         *wait_ms = left_ms;

@@ -1,5 +1,5 @@
 /*
- * What a target does: it runs the loops step by step for a host, and lets ground stations read and set its parameters.
+ * The application of a target: it runs the loops step by step for a host, and serves its parameters to ground stations.
  *
  * The application has neither interrupts nor hardware. A port gives it octets and the time, and takes octets from it, all
  * from one main loop:
@@ -46,11 +46,20 @@
 #define FS_APP_OVERRUN 0x40000UL
 #define FS_APP_BAD_INPUT 0x80000UL
 
-#define FS_APP_PROTOCOL 2U /* version of the FS_PIL messages: FS_PIL_IDENTITY.protocol */
+/* FS_PIL_SENSE.kind; smaller numbers are those of the estimator's rings */
+#define FS_SENSE_IMU 10UL
+#define FS_SENSE_EARTH 11UL
+#define FS_SENSE_LANDED 12UL
+#define FS_SENSE_PARAMS 13UL
+#define FS_SENSE_CLEAR 14UL
+#define FS_SENSE_START 15UL
+#define FS_SENSE_READ 16UL
+
+#define FS_APP_PROTOCOL 3U /* version of the FS_PIL messages: FS_PIL_IDENTITY.protocol */
 #define FS_APP_WINDOW 8U   /* steps whose answers are kept, so that a host may send as many before the first answer */
 
 #define FS_APP_STEP_TIMEOUT_MS 1000UL /* without a step: no host steps any more */
-#define FS_APP_SILENCE_MS 20UL        /* without an octet: what is held of a frame will not be completed */
+#define FS_APP_SILENCE_MS 20UL        /* without an octet: an incomplete frame is dropped */
 #define FS_APP_REST_TIMEOUT_MS 5000UL /* free-running at rest without a frame: stop */
 #define FS_APP_BAUD_TRIAL_MS 1000UL /* at a new baud rate without a frame: go back; also until a change must begin */
 #define FS_APP_PERIOD_MS 1000UL       /* between heartbeats, between status messages, between complaints */
@@ -68,13 +77,15 @@ typedef struct {
     uint32_t baud;                      /* of the line at the start; 0: it has no rate */
     uint16_t (*can_set_baud)(uint32_t baud); /* 1: the line can run at this rate; NULL: the rate is fixed */
     uint16_t (*set_baud)(uint32_t baud);     /* change the rate; 0: not yet, octets are still being sent */
+    uint16_t (*sense)(const fs_pil_sense *event, fs_pil_estimate *estimate); /* fs_sensing.h; NULL: no estimator */
+    void (*read_estimator)(fs_pil_memory *words);
 } fs_port;
 
 /* The baud rate of the line; see fs_app_baud.c. */
 typedef struct {
     uint32_t baud, next, former;     /* present one; another one if a change is due; the one to go back to */
     uint32_t since_ms, unframed_ms;  /* when it began or was commanded; when the first octet without a frame came */
-    uint16_t is_on_trial, is_unframed, has_heard; /* the last: a frame, since noise was looked for */
+    uint16_t is_on_trial, is_unframed, has_heard; /* the last: a frame, since the search for noise */
 } fs_line;
 
 /* A step and its report, for the case that the report is lost. */
@@ -83,6 +94,13 @@ typedef struct {
     fs_pil_report report;
     uint16_t is_short; /* 1: it came as an FS_PIL_TICK, and is answered by an FS_PIL_OUTPUT */
 } fs_answered;
+
+/* The last event of the estimator, for the case that its answer is lost; see fs_app_sense.c. */
+typedef struct {
+    fs_pil_estimate answer;
+    uint32_t kind;
+    uint16_t has_answer;
+} fs_sensed;
 
 /* Free-running; see fs_app_free.c. */
 typedef struct {
@@ -98,7 +116,7 @@ typedef struct {
     uint32_t aged, window_ms; /* ticks with an age in this window; when it began */
 } fs_free;
 
-/* The state of the application: the caller owns it, and looks only at what fs_app_* functions tell. */
+/* The state of the application: the caller owns it, and reads it only through fs_app_* functions. */
 typedef struct {
     const fs_port *port;
     fs_loops loops;
@@ -109,7 +127,7 @@ typedef struct {
 
     uint32_t now_ms, last_octet_ms, last_frame_ms, last_step_ms, last_heartbeat_ms, last_status_ms, last_complaint_ms;
     uint32_t clock_overhead; /* cost of a clock reading; costs are told without it */
-    uint16_t is_polled;    /* the three times of last news mean something */
+    uint16_t is_polled;    /* the three times of the last reports are valid */
     uint16_t has_received; /* octets since the last poll */
     uint16_t state;        /* FS_APP_READY … */
 
@@ -118,6 +136,7 @@ typedef struct {
     uint16_t kept, newest;               /* how many there are; place of the last one */
     uint32_t steps, repeats, out_of_order, loop_overruns, safe_states;
 
+    fs_sensed sensed;
     fs_line line;
     fs_free free_run;
     uint32_t uart_overruns, uart_errors, told_overruns; /* the last: of those that were complained about */
@@ -135,7 +154,7 @@ void fs_app_receive(fs_app *app, fs_octet octet);
 /* Note what the serial port has lost since the start, as totals: octets overrun; framing, parity and break errors. */
 void fs_app_uart_errors(fs_app *app, uint32_t overruns, uint32_t errors);
 
-/* Do what is due by the port's time, which counts modulo 2^32: heartbeat, status, time-outs. */
+/* Run the tasks that are due by the port's time, which counts modulo 2^32: heartbeat, status, time-outs. */
 void fs_app_poll(fs_app *app, uint32_t now_ms);
 
 /* Free-running: note the port's time, which counts modulo 2^32, and run the tick that is due. From each pass. */

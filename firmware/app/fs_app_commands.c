@@ -26,7 +26,7 @@ static uint16_t send_identity(fs_app *app)
     message.char_bits = CHAR_BIT;
     fs_text_put(message.board, BOARD_SIZE, app->port->board);
     fs_text_put(message.compiler, COMPILER_SIZE, app->port->compiler);
-    message.compiler[COMPILER_SIZE - 1U] = 0U; /* a cut version must not look whole to who wants a NUL */
+    message.compiler[COMPILER_SIZE - 1U] = 0U; /* a truncated version still ends with NUL */
     message.protocol = FS_APP_PROTOCOL;
     message.window = FS_APP_WINDOW;
     message.baud = app->line.baud;
@@ -90,7 +90,7 @@ static void tell_reboot(fs_app *app)
 
 /*
  * Begin anew as after power-up, but for the counters: parameters at their defaults, no flight. A target that was
- * stopped stays so: only a host that knows of it, and says RESET, lets it fly again.
+ * stopped stays so: only a host that sends RESET starts it again.
  */
 static uint16_t reboot(fs_app *app, float what)
 {

@@ -34,6 +34,9 @@ void fs_app_forget_flight(fs_app *app); /* step 0 or one with RESET is expected 
 uint16_t fs_app_is_overrun(const fs_app *app, const fs_loop_cost *cost);
 void fs_app_take_overhead_out(const fs_app *app, fs_loop_cost *cost); /* the readings of the clock */
 
+/* fs_app_sense.c: the estimator */
+void fs_app_on_sense(fs_app *app);
+
 /* fs_app_free.c */
 void fs_app_free_init(fs_app *app);
 uint16_t fs_app_free_command(fs_app *app, float what, float every, float timeout_ms);

@@ -156,7 +156,7 @@ static void take_step(fs_app *app, const fs_pil_step *step, uint16_t is_short)
     uint16_t is_reset = ((step->flags & FS_RESET) != 0UL) ? 1U : 0U;
 
     if ((app->free_run.is_on != 0U) && (app->free_run.is_flying == 0U) && (is_reset != 0U)) {
-        fs_app_free_stop(app); /* the host that let it run is gone */
+        fs_app_free_stop(app); /* the host that started the free run is gone */
     }
     if (before != NULL) {
         app->repeats++;

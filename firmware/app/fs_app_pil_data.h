@@ -9,7 +9,7 @@
 uint16_t fs_pil_is_same(const fs_pil_step *one, const fs_pil_step *other);
 
 /*
- * Return what is wrong with a step, to be told: a number that its flags make an input is not finite, or the flags are
+ * Return the error of a step, for the report: a number that its flags make an input is not finite, or the flags are
  * none that this target knows, or ask for two meanings of the setpoint at once. NULL when it is sound.
  */
 const char *fs_pil_fault_of(const fs_pil_step *step, uint16_t is_short);

@@ -2,7 +2,7 @@
 #ifndef FS_BUILD_H
 #define FS_BUILD_H
 
-/* First 8 octets of the SHA-256 of the sources, given by who compiles: -DFS_SOURCE_HASH=0x12U,0x34U,... */
+/* First 8 octets of the SHA-256 of the sources, given to the compiler: -DFS_SOURCE_HASH=0x12U,0x34U,... */
 #ifndef FS_SOURCE_HASH
 #define FS_SOURCE_HASH 0U, 0U, 0U, 0U, 0U, 0U, 0U, 0U
 #endif
@@ -10,7 +10,7 @@
 #define FS_TEXT_OF(number) #number
 #define FS_TEXT(number) FS_TEXT_OF(number)
 
-/* 47 characters of it are told; who compiles may know better: -DFS_COMPILER="..." */
+/* 47 characters of it are sent; a build may replace it: -DFS_COMPILER="..." */
 #if defined(FS_COMPILER)
 /* given */
 #elif defined(__TI_COMPILER_VERSION__)

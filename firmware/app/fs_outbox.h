@@ -12,7 +12,7 @@
 #define FS_OUTBOX_SIZE 2048U /* octets: 178 ms at 115200 baud */
 
 /* Reserves, in octets that must stay free. A report's frame has 160: those of a window of 8 have 1280. */
-#define FS_OUTBOX_ALARM 0U   /* why the rotors are stopped: whoever listens has to know */
+#define FS_OUTBOX_ALARM 0U   /* reason that the rotors are stopped, for every listener */
 #define FS_OUTBOX_REPORT 0U  /* reports of steps: what a host waits for in each step */
 #define FS_OUTBOX_ANSWER 1344U /* answers to requests, which are asked again when they are lost */
 #define FS_OUTBOX_NEWS 1664U  /* heartbeat, status, texts: a later one replaces them */

@@ -19,7 +19,27 @@ static fs_vector3 clipped(const fs_vector3 *v, fs_real limit)
     return (fs_vector3){v->x * scale, v->y * scale, v->z * scale};
 }
 
-/* attitude_reference.py:61 */
+/* Return the body rates after dt_s [rad/s], with the limits of acceleration and rate. attitude_reference.py:61 */
+static fs_vector3 advanced_rates(const fs_reference_memory *memory, const fs_vector3 *error,
+                                 const fs_reference_params *params, fs_real dt_s)
+{
+    const fs_real stiffness = params->bandwidth_rad_s * params->bandwidth_rad_s;
+    const fs_real friction = FS_LIT(2.0) * params->damping * params->bandwidth_rad_s;
+    const fs_vector3 v = {
+        .x = stiffness * error->x - friction * memory->p_rad_s,
+        .y = stiffness * error->y - friction * memory->q_rad_s,
+        .z = stiffness * error->z - friction * memory->r_rad_s,
+    };
+    const fs_vector3 acceleration = clipped(&v, params->max_acceleration_rad_s2);
+    const fs_vector3 v_2 = {
+        .x = memory->p_rad_s + acceleration.x * dt_s,
+        .y = memory->q_rad_s + acceleration.y * dt_s,
+        .z = memory->r_rad_s + acceleration.z * dt_s,
+    };
+    return clipped(&v_2, params->max_rate_rad_s);
+}
+
+/* attitude_reference.py:84 */
 void fs_attitude_reference_step(const fs_reference_memory *memory, const fs_quaternion *target,
                                 const fs_reference_params *params, fs_real dt_s, fs_reference_memory *advanced_out,
                                 fs_attitude_reference *attitude_reference_out)
@@ -43,22 +63,9 @@ void fs_attitude_reference_step(const fs_reference_memory *memory, const fs_quat
     const fs_quaternion conjugate = fs_conjugate(&attitude);
     const fs_quaternion quaternion_product = fs_quaternion_product(&conjugate, target);
     const fs_vector3 error = fs_rotation_vector(&quaternion_product);
-    const fs_real stiffness = params->bandwidth_rad_s * params->bandwidth_rad_s;
-    const fs_real friction = FS_LIT(2.0) * params->damping * params->bandwidth_rad_s;
-    const fs_vector3 v = {
-        .x = stiffness * error.x - friction * memory->p_rad_s,
-        .y = stiffness * error.y - friction * memory->q_rad_s,
-        .z = stiffness * error.z - friction * memory->r_rad_s,
-    };
-    fs_vector3 acceleration = clipped(&v, params->max_acceleration_rad_s2);
-    const fs_vector3 v_2 = {
-        .x = memory->p_rad_s + acceleration.x * dt_s,
-        .y = memory->q_rad_s + acceleration.y * dt_s,
-        .z = memory->r_rad_s + acceleration.z * dt_s,
-    };
-    const fs_vector3 rates = clipped(&v_2, params->max_rate_rad_s);
+    const fs_vector3 rates = advanced_rates(memory, &error, params, dt_s);
     /* after the limits */
-    acceleration = (fs_vector3){
+    const fs_vector3 acceleration = {
         .x = (rates.x - memory->p_rad_s) / dt_s,
         .y = (rates.y - memory->q_rad_s) / dt_s,
         .z = (rates.z - memory->r_rad_s) / dt_s,
@@ -79,7 +86,7 @@ void fs_attitude_reference_step(const fs_reference_memory *memory, const fs_quat
     *attitude_reference_out = (fs_attitude_reference){attitude, rates, acceleration};
 }
 
-/* attitude_reference.py:105 */
+/* attitude_reference.py:111 */
 fs_attitude_reference fs_in_body_frame(const fs_attitude_reference *reference, const fs_quaternion *attitude)
 {
     const fs_quaternion conjugate = fs_conjugate(attitude);

@@ -6,9 +6,9 @@
 #include "fs_math.h"
 #include "fs_types.h"
 
-#define FS_LARGEST_SQUARE FS_LIT(0.1715)
-#define FS_LEAST_LENGTH FS_LIT(1e-30)
-#define FS_SMALL_SQUARE FS_LIT(0.01)
+#define FS_GEOMETRY_LARGEST_SQUARE FS_LIT(0.1715)
+#define FS_GEOMETRY_LEAST_LENGTH FS_LIT(1e-30)
+#define FS_GEOMETRY_SMALL_SQUARE FS_LIT(0.01)
 
 /*
  * Logarithm of a quaternion of any length: axis times angle [rad], angle in [0, pi]; zero for the zero quaternion.
@@ -24,7 +24,8 @@ static inline fs_vector3 fs_rotation_vector(const fs_quaternion *q)
     fs_real inverse;
     fs_real ratio_square;
     fs_real scale;
-    if (square < FS_LARGEST_SQUARE * w_square) { /* below 45 degrees: 2 atan(norm / w) / norm, without the norm */
+    /* below 45 degrees: 2 atan(norm / w) / norm, without the norm */
+    if (square < FS_GEOMETRY_LARGEST_SQUARE * w_square) {
         inverse = FS_LIT(1.0) / q->w;
         ratio_square = square * inverse * inverse;
         scale = FS_LIT(2.0) * inverse;
@@ -32,7 +33,7 @@ static inline fs_vector3 fs_rotation_vector(const fs_quaternion *q)
         /* the tangent of an eighth of the angle: tan(a/2) = sin a / (cos a + 1), twice */
         const fs_real half = fs_abs(q->w) + fs_sqrt(w_square + square);
         const fs_real quarter = half + fs_sqrt(half * half + square);
-        inverse = FS_LIT(1.0) / fs_max(quarter, FS_LEAST_LENGTH);
+        inverse = FS_LIT(1.0) / fs_max(quarter, FS_GEOMETRY_LEAST_LENGTH);
         ratio_square = square * inverse * inverse;
         scale = q->w >= FS_LIT(0.0) ? FS_LIT(8.0) * inverse : FS_LIT(-8.0) * inverse;
     }
@@ -77,7 +78,7 @@ static inline fs_quaternion fs_rotation_over(const fs_vector3 *rates, fs_real dt
     fs_real sine;
     fs_real w;
     fs_real scale;
-    if (square <= FS_SMALL_SQUARE) { /* Taylor's series of cosine and of sine by angle: no norm needed */
+    if (square <= FS_GEOMETRY_SMALL_SQUARE) { /* Taylor's series of cosine and of sine by angle: no norm needed */
         const fs_real cosine = (square * (FS_LIT(1.0) / FS_LIT(40320.0)) - FS_LIT(1.0) / FS_LIT(720.0)) * square +
                                FS_LIT(1.0) / FS_LIT(24.0);
         sine = ((square * (FS_LIT(1.0) / FS_LIT(362880.0)) - FS_LIT(1.0) / FS_LIT(5040.0)) * square +

@@ -2,7 +2,7 @@
 
 /*
  * pi/2 in three parts. The first two are so short that their product with the number of quarter turns, 13 bits for the
- * largest angle, is exact; so are the two differences, and what is left of the angle has almost no error.
+ * largest angle, is exact; so are the two differences, and the rest of the angle has almost no error.
  */
 #ifdef FS_DOUBLE
 #define HALF_PI_1 1.570796326734125614166259765625

@@ -17,7 +17,7 @@
 #define FS_LARGEST_ANGLE_RAD FS_LIT(10000.0)
 
 /*
- * Sine and cosine of an angle [rad]; both NaN beyond FS_LARGEST_ANGLE_RAD and for what is not finite.
+ * Sine and cosine of an angle [rad]; both NaN beyond FS_LARGEST_ANGLE_RAD and if not finite.
  *
  * Error: see docs/explanation/firmware.md; tests/firmware/test_core_math.py measures it.
  */

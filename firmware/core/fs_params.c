@@ -112,7 +112,7 @@ uint16_t fs_param_set(fs_loops *loops, uint16_t index, fs_real value)
         return FS_PARAM_REFUSED;
     }
     before = *place;
-    *place = value; /* also 0 in place of -0, which are equal: what is read back shall be what was set */
+    *place = value; /* also 0 in place of -0, which are equal: a value reads back as it was set */
     if (!fs_param_is_consistent(loops)) {
         *place = before;
         return FS_PARAM_REFUSED;

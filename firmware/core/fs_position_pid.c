@@ -24,6 +24,16 @@ static void horizontal_demand(const fs_position_memory *memory, const fs_vehicle
     *east_out = east;
 }
 
+/* Return the upward specific force [m/s^2]. position_pid.py:71 */
+static fs_real lift_demand(const fs_position_memory *memory, const fs_vehicle_state *state,
+                           const fs_position_setpoint *setpoint, const fs_position_params *params)
+{
+    const fs_real error_z = setpoint->position_ned_m.z - state->position_ned_m.z;
+    const fs_real down = setpoint->acceleration_ned_m_s2.z + params->kp_z * error_z +
+                         params->kd_z * (setpoint->velocity_ned_m_s.z - state->velocity_ned_m_s.z) + memory->z;
+    return params->gravity_m_s2 - down;
+}
+
 /*
  * Return the attitude with this yaw whose thrust axis is along (forward, right, upward), upward positive.
  *
@@ -31,7 +41,7 @@ static void horizontal_demand(const fs_position_memory *memory, const fs_vehicle
  * tangents of the half angles are -forward / (level + upward) and right / (whole + level), without cancellation. One
  * common scale converts them to sines and cosines.
  *
- * position_pid.py:125
+ * position_pid.py:133
  */
 static fs_quaternion attitude_along(fs_real forward, fs_real right, fs_real upward, fs_real half_yaw_sine,
                                     fs_real half_yaw_cosine)
@@ -57,7 +67,7 @@ static fs_quaternion attitude_along(fs_real forward, fs_real right, fs_real upwa
     };
 }
 
-/* position_pid.py:150 */
+/* position_pid.py:158 */
 static fs_attitude_target target_for(fs_real north, fs_real east, fs_real lift, fs_real yaw_rad,
                                      const fs_vehicle_state *state, const fs_position_params *params)
 {
@@ -79,13 +89,13 @@ static fs_attitude_target target_for(fs_real north, fs_real east, fs_real lift, 
     };
 }
 
-/* position_pid.py:71 */
+/* position_pid.py:86 */
 static fs_real bounded(fs_real value, fs_real limit)
 {
     return fs_min(fs_max(value, -limit), limit);
 }
 
-/* position_pid.py:76 */
+/* position_pid.py:91 */
 void fs_position_pid_step(const fs_position_memory *memory, const fs_vehicle_state *state,
                           const fs_position_setpoint *setpoint, const fs_position_params *params, fs_real dt_s,
                           fs_real thrust_saturation, fs_position_memory *memory_out, fs_attitude_target *target_out)
@@ -93,12 +103,8 @@ void fs_position_pid_step(const fs_position_memory *memory, const fs_vehicle_sta
     fs_real north;
     fs_real east;
     horizontal_demand(memory, state, setpoint, params, &north, &east);
-    const fs_real z = state->position_ned_m.z;
-    const fs_real vz = state->velocity_ned_m_s.z;
-    const fs_real error_z = setpoint->position_ned_m.z - z;
-    const fs_real down = setpoint->acceleration_ned_m_s2.z + params->kp_z * error_z +
-                         params->kd_z * (setpoint->velocity_ned_m_s.z - vz) + memory->z;
-    fs_real lift = params->gravity_m_s2 - down; /* upward specific force */
+    const fs_real error_z = setpoint->position_ned_m.z - state->position_ned_m.z;
+    fs_real lift = lift_demand(memory, state, setpoint, params);
     const fs_real most = params->max_thrust_n / params->mass_kg;
     const fs_real least = params->min_thrust_n / params->mass_kg;
     /* the vertical integrator holds only in the direction of saturation, here or in the mixer */

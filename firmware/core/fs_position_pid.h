@@ -18,7 +18,7 @@
  * thrust is at its limit, or while the mixer is saturated in thrust (thrust_saturation: the last tick achieved more
  * (-1) or less (+1) than demanded).
  *
- * position_pid.py:76
+ * position_pid.py:91
  */
 void fs_position_pid_step(const fs_position_memory *memory, const fs_vehicle_state *state,
                           const fs_position_setpoint *setpoint, const fs_position_params *params, fs_real dt_s,

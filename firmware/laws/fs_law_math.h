@@ -103,7 +103,7 @@ static inline fs_real fs_ldexp(fs_real number, int32_t power)
     return scaled * fs_power_of_two(left);
 }
 
-/* number as mantissa 2^power, the mantissa's magnitude in [0.5, 1); power 0 for 0 and for what is not finite. */
+/* number as mantissa 2^power, the mantissa's magnitude in [0.5, 1); power 0 for 0, NaN and infinities. */
 static inline void fs_frexp(fs_real number, fs_real *mantissa, int32_t *power)
 {
     int32_t exponent = 0, step;

@@ -86,6 +86,18 @@ uint16_t fs_message_kind_of(uint32_t id, fs_message_kind *kind)
         kind->length = FS_PIL_TIMING_LENGTH;
         kind->crc_extra = 5U;
         break;
+    case FS_PIL_SENSE_ID:
+        kind->length = FS_PIL_SENSE_LENGTH;
+        kind->crc_extra = 183U;
+        break;
+    case FS_PIL_ESTIMATE_ID:
+        kind->length = FS_PIL_ESTIMATE_LENGTH;
+        kind->crc_extra = 29U;
+        break;
+    case FS_PIL_MEMORY_ID:
+        kind->length = FS_PIL_MEMORY_LENGTH;
+        kind->crc_extra = 233U;
+        break;
     default:
         known = 0U;
         break;
@@ -539,4 +551,55 @@ void fs_pil_timing_decode(const fs_octet *payload, uint16_t length, fs_pil_timin
     m->cost_max = fs_get_u32(payload, length, 40U);
     m->late_mean_us = fs_get_float(payload, length, 44U);
     m->age_mean_us = fs_get_float(payload, length, 48U);
+}
+
+uint16_t fs_pil_sense_encode(const fs_pil_sense *m, fs_octet *payload)
+{
+    fs_put_u32(&payload[0], m->event);
+    fs_put_u32(&payload[4], m->kind);
+    fs_put_floats(&payload[8], m->values, 10U);
+    return fs_trimmed(payload, FS_PIL_SENSE_LENGTH);
+}
+
+void fs_pil_sense_decode(const fs_octet *payload, uint16_t length, fs_pil_sense *m)
+{
+    m->event = fs_get_u32(payload, length, 0U);
+    m->kind = fs_get_u32(payload, length, 4U);
+    fs_get_floats(payload, length, 8U, m->values, 10U);
+}
+
+uint16_t fs_pil_estimate_encode(const fs_pil_estimate *m, fs_octet *payload)
+{
+    fs_put_u32(&payload[0], m->event);
+    fs_put_u32(&payload[4], m->status);
+    fs_put_u32(&payload[8], m->cycles);
+    fs_put_u32(&payload[12], m->flags);
+    fs_put_floats(&payload[16], m->state, 13U);
+    fs_put_floats(&payload[68], m->resets, 19U);
+    return fs_trimmed(payload, FS_PIL_ESTIMATE_LENGTH);
+}
+
+void fs_pil_estimate_decode(const fs_octet *payload, uint16_t length, fs_pil_estimate *m)
+{
+    m->event = fs_get_u32(payload, length, 0U);
+    m->status = fs_get_u32(payload, length, 4U);
+    m->cycles = fs_get_u32(payload, length, 8U);
+    m->flags = fs_get_u32(payload, length, 12U);
+    fs_get_floats(payload, length, 16U, m->state, 13U);
+    fs_get_floats(payload, length, 68U, m->resets, 19U);
+}
+
+uint16_t fs_pil_memory_encode(const fs_pil_memory *m, fs_octet *payload)
+{
+    fs_put_u32(&payload[0], m->event);
+    fs_put_u32(&payload[4], m->first);
+    fs_put_u32s(&payload[8], m->words, 60U);
+    return fs_trimmed(payload, FS_PIL_MEMORY_LENGTH);
+}
+
+void fs_pil_memory_decode(const fs_octet *payload, uint16_t length, fs_pil_memory *m)
+{
+    m->event = fs_get_u32(payload, length, 0U);
+    m->first = fs_get_u32(payload, length, 4U);
+    fs_get_u32s(payload, length, 8U, m->words, 60U);
 }

@@ -9,8 +9,8 @@
  * the XML: pymavlink's common.xml, and flightstack/mavlink/flightstack.xml for FS_PIL_*.
  *
  * <message>_encode writes FS_<MESSAGE>_LENGTH octets and returns how many of them are to be sent, without the
- * zeros at the end, as MAVLink 2 demands. <message>_decode takes a payload of any length: what is missing is
- * zero, what is too much is ignored. It writes every field.
+ * zeros at the end, as MAVLink 2 demands. <message>_decode takes a payload of any length: missing octets are
+ * zero, surplus octets are ignored. It writes every field.
  */
 
 /* What identifies a message on the wire. */
@@ -315,5 +315,41 @@ typedef struct {
 } fs_pil_timing;
 uint16_t fs_pil_timing_encode(const fs_pil_timing *m, fs_octet *payload);
 void fs_pil_timing_decode(const fs_octet *payload, uint16_t length, fs_pil_timing *m);
+
+/* FS_PIL_SENSE */
+#define FS_PIL_SENSE_ID 53019U
+#define FS_PIL_SENSE_LENGTH 48U
+typedef struct {
+    uint32_t event;
+    uint32_t kind;
+    float values[10];
+} fs_pil_sense;
+uint16_t fs_pil_sense_encode(const fs_pil_sense *m, fs_octet *payload);
+void fs_pil_sense_decode(const fs_octet *payload, uint16_t length, fs_pil_sense *m);
+
+/* FS_PIL_ESTIMATE */
+#define FS_PIL_ESTIMATE_ID 53020U
+#define FS_PIL_ESTIMATE_LENGTH 144U
+typedef struct {
+    uint32_t event;
+    uint32_t status;
+    uint32_t cycles;
+    uint32_t flags;
+    float state[13];
+    float resets[19];
+} fs_pil_estimate;
+uint16_t fs_pil_estimate_encode(const fs_pil_estimate *m, fs_octet *payload);
+void fs_pil_estimate_decode(const fs_octet *payload, uint16_t length, fs_pil_estimate *m);
+
+/* FS_PIL_MEMORY */
+#define FS_PIL_MEMORY_ID 53021U
+#define FS_PIL_MEMORY_LENGTH 248U
+typedef struct {
+    uint32_t event;
+    uint32_t first;
+    uint32_t words[60];
+} fs_pil_memory;
+uint16_t fs_pil_memory_encode(const fs_pil_memory *m, fs_octet *payload);
+void fs_pil_memory_decode(const fs_octet *payload, uint16_t length, fs_pil_memory *m);
 
 #endif

@@ -49,7 +49,7 @@ static void fs_judge_v1(const fs_octet *at, uint16_t count, fs_candidate *candid
     }
 }
 
-/* Judge a whole frame whose checksum we cannot verify, by what follows it. */
+/* Check a whole frame of unknown checksum by the octets that follow it. */
 static void fs_judge_unknown(const fs_octet *at, uint16_t count, uint16_t silent, fs_candidate *candidate)
 {
     if (count > candidate->size) {
@@ -92,7 +92,7 @@ static void fs_judge_v2(const fs_octet *at, uint16_t count, uint16_t silent, fs_
     }
 }
 
-/* Judge the count octets, one at least, from a place on where a frame may begin; silent: no more will come. */
+/* Check the count octets, one at least, from a place on where a frame may begin; silent: no more will come. */
 static void fs_judge(const fs_octet *at, uint16_t count, uint16_t silent, fs_candidate *candidate)
 {
     candidate->verdict = FS_WAIT;
@@ -129,7 +129,7 @@ static void fs_drop(fs_parser *parser, uint16_t octets)
 }
 
 /*
- * Find the first frame among what is held, and drop everything before it and itself. Without one, keep only the
+ * Find the first frame among the octets held, and drop everything before it and itself. Without one, keep only the
  * beginning that has to wait for its rest; when the line is silent nothing waits.
  */
 static uint16_t fs_scan(fs_parser *parser, uint16_t silent, fs_frame *frame)

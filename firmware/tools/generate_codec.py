@@ -3,7 +3,7 @@
 The official C library cannot be used where a char has 16 bits: it packs structures and copies octets by memory.
 This generator writes one structure, one encoder and one decoder for each message a target speaks, on the few
 functions of ``fs_wire.c``. Its input beside flightstack.xml is the XML that comes inside pymavlink's wheel;
-only what is part of the wire format is taken from it, so that new wording upstream makes nothing stale.
+only the wire format is taken from it, so that new wording upstream makes nothing stale.
 ``--check`` fails when a file is stale.
 """
 
@@ -51,6 +51,9 @@ MESSAGES = (
     "FS_PIL_STATE",
     "FS_PIL_DRIVE",
     "FS_PIL_TIMING",
+    "FS_PIL_SENSE",
+    "FS_PIL_ESTIMATE",
+    "FS_PIL_MEMORY",
 )
 """What a target speaks. The parser passes over every other message."""
 
@@ -265,8 +268,8 @@ HEADER_START = """\
  * the XML: pymavlink's common.xml, and flightstack/mavlink/flightstack.xml for FS_PIL_*.
  *
  * <message>_encode writes FS_<MESSAGE>_LENGTH octets and returns how many of them are to be sent, without the
- * zeros at the end, as MAVLink 2 demands. <message>_decode takes a payload of any length: what is missing is
- * zero, what is too much is ignored. It writes every field.
+ * zeros at the end, as MAVLink 2 demands. <message>_decode takes a payload of any length: missing octets are
+ * zero, surplus octets are ignored. It writes every field.
  */
 
 /* What identifies a message on the wire. */

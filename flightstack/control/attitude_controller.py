@@ -3,6 +3,8 @@
 A controller is a module-level ``AttitudeController``, registered in the entry point group
 ``flightstack.attitude_controllers`` (``controller_loading``). A user's package registers its controller in its own
 ``pyproject.toml`` and selects it with ``--controller name``; docs/tutorials/controller.md shows an example.
+
+A module of its own: packages of users import it.
 """
 
 from __future__ import annotations

@@ -58,6 +58,29 @@ def _clipped(v: Vector3, limit: float) -> Vector3:
 
 
 @compiled
+def _advanced_rates(memory: ReferenceMemory, error: Vector3, params: ReferenceParams, dt_s: float) -> Vector3:
+    """Return the body rates after ``dt_s`` [rad/s], with the limits of acceleration and rate."""
+    stiffness = params.bandwidth_rad_s * params.bandwidth_rad_s
+    friction = 2.0 * params.damping * params.bandwidth_rad_s
+    acceleration = _clipped(
+        Vector3(
+            stiffness * error.x - friction * memory.p_rad_s,
+            stiffness * error.y - friction * memory.q_rad_s,
+            stiffness * error.z - friction * memory.r_rad_s,
+        ),
+        params.max_acceleration_rad_s2,
+    )
+    return _clipped(
+        Vector3(
+            memory.p_rad_s + acceleration.x * dt_s,
+            memory.q_rad_s + acceleration.y * dt_s,
+            memory.r_rad_s + acceleration.z * dt_s,
+        ),
+        params.max_rate_rad_s,
+    )
+
+
+@compiled
 def attitude_reference_step(
     memory: ReferenceMemory, target: Quaternion, params: ReferenceParams, dt_s: float
 ) -> tuple[ReferenceMemory, AttitudeReference]:
@@ -73,24 +96,7 @@ def attitude_reference_step(
         return passed, AttitudeReference(target, zero, zero)
     attitude = Quaternion(memory.w, memory.x, memory.y, memory.z)
     error = rotation_vector(quaternion_product(conjugate(attitude), target))
-    stiffness = params.bandwidth_rad_s * params.bandwidth_rad_s
-    friction = 2.0 * params.damping * params.bandwidth_rad_s
-    acceleration = _clipped(
-        Vector3(
-            stiffness * error.x - friction * memory.p_rad_s,
-            stiffness * error.y - friction * memory.q_rad_s,
-            stiffness * error.z - friction * memory.r_rad_s,
-        ),
-        params.max_acceleration_rad_s2,
-    )
-    rates = _clipped(
-        Vector3(
-            memory.p_rad_s + acceleration.x * dt_s,
-            memory.q_rad_s + acceleration.y * dt_s,
-            memory.r_rad_s + acceleration.z * dt_s,
-        ),
-        params.max_rate_rad_s,
-    )
+    rates = _advanced_rates(memory, error, params, dt_s)
     acceleration = Vector3(  # after the limits
         (rates.x - memory.p_rad_s) / dt_s,
         (rates.y - memory.q_rad_s) / dt_s,

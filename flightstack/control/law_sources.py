@@ -1,4 +1,4 @@
-"""What the compiled step of a user's law depends on: source files, and constants of modules.
+"""Dependencies of the compiled step of a user's law: source files, and constants of modules.
 
 Numba compiles the functions that a step calls, and the constants that they use, into the kernel of the loops. The key
 of a cached kernel covers both, wherever they come from: a module beside the law, another package, or a file that a

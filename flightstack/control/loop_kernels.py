@@ -31,6 +31,7 @@ from flightstack.control.position_pid import (
 from flightstack.core.array_items import as_tuple, store
 from flightstack.core.arrays import (
     achieved_wrench,
+    all_finite,
     attitude_target,
     commanded_wrench,
     position_setpoint,
@@ -91,15 +92,6 @@ BOUND_NAMES = {
 
 
 @compiled
-def all_finite(values: FloatArray | tuple[float, ...]) -> bool:
-    """Return True if all values of an array or a flat tuple are finite."""
-    for value in values:  # noqa: SIM110  # compiled code has no generators
-        if not math.isfinite(value):
-            return False
-    return True
-
-
-@compiled
 def _is_sound(setpoint: PositionSetpoint) -> bool:
     """Return True if all numbers are finite, and the yaw is within ±10⁴ rad, the limit of ``sin_cos``."""
     p, v, a = setpoint.position_ned_m, setpoint.velocity_ned_m_s, setpoint.acceleration_ned_m_s2
@@ -128,10 +120,9 @@ def outer_kernel(
     finite, or if a yaw setpoint is beyond ±10⁴ rad. ``last`` (48,) is the inner loop's row of the previous tick, which
     shows saturation of the mixer. ``specialise`` binds other laws to this template, and to it alone.
     """
-    desired = position_setpoint(setpoint)
+    vehicle, desired = vehicle_state(state), position_setpoint(setpoint)
     if not (all_finite(state) and _is_sound(desired)):
         return
-    vehicle = vehicle_state(state)
     guided, desired = guidance_step(
         GuidanceMemory(*as_tuple(memory[POSITION_MEMORY_SIZE:], GUIDANCE_MEMORY_SIZE)),
         vehicle,
@@ -139,10 +130,7 @@ def outer_kernel(
         GuidanceParams(*as_tuple(params[POSITION_PARAMS_SIZE:], GUIDANCE_PARAMS_SIZE)),
         dt_s,
     )
-    is_valid = _is_sound(desired)
-    for value in guided:
-        is_valid = is_valid and math.isfinite(value)
-    if not is_valid:
+    if not (_is_sound(desired) and all_finite(guided)):
         return
     advanced, new_target = position_step(
         PositionLawMemory(*as_tuple(memory, POSITION_MEMORY_SIZE)),
@@ -152,10 +140,7 @@ def outer_kernel(
         dt_s,
         _saturation_direction(commanded_wrench(last).thrust_n, achieved_wrench(last).thrust_n, 1e-9),
     )
-    is_valid = all_finite(new_target.attitude) and math.isfinite(new_target.thrust_n)
-    for value in advanced:
-        is_valid = is_valid and math.isfinite(value)
-    if not is_valid:
+    if not (all_finite(new_target.attitude) and math.isfinite(new_target.thrust_n) and all_finite(advanced)):
         return
     store(memory, advanced)
     store(memory[POSITION_MEMORY_SIZE:], guided)
@@ -336,20 +321,17 @@ def inner_kernel(
     controller_memory = ControllerMemory(*as_tuple(m["attitude"], CONTROLLER_MEMORY_SIZE))
     controller_params = ControllerParams(*as_tuple(m["attitude_params"], CONTROLLER_PARAMS_SIZE))
     advanced, torque = controller_step(controller_memory, inputs, controller_params, dt_s)
-    is_valid = _is_reference_finite(filtered, inputs.reference) and _is_finite(torque)
-    for value in advanced:
-        is_valid = is_valid and math.isfinite(value)
-    if not is_valid:
+    if not (_is_reference_finite(filtered, inputs.reference) and _is_finite(torque) and all_finite(advanced)):
         _repeat(row, last, OUTPUT_NOT_FINITE)
         return
     demanded, commands = Wrench(target[4], torque), row[COMMAND_AT:]
     mixer_memory = MixerMemory(*as_tuple(m["mixer"], MIXER_MEMORY_SIZE))
     mixer_params = MixerParams(*as_tuple(m["mixer_params"], MIXER_PARAMS_SIZE))
     mixed, achieved = mixer_step(mixer_memory, demanded, mixer, mixer_params, dt_s, commands, work)
-    is_valid = math.isfinite(achieved.thrust_n) and _is_finite(achieved.torque_frd_n_m)
-    for value in mixed:
-        is_valid = is_valid and math.isfinite(value)
-    if not (is_valid and all_finite(commands[: mixer.spin.size])):  # a sum overflowed
+    is_achieved = math.isfinite(achieved.thrust_n) and _is_finite(achieved.torque_frd_n_m)
+    if not (
+        is_achieved and all_finite(mixed) and all_finite(commands[: mixer.spin.size])
+    ):  # a sum overflowed
         _repeat(row, last, OUTPUT_NOT_FINITE)
         return
     store(m["reference"], filtered)

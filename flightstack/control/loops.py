@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import numba
 import numpy as np
 
 from flightstack.control.backend import IdleRow
@@ -22,9 +21,9 @@ from flightstack.control.controller import (
 )
 from flightstack.control.controller_loading import check_python, compile_error, fields_of
 from flightstack.control.loop_kernels import BOUND_NAMES, inner_kernel, inner_layout, outer_kernel
-from flightstack.control.loop_parameters import LoopParameters, loop_numbers
+from flightstack.control.loop_parameters import LoopNumbers, LoopParameters, loop_numbers
 from flightstack.control.mixer import mixer_for
-from flightstack.core.compiled import direct, specialise
+from flightstack.core.compiled import compiler_version, direct, specialise
 from flightstack.core.contract import MAX_ROTORS, SETPOINT_SIZE, FloatArray, LoopRow, RecordArray
 from flightstack.params.toml_file import Table
 from flightstack.params.vehicle import Vehicle
@@ -58,11 +57,25 @@ def joined(values: Mapping[str, FloatArray]) -> tuple[FloatArray, dict[str, Floa
     return whole, {POSITION: whole[:split], GUIDANCE: whole[split:]}
 
 
+def _inner_memory(
+    vehicle: Vehicle, controller: Controller, numbers: LoopNumbers, inner_hz: float
+) -> RecordArray:
+    """Return the record of the inner loop with its parameters, state at zero."""
+    memory: RecordArray = np.zeros(
+        1, inner_layout(len(vehicle.rotors), controller.attitude, controller.mixer)
+    )
+    record = memory[0]
+    for name, values in mixer_for(vehicle)._asdict().items():
+        record[name] = values
+    record["dt_s"], record["reference_params"] = 1.0 / inner_hz, numbers.reference
+    record["attitude_params"], record["mixer_params"] = numbers.laws[ATTITUDE], numbers.laws[MIXER]
+    return memory
+
+
 class PythonLoops:
     """Control loops as compiled Python; implements ``ControlBackend``."""
 
     name = "python"
-    version = f"Python, Numba {numba.__version__}"
 
     def __init__(
         self,
@@ -73,20 +86,16 @@ class PythonLoops:
         outer_hz: float,
         max_tilt_rad: float,
     ) -> None:
-        self._outer_dt_s = 1.0 / outer_hz
-        self._fraction_step = outer_hz / inner_hz
+        self.version = f"Python, Numba {compiler_version()}"
+        self._outer_dt_s, self._fraction_step = 1.0 / outer_hz, outer_hz / inner_hz
         self.fraction = 0.0
         """Share of the way from the last attitude target to the present one."""
         controller = controller_of(controller)
         check_python(controller)
         numbers, laws = loop_numbers(vehicle, controller, gains, max_tilt_rad), controller.laws
-        self.memory: RecordArray = np.zeros(1, inner_layout(len(vehicle.rotors), laws[ATTITUDE], laws[MIXER]))
+        self.memory = _inner_memory(vehicle, controller, numbers, inner_hz)
         """State and parameters of the inner loop."""
         record = self.memory[0]
-        for name, values in mixer_for(vehicle)._asdict().items():
-            record[name] = values
-        record["dt_s"], record["reference_params"] = 1.0 / inner_hz, numbers.reference
-        record["attitude_params"], record["mixer_params"] = numbers.laws[ATTITUDE], numbers.laws[MIXER]
         self._initial = {role: np.array(law.initial_memory, np.float64) for role, law in laws.items()}
         self.outer_memory, outer = joined(self._initial)
         """Integrals of the outer loop's laws."""

@@ -68,6 +68,21 @@ def _horizontal_demand(
 
 
 @compiled
+def _lift_demand(
+    memory: PositionMemory, state: VehicleState, setpoint: PositionSetpoint, params: PositionParams
+) -> float:
+    """Return the upward specific force [m/s²]."""
+    error_z = setpoint.position_ned_m.z - state.position_ned_m.z
+    down = (
+        setpoint.acceleration_ned_m_s2.z
+        + params.kp_z * error_z
+        + params.kd_z * (setpoint.velocity_ned_m_s.z - state.velocity_ned_m_s.z)
+        + memory.z
+    )
+    return params.gravity_m_s2 - down
+
+
+@compiled
 def _bounded(value: float, limit: float) -> float:
     return min(max(value, -limit), limit)
 
@@ -90,15 +105,8 @@ def position_pid_step(
     tick achieved more (−1) or less (+1) than demanded).
     """
     north, east = _horizontal_demand(memory, state, setpoint, params)
-    z, vz = state.position_ned_m.z, state.velocity_ned_m_s.z
-    error_z = setpoint.position_ned_m.z - z
-    down = (
-        setpoint.acceleration_ned_m_s2.z
-        + params.kp_z * error_z
-        + params.kd_z * (setpoint.velocity_ned_m_s.z - vz)
-        + memory.z
-    )
-    lift = params.gravity_m_s2 - down  # upward specific force
+    error_z = setpoint.position_ned_m.z - state.position_ned_m.z
+    lift = _lift_demand(memory, state, setpoint, params)
     most, least = params.max_thrust_n / params.mass_kg, params.min_thrust_n / params.mass_kg
     # the vertical integrator holds only in the direction of saturation, here or in the mixer
     at_top = lift >= most or thrust_saturation > 0.0

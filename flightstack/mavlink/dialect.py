@@ -3,7 +3,7 @@
 ``mavlink`` is pymavlink's module of common.xml. The messages of ``flightstack.xml`` are registered there under
 pymavlink's names (``MAVLink_available_modes_message``, ``MAVLINK_MSG_ID_AVAILABLE_MODES``), so that every codec
 (``mavlink.MAVLink``) supports them. MISSION_COUNT, MISSION_ACK and MISSION_CURRENT replace pymavlink's versions, which
-lack the plan ids at the end.
+lack the plan ids at the end. A module of its own: one dialect for all.
 """
 
 from __future__ import annotations

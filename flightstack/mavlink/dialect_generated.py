@@ -291,4 +291,37 @@ LAYOUTS = (
             Field("age_mean_us", "f", 1, False, "float", "us", 12),
         ),
     ),
+    Layout(
+        53019,
+        "FS_PIL_SENSE",
+        183,
+        (
+            Field("event", "I", 1, False, "uint32_t", "", 0),
+            Field("kind", "I", 1, False, "uint32_t", "", 1),
+            Field("values", "f", 10, True, "float", "", 2),
+        ),
+    ),
+    Layout(
+        53020,
+        "FS_PIL_ESTIMATE",
+        29,
+        (
+            Field("event", "I", 1, False, "uint32_t", "", 0),
+            Field("status", "I", 1, False, "uint32_t", "", 1),
+            Field("cycles", "I", 1, False, "uint32_t", "", 2),
+            Field("flags", "I", 1, False, "uint32_t", "", 3),
+            Field("state", "f", 13, True, "float", "", 4),
+            Field("resets", "f", 19, True, "float", "", 5),
+        ),
+    ),
+    Layout(
+        53021,
+        "FS_PIL_MEMORY",
+        233,
+        (
+            Field("event", "I", 1, False, "uint32_t", "", 0),
+            Field("first", "I", 1, False, "uint32_t", "", 1),
+            Field("words", "I", 60, True, "uint32_t", "", 2),
+        ),
+    ),
 )

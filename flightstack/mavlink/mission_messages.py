@@ -14,8 +14,8 @@ from typing import NamedTuple
 from flightstack.core.float32 import as_float32
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Message
+from flightstack.plan.commands import SCALED_FRAMES
 from flightstack.plan.item import MissionItem, float_coordinate, integer_coordinate
-from flightstack.plan.vocabulary import SCALED_FRAMES
 
 PROTOCOL = frozenset(
     {

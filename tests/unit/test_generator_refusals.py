@@ -18,7 +18,7 @@ import math
 from typing import Annotated, NamedTuple
 import numpy as np
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray, Vector3
+from flightstack.core.contract import FloatArray, Record, RecordArray, Vector3
 from flightstack.core.portable_math import sin_cos
 
 LIMITS = {"a": 1.0}
@@ -56,14 +56,23 @@ class Box(NamedTuple):
     cube: Annotated[FloatArray, 2, 2, 3]
     x: float
 
+class Part(NamedTuple):
+    y: Annotated[FloatArray, 2]
+
+class Kept(NamedTuple):
+    part: Part
+    z: Annotated[FloatArray, 2]
+
 @compiled
-def law(x: float, n: int, flag: bool, v: Vector3, a: Annotated[FloatArray, 3], box: Box, counts: Counts) -> float:
+def law(x: float, n: int, flag: bool, v: Vector3, a: Annotated[FloatArray, 3], box: Box, counts: Counts,
+        kept: Annotated[Record, Kept], many: Annotated[RecordArray, Kept]) -> float:
 """
 LINE = HEAD.count("\n") + 1
 REFUSED = {
     "while x > 0.0:\n    x -= 1.0\nreturn x": "while loop",
     "for value in a:\n    x += value\nreturn x": "for loop over values",
-    "m = n\nfor i in range(m):\n    x += 1.0\nreturn x": "loop bound",
+    "m = int(x)\nfor i in range(m):\n    x += 1.0\nreturn x": "loop bound",
+    "m = 2 if flag else int(x)\nfor i in range(m):\n    x += 1.0\nreturn x": "loop bound",
     "n = n + 1\nfor i in range(n):\n    x += 1.0\nreturn x": "loop bound",
     "return rounds(x, int(x))": "loop bound",
     "counts.numbers[0] = x\nreturn x": "values of different types",
@@ -90,12 +99,15 @@ REFUSED = {
     "both = (x, x)\nreturn x": "tuple",
     "b = a[0:2]\nreturn x": "slice",
     "return v[0]": "index of a NamedTuple",
+    "return kept['missing'][0]": "index of a record",
+    "return many[1]['z'][0]": "index of a record",
+    "part = Part(kept['z'])\nreturn x": "NamedTuple of arrays",
     "return a[x]": "index",
     "return a[-1]": "index",
     "v.x = 1.0\nreturn x": "assignment to an attribute",
     "box.x = 1.0\nreturn x": "assignment to an attribute",
     "box.values = a\nreturn x": "assignment to an attribute",
-    "box = Box(a, a, a, x)\nreturn x": "array value",
+    "box = Box(box.values, box.grid, box.cube, x)\nreturn x": "NamedTuple of arrays",
     "other_box = box if flag else box\nreturn x": "array value",
     "part = box.cube[1]\nreturn x": "array value",
     "b = box.grid[0, 1:]\nreturn x": "slice",
@@ -161,7 +173,7 @@ def refused(folder: Path, source: str) -> OutsideSubsetError:
 def test_construct_outside_the_subset_is_refused(body: str, construct: str, tmp_path: Path) -> None:
     error = refused(tmp_path, HEAD + "".join(f"    {line}\n" for line in body.splitlines()))
     assert error.advice == ADVICE[construct]
-    assert LINE - 1 <= error.line <= LINE + body.count("\n")
+    assert LINE - 2 <= error.line <= LINE + body.count("\n")
     assert str(error).startswith(f"a_law.py:{error.line}: ")
 
 
@@ -174,7 +186,8 @@ def test_construct_outside_the_subset_is_refused(body: str, construct: str, tmp_
         "def law(x: Bad) -> float:": "annotation",
         "def law(*x: float) -> float:": "arguments",
         "def law(x: float) -> str:": "annotation",
-        "def law(x: FloatArray) -> float:\n    return float(x.size)\n": "array of unknown shape",
+        "def law(x: Annotated[Record, Kept], n: int) -> Part:\n    return Part(x['y'])\n": "NamedTuple of arrays",
+        "def law(x: FloatArray) -> float:\n    return float(x.shape[0])\n": "array of unknown shape",
     }.items(),
 )
 def test_signature_outside_the_subset_is_refused(signature: str, construct: str, tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from flightstack.firmware.generator.types import (
     Array,
     Record,
     Several,
+    Single,
     Type,
     c_size,
     c_type,
@@ -33,6 +34,7 @@ from flightstack.firmware.generator.values import (
     Value,
     address,
     as_real,
+    field_of,
     real_literal,
 )
 
@@ -70,11 +72,19 @@ class Calls:
         callee = self.callee(node, target)
         if isinstance(callee.result, Several):
             raise self.function.refusal(node, "tuple", f"result of {callee.name} as one value")
+        if callee.part:
+            return self._part(node, callee)
         if callee.written and not alone:
             raise self.function.refusal(node, "call that writes to an array")
         text = f"{callee.c_name}({', '.join(self.arguments(node, callee))})"
         form = Form.MADE if isinstance(callee.result, Record) else Form.VALUE
         return Value(callee.result, text, ATOM, form, callee=callee.name.strip("_"))
+
+    def _part(self, node: ast.Call, callee: Function) -> Value:
+        """Return the part of a record that a function takes of its parameter."""
+        (parameter,) = callee.parameters
+        (record,) = self.bound(node, [(parameter.name, parameter.type)], {})
+        return field_of(record, callee.part, callee.result)
 
     def callee(self, node: ast.Call, target: Any) -> Function:
         """Return the translated function that a call names."""
@@ -92,27 +102,28 @@ class Calls:
         values = self.bound(node, types, defaults)
         texts = []
         for (name, kind), value in zip(types, values, strict=True):
-            if isinstance(kind, Record):
+            if isinstance(kind, Record | Single):
                 held = value if value.form in (Form.VALUE, Form.POINTER) else self.writer.hoist(value, name)
                 texts.append(address(held))
             else:
                 texts.append(_array_argument(kind, value, name in callee.written))
+            if name in callee.sized:
+                assert isinstance(value.type, Array)
+                size = self.writer.size_of(value) or self.expressions.size(node, value.type.shape[0])
+                texts.append(size.text)
             if name in callee.written:
                 self.writer.write_to(node, value)
             if name in callee.bounds:
-                self._check_bound(node, name, value)
+                self._check_bound(node, callee, name)
         if callee.needs_rotors:
             texts.append(self.writer.rotors())
         return texts
 
-    def _check_bound(self, node: ast.Call, name: str, value: Value) -> None:
-        """Accept a constant, a loop's variable, or a parameter that bounds a loop too."""
-        if value.literal is not None or value.is_constant:
-            return
-        if value.text in self.writer.loops:
-            return
-        if self.writer.is_whole_parameter(value.text):
-            self.function.bounds.add(value.text)
+    def _check_bound(self, node: ast.Call, callee: Function, name: str) -> None:
+        """Accept an argument that may bound a loop of this function too, or the default of a parameter."""
+        names = [parameter.name for parameter in callee.parameters]
+        given = dict(zip(names, node.args, strict=False)) | {str(k.arg): k.value for k in node.keywords}
+        if name not in given or self.expressions.bounds.accepts(given[name]):
             return
         raise self.function.refusal(node, "loop bound", f"loop bound {name} of {ast.unparse(node.func)}")
 
@@ -254,13 +265,15 @@ def c_prototype(function: Function, is_inline: bool = False) -> str:
     for parameter in function.parameters:
         name, kind = identifier(parameter.name), parameter.type
         const = "" if parameter.name in function.written else "const "
-        if isinstance(kind, Record):
+        if isinstance(kind, Record | Single):
             parts.append(f"{const}{c_type(kind)} *{name}")
         elif isinstance(kind, Array):
             sizes = "".join(f"[{c_size(size)}]" for size in kind.shape)
             parts.append(f"{const}{c_type(kind)} {name}{sizes}")
         else:
             parts.append(f"{c_type(kind)} {name}")
+        if parameter.name in function.sized:
+            parts.append(f"int32_t {name}_size")
     if function.needs_rotors:
         parts.append("int32_t rotors")
     parts += [f"{c_type(kind)} *{name}" for name, kind in function.outputs]

@@ -80,7 +80,7 @@ def core_files(laws: Laws) -> dict[str, str]:
         if isinstance(law.step, CStep):
             texts |= hand_written(law, law.step)
     for unit in program.written():
-        if unit.module in INLINE:
+        if unit.module in program.inline:
             texts[f"{unit.name}.h"] = unit.inline()
         else:
             texts |= {f"{unit.name}.h": unit.header(), f"{unit.name}.c": unit.source()}
@@ -94,7 +94,7 @@ def every(laws: Laws) -> list[ControlLaw]:
 
 def law_program(laws: Laws = BUILT_IN) -> Program:
     """Translate the functions of the loops and the steps of the laws; raise OutsideSubsetError, ValueError."""
-    program = Program(types=dict.fromkeys(_law_types(laws), "fs_numbers"))
+    program = Program(types=dict.fromkeys(_law_types(laws), "fs_numbers"), inline=INLINE)
     steps = [law.step for law in every(laws) if not isinstance(law.step, CStep)]
     for function in (*FUNCTIONS, *steps):
         program.add(function)

@@ -8,8 +8,10 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from flightstack.core.float32 import LARGEST_FLOAT32
+from flightstack.firmware.generator.analysis import Bounds
 from flightstack.firmware.generator.calls import Calls
 from flightstack.firmware.generator.law import Function
+from flightstack.firmware.generator.records import Records
 from flightstack.firmware.generator.subset import construct_of
 from flightstack.firmware.generator.text import identifier
 from flightstack.firmware.generator.types import (
@@ -21,6 +23,7 @@ from flightstack.firmware.generator.types import (
     WHOLE,
     Array,
     Record,
+    Single,
     c_type,
     has_arrays,
 )
@@ -67,6 +70,8 @@ class Expressions:
     def __init__(self, function: Function, writer: Writer) -> None:
         self.function, self.writer = function, writer
         self.calls = Calls(function, writer, self)
+        self.bounds = Bounds(function, writer, self)
+        self.records = Records(function, self)
 
     def value(self, node: ast.expr) -> Value:
         """Return the C expression of ``node``; statements that it needs go to the writer."""
@@ -170,7 +175,7 @@ class Expressions:
             return self._global(node, identifier(node.attr))
         owner = self.value(node.value)
         if isinstance(owner.type, Array) and node.attr == "size" and len(owner.type.shape) == 1:
-            return self.size(node, owner.type.shape[0])
+            return self.writer.size_of(owner) or self.size(node, owner.type.shape[0])
         if not isinstance(owner.type, Record) or node.attr not in owner.type.fields:
             raise self.function.refusal(node, "attribute", f"attribute .{node.attr}")
         return self.field(owner, node.attr)
@@ -200,8 +205,8 @@ class Expressions:
             if isinstance(array.type, Array) and axis in range(len(array.type.shape)):
                 return self.size(node, array.type.shape[axis])
         array = self.value(shape)
-        if isinstance(array.type, Record):
-            raise self.function.refusal(node, "index of a NamedTuple")
+        if isinstance(array.type, Record | Single):
+            return self.records.item(node, array)
         if not isinstance(array.type, Array):
             raise self.function.refusal(node, "index", "index of a number")
         return self._item(node, array, array.type)
@@ -325,9 +330,12 @@ class Expressions:
             fields = record.fields
         except TypeError as error:
             raise self.function.refusal(node, "annotation", str(error)) from None
-        if has_arrays(record):
-            raise self.function.refusal(node, "array value", "NamedTuple made of arrays")
+        row = self.records.row(node)
+        if row is not None:
+            return self.calls.converted(node, row, record)
         values = self.calls.bound(node, list(fields.items()), {})
+        if has_arrays(record):
+            return self.records.part(node, record, values)
         return Value(record, c_type(record), ATOM, Form.FIELDS, tuple(values))
 
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import ast
+import functools
 import inspect
 import io
 import re
+import sys
 import textwrap
 import tokenize
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 from flightstack.firmware.generator.subset import ADVICE, OutsideSubsetError
@@ -20,6 +23,7 @@ from flightstack.firmware.generator.types import (
     Array,
     Record,
     Several,
+    Single,
     Type,
     annotated,
     prefix_of,
@@ -57,6 +61,10 @@ class Function:
     """Integer parameters that bound a loop: every call gives them a bounded number."""
     needs_rotors: bool = False
     """The number of rotors is a parameter of its own in C."""
+    sized: set[str] = field(default_factory=set)
+    """Parameters that are arrays of any size, of which the function reads the size: a parameter of its own in C."""
+    part: str = ""
+    """Part of the parameter that a function returns, whose result is arrays of a record; it has no C of its own."""
     lines: list[str] = field(default_factory=list)
     """C text of the body."""
 
@@ -74,7 +82,7 @@ class Function:
     def c_name(self) -> str:
         """Name in C."""
         if self.is_private:
-            return identifier(self.name.strip("_"))
+            return static_name(self.name, self.module)
         return f"{prefix_of(self.module)}_{ascii_text(self.name)}"
 
     @property
@@ -100,6 +108,20 @@ def python_function(value: Any) -> Callable[..., Any] | None:
     """Return the Python function of a compiled or plain one, or None."""
     plain = getattr(value, "py_func", value)
     return plain if inspect.isfunction(plain) else None
+
+
+def static_name(name: str, module: str) -> str:
+    """Return the C name of a private function, which no parameter of a function of its module has."""
+    plain = identifier(name.strip("_"))
+    return f"{plain}_" if plain in _parameters_of(module) else plain
+
+
+@functools.cache
+def _parameters_of(module: str) -> frozenset[str]:
+    functions = [python_function(value) for value in vars(sys.modules[module]).values()]
+    codes = [function.__code__ for function in functions if isinstance(function, FunctionType)]
+    names = (code.co_varnames[: code.co_argcount + code.co_kwonlyargcount] for code in codes)
+    return frozenset(identifier(name) for several in names for name in several)
 
 
 def load(value: Any) -> Function:
@@ -165,8 +187,9 @@ def _type(function: Function, node: ast.AST, annotation: ast.expr | None) -> Typ
 
 def _check_fields(kind: Type) -> None:
     """Raise TypeError if a field of a record is outside the subset."""
-    if isinstance(kind, Record):
-        for inner in kind.fields.values():
+    if isinstance(kind, Record | Single):
+        record = kind if isinstance(kind, Record) else kind.record
+        for inner in record.fields.values():
             _check_fields(inner)
     if isinstance(kind, Several):
         for inner in kind.items:

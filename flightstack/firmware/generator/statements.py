@@ -10,7 +10,7 @@ from flightstack.firmware.generator.expressions import MISSING, Expressions
 from flightstack.firmware.generator.law import Function, python_function
 from flightstack.firmware.generator.subset import construct_of
 from flightstack.firmware.generator.text import identifier
-from flightstack.firmware.generator.types import INT, NOTHING, Several
+from flightstack.firmware.generator.types import INT, NOTHING, Several, has_arrays
 from flightstack.firmware.generator.unit import Unit
 from flightstack.firmware.generator.values import Value
 from flightstack.firmware.generator.writer import Variable, Writer, declaration
@@ -193,36 +193,10 @@ class Statements:
         constant = self.expressions.constant(node)
         if isinstance(constant, int) and not isinstance(constant, bool):
             return self.expressions.literal(node, constant)
-        sizes = {
-            inner.value
-            for inner in ast.walk(node)
-            if isinstance(inner, ast.Attribute) and inner.attr in ("size", "shape")
-        } | {inner.args[0] for inner in ast.walk(node) if isinstance(inner, ast.Call) and inner.args}
-        within = {id(part) for size in sizes for part in ast.walk(size)}
-        for inner in ast.walk(node):
-            if not isinstance(inner, ast.Name) or id(inner) in within or not self.writer.has(inner.id):
-                continue
-            if inner.id in self._loops or inner.id in self._sizes:
-                continue
-            if not self.writer.is_whole_parameter(inner.id):
-                raise self.function.refusal(node, "loop bound", f"loop bound {ast.unparse(node)}")
-            self.function.bounds.add(inner.id)
         value = self.expressions.value(node)
-        if value.type is not INT:
+        if value.type is not INT or not self.expressions.bounds.accepts(node):
             raise self.function.refusal(node, "loop bound", f"loop bound {ast.unparse(node)}")
         return value
-
-    @property
-    def _sizes(self) -> set[str]:
-        """Variables that hold the size of an array, assigned once."""
-        return {
-            node.targets[0].id
-            for node in ast.walk(self.function.node)
-            if isinstance(node, ast.Assign)
-            and isinstance(node.targets[0], ast.Name)
-            and isinstance(node.value, ast.Attribute | ast.Subscript | ast.Constant)
-            and len(self.writer.usage.stores[node.targets[0].id]) == 1
-        }
 
     def _break(self, _: ast.Break) -> bool:
         self.writer.line("break;")
@@ -278,8 +252,20 @@ class Statements:
             self.expressions.calls.call(node.value, alone=True) if isinstance(node.value, ast.Call) else None
         )
         value = call or self.expressions.value(node.value)
-        writer.store("return ", self.expressions.calls.converted(node, value, function.result))
+        made = self.expressions.calls.converted(node, value, function.result)
+        if has_arrays(function.result):
+            self._return_part(node, made)
+        else:
+            writer.store("return ", made)
         return True
+
+    def _return_part(self, node: ast.Return, value: Value) -> None:
+        """Note the part of the parameter that callers take: C returns no arrays."""
+        owner, body = value.owner, [part for part in self.function.node.body if part is not node]
+        is_only = all(isinstance(part, ast.Expr) and isinstance(part.value, ast.Constant) for part in body)
+        if owner is None or owner.text != owner.root or len(self.function.parameters) != 1 or not is_only:
+            raise self.function.refusal(node, "NamedTuple of arrays", "result that is arrays of a NamedTuple")
+        self.function.part = value.text.removeprefix(f"{owner.text}->")
 
     def _return_several(self, node: ast.Return, value: ast.expr) -> None:
         writer, outputs = self.writer, self.function.outputs

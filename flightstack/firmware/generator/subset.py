@@ -39,6 +39,8 @@ ADVICE: dict[str, str] = {
     "tuple": "unpack it at once: `a, b = f(x)`, or use a NamedTuple",
     "slice": "use `for i in range(N)` and an index",
     "index of a NamedTuple": "use the name of the field",
+    "index of a record": 'use the name of a field, `record["x"]`, and `records[0]` for an array of one record',
+    "NamedTuple of arrays": "name its fields in their order; the record's NamedTuple must have it as a field",
     "index": "use an integer index",
     "assignment to an attribute": "make a new NamedTuple",
     "assignment expression": "assign in a statement of its own",

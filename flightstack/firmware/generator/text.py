@@ -79,7 +79,7 @@ def comment(text: str, indent: str = "") -> list[str]:
 
 
 def fold(text: str, indent: str = "") -> list[str]:
-    """Return a statement in lines of at most ``WIDTH`` characters; what is broken is aligned to its bracket."""
+    """Return a statement in lines of at most ``WIDTH`` characters; continuation lines are aligned to their bracket."""
     lines, lead = [], indent
     start = _START.match(text)
     columns = [len(indent) + (start.end() if start else 4)]

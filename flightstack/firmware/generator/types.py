@@ -45,6 +45,20 @@ class Record:
         """Types of the fields; raise TypeError for one outside the subset."""
         return _fields(self.kind)
 
+    def part_with(self, name: str) -> str | None:
+        """Return the field with the part of a NumPy record that has the field ``name``, or None."""
+        parts = (
+            part for part, inner in self.fields.items() if isinstance(inner, Record) and has_arrays(inner)
+        )
+        return next((part for part in parts if name in _fields(self.fields[part].kind)), None)  # type: ignore[union-attr]
+
+
+@dataclass(frozen=True)
+class Single:
+    """A NumPy array of one record."""
+
+    record: Record
+
 
 @dataclass(frozen=True)
 class Several:
@@ -61,7 +75,7 @@ class Array:
     item: Scalar = Scalar.REAL
 
 
-Type: TypeAlias = Scalar | Record | Several | Array
+Type: TypeAlias = Scalar | Record | Single | Several | Array
 
 
 @functools.cache
@@ -109,6 +123,8 @@ def c_type(kind: Type) -> str:
         return c_type(kind.item)
     if kind is WHOLE:
         return REAL.value
+    if isinstance(kind, Single):
+        kind = kind.record
     return record_name(kind.kind) if isinstance(kind, Record) else kind.value  # type: ignore[union-attr]
 
 
@@ -141,6 +157,17 @@ def _item(base: Any, names: Mapping[str, Any]) -> Scalar | None:
     return _ITEMS.get(get_args(dtype[0])[0]) if dtype and get_args(dtype[0]) else None
 
 
+def _annotated_type(value: Any, names: Mapping[str, Any]) -> Type | None:
+    """Return the type of ``Annotated[FloatArray, N]``, or of a NumPy record: ``Annotated[Record, Kind]``; else None."""
+    base, *shape = get_args(value)
+    if len(shape) == 1 and is_record(shape[0]):
+        record = Record(shape[0])
+        return record if base is contract.Record else Single(record)
+    item = _item(base, names)
+    is_shape = all(size == ROTORS or (isinstance(size, int) and size > 0) for size in shape)
+    return Array(tuple(shape), item) if item is not None and is_shape else None
+
+
 def _resolved(value: Any, names: Mapping[str, Any]) -> Type:
     if value == contract.FloatArray:
         return Array(("",))
@@ -153,10 +180,9 @@ def _resolved(value: Any, names: Mapping[str, Any]) -> Type:
     if get_origin(value) is tuple:
         return Several(tuple(_resolved(item, names) for item in get_args(value)))
     if get_origin(value) is typing.Annotated:
-        base, *shape = get_args(value)
-        item = _item(base, names)
-        if item is not None and all(size == ROTORS or (isinstance(size, int) and size > 0) for size in shape):
-            return Array(tuple(shape), item)
+        made = _annotated_type(value, names)
+        if made is not None:
+            return made
     known = _PLAIN.get(value) if isinstance(value, type | None) else None
     if known is None:
         raise TypeError(f"{value!r} has no C type")

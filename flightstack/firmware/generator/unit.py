@@ -9,16 +9,16 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numba
-
 from flightstack.core import portable_math
+from flightstack.core.compiled import IS_DISABLED
 from flightstack.firmware.generator.calls import c_prototype
-from flightstack.firmware.generator.law import Function, load, python_function
+from flightstack.firmware.generator.law import Function, load, python_function, static_name
 from flightstack.firmware.generator.text import comment, fold, identifier, snake_case
 from flightstack.firmware.generator.types import (
     Array,
     Record,
     Several,
+    Single,
     Type,
     c_size,
     c_type,
@@ -40,21 +40,23 @@ class Unit:
 
     def __init__(self, program: Program, module: str) -> None:
         self.program, self.module = program, module
-        self.name = unit_name(module)
+        self.name = program.names.get(module) or unit_name(module)
         self.functions: list[Function] = []
         self.includes: set[str] = set()
         self.records: list[type] = []
         self._constants: dict[str, str] = {}
         self._tables: dict[str, list[str]] = {}
         self.static_names = frozenset(
-            identifier(name.strip("_"))
+            static_name(name, module)
             for name, value in vars(sys.modules[module]).items()
             if name.startswith("_") and python_function(value) is not None
         )
 
     def constant(self, name: str, text: str) -> str:
         """Return the macro of a constant."""
-        made = f"{prefix_of(self.module)}_{identifier(name).strip('_')}".upper()
+        is_inline = self.module in self.program.inline  # other units see its macros
+        prefix = self.name if is_inline else prefix_of(self.module)
+        made = f"{prefix}_{identifier(name).strip('_')}".upper()
         known = self._constants.setdefault(made, text)
         if known != text:  # two constants of one name, of different modules
             made = f"{made}_{len(self._constants)}"
@@ -72,7 +74,7 @@ class Unit:
     def require(self, caller: Function, node: ast.AST, target: Any) -> Function:
         """Return the translation of a function that ``caller`` calls."""
         callee = self.program.translated(target, caller, node)
-        if callee.module != self.module or callee.python in WRITTEN_BY_HAND:
+        if callee.module != self.module or not self.program.writes(callee):
             if callee.is_private:
                 raise caller.refusal(
                     node, "function call", f"private function {callee.name} of another module"
@@ -144,6 +146,7 @@ class Unit:
 
     def _type_headers(self) -> set[str]:
         kinds = [kind for function in self.functions for kind in _types(function)]
+        kinds += [part for kind in self.records for part in _parts(Record(kind))]
         homes = {self.program.home_of(kind) for kind in kinds}
         return {f"{home}.h" for home in homes if home and home != self.name}
 
@@ -156,14 +159,20 @@ class Program:
         provided: Mapping[str, str] = PROVIDED,
         types: Mapping[type, str] | None = None,
         accepts_plain: bool = False,
+        below: Program | None = None,
+        names: Mapping[str, str] | None = None,
+        inline: Sequence[str] = (),
     ) -> None:
         """Translate without writing the modules of ``provided``, which are in C already: module → header.
 
         ``types`` has the headers of records that are declared elsewhere. ``accepts_plain`` accepts
-        functions that are not marked @compiled.
+        functions that are not marked @compiled. The functions of the program ``below`` are called, not written;
+        ``names`` gives other names to the files of modules that both programs have. The modules of ``inline`` are
+        headers with their functions.
         """
         self.provided = dict(provided)
-        self.accepts_plain = accepts_plain or bool(numba.config.DISABLE_JIT)  # then nothing is marked
+        self.below, self.names, self.inline = below, dict(names or {}), frozenset(inline)
+        self.accepts_plain = accepts_plain or IS_DISABLED  # then nothing is marked
         self.units: dict[str, Unit] = {}
         self.types: dict[type, str] = dict(types or {})
         """Header of each record that is not declared by its unit."""
@@ -181,7 +190,7 @@ class Program:
 
         python = python_function(target)
         assert python is not None
-        known = self._functions.get(python)
+        known = self.known(python) or (self.below.known(python) if self.below is not None else None)
         if known is not None:
             return known
         if python in self._open and caller is not None and node is not None:
@@ -192,7 +201,8 @@ class Program:
             self._open.append(python)
             translate(function, unit)
             self._open.pop()
-            unit.functions.append(function)
+            if not function.part:
+                unit.functions.append(function)
             if not function.is_private and self._public.setdefault(function.c_name, python) is not python:
                 detail = f"second function {function.name}"
                 raise function.refusal(function.node, "two functions of one name", detail)
@@ -200,6 +210,14 @@ class Program:
                 self._declare(kind, unit)
         self._functions[python] = function
         return function
+
+    def known(self, python: Callable[..., Any]) -> Function | None:
+        """Return the translation of a function, if it has one."""
+        return self._functions.get(python)
+
+    def writes(self, function: Function) -> bool:
+        """Return True for a function that is written to a unit of this program."""
+        return function.python in self._functions and function.python not in WRITTEN_BY_HAND
 
     def unit(self, module: str) -> Unit:
         """Return the unit of a module."""
@@ -211,6 +229,8 @@ class Program:
         """Return the header that declares a function, without its ending."""
         if function.python in WRITTEN_BY_HAND:
             return "fs_math"
+        if self.below is not None and self.below.known(function.python) is not None:
+            return self.below.header_of(function)
         return self.provided.get(function.module, self.unit(function.module).name)
 
     def home_of(self, kind: type) -> str:
@@ -260,6 +280,8 @@ def structure(kind: type, name: str = "") -> list[str]:
 def _parts(kind: Type) -> list[type]:
     if isinstance(kind, Record):
         return [*(part for inner in kind.fields.values() for part in _parts(inner)), kind.kind]
+    if isinstance(kind, Single):
+        return _parts(kind.record)
     if isinstance(kind, Several):
         return [part for inner in kind.items for part in _parts(inner)]
     return []

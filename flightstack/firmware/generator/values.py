@@ -10,7 +10,7 @@ from flightstack.firmware.generator.types import BOOL, INT, REAL, WHOLE, Record,
 
 
 class Form(Enum):
-    """How C's text denotes a value."""
+    """Form of a value in the text of C."""
 
     VALUE = "value"
     """A number, or a structure that has an address."""
@@ -43,6 +43,8 @@ class Value:
     """Variable that the value is a part of."""
     callee: str = ""
     """Function that returned the value."""
+    owner: Value | None = None
+    """The structure of which the value is a field."""
 
     def within(self, rank: int) -> str:
         """Return the text as an operand of an operator of this rank."""
@@ -98,7 +100,7 @@ def as_whole(value: Value) -> Value:
 def field_of(record: Value, name: str, kind: Type) -> Value:
     """Return a field of a structure that has an address."""
     arrow = "->" if record.form is Form.POINTER else "."
-    return Value(kind, f"{record.text}{arrow}{name}", root=record.root)
+    return Value(kind, f"{record.text}{arrow}{name}", root=record.root, owner=record)
 
 
 def address(value: Value) -> str:

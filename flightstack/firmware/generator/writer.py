@@ -9,10 +9,20 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from flightstack.firmware.generator.analysis import Path, Usage
 from flightstack.firmware.generator.law import Function
 from flightstack.firmware.generator.text import WIDTH, comment, fold, identifier
-from flightstack.firmware.generator.types import INT, Array, Record, Scalar, Type, c_size, c_type, has_rotors
-from flightstack.firmware.generator.usage import Path, Usage
+from flightstack.firmware.generator.types import (
+    INT,
+    Array,
+    Record,
+    Scalar,
+    Single,
+    Type,
+    c_size,
+    c_type,
+    has_rotors,
+)
 from flightstack.firmware.generator.values import Form, Value
 
 if TYPE_CHECKING:
@@ -58,7 +68,7 @@ class Writer:
         self._local = names | set(self.usage.stores) | self.usage.loop_variables
         self._taken = {self._c_local(name) for name in self._local} | {name for name, _ in function.outputs}
         for parameter in function.parameters:
-            form = Form.POINTER if isinstance(parameter.type, Record) else Form.VALUE
+            form = Form.POINTER if isinstance(parameter.type, Record | Single) else Form.VALUE
             self.variables[parameter.name] = Variable(
                 identifier(parameter.name), parameter.type, form, parameter.name, is_stable=True
             )
@@ -153,6 +163,14 @@ class Writer:
                 return f"{identifier(parameter.name)}->rotors"
         self.function.needs_rotors = True
         return "rotors"
+
+    def size_of(self, array: Value) -> Value | None:
+        """Return the size of a parameter that is an array of any size, a parameter of its own; else None."""
+        is_parameter = array.root in self._parameters() and array.text == identifier(array.root)
+        if not is_parameter or array.type != Array(("",)):
+            return None
+        self.function.sized.add(array.root)
+        return Value(INT, f"{array.text}_size")
 
     def write_to(self, node: ast.AST, value: Value) -> None:
         """Note that the function writes to an array: a variable, a parameter, or a field of a parameter."""

@@ -1,0 +1,308 @@
+/* Generated from Python by flightstack.firmware.generator: do not edit. */
+/* Fusion of each sensor's measurements at the delayed horizon. flightstack/estimation/fusion.py */
+#include "fs_fusion.h"
+
+#include "fs_derived_generated.h"
+#include "fs_error_state.h"
+#include "fs_kalman.h"
+#include "fs_math.h"
+
+#define FS_MAG 7
+#define FS_VELOCITY 3
+#define FS_REST_VELOCITY 11
+#define FS_GYRO_BIAS 9
+#define FS_REST_RATE 14
+#define FS_POSITION 6
+#define FS_HOLD_POSITION 17
+#define FS_GNSS_VELOCITY 0
+#define FS_FUSED_S 3
+#define FS_AIDED_S FS_LIT(1.0)
+#define FS_BARO_BIAS 23
+#define FS_BARO 6
+#define FS_HOLDS_HORIZONTAL FS_LIT(2.0)
+#define FS_RANGE 10
+#define FS_UNKNOWN_VERTICAL_M FS_LIT(8.0)
+#define FS_UNKNOWN_M FS_LIT(5.0)
+#define FS_UNKNOWN_M_S FS_LIT(0.5)
+#define FS_GNSS_BIAS 24
+#define FS_VELOCITY_IS_WRONG FS_LIT(2.0)
+#define FS_WRONG_VELOCITY_M_S FS_LIT(2.0)
+#define FS_INNOVATION 0
+#define FS_INNOVATION_VARIANCE 1
+#define FS_CONFIRMATION FS_LIT(0.02)
+#define FS_LEAST_SHARE FS_LIT(0.01)
+#define FS_POSITION_DRIFTS FS_LIT(1.0)
+#define FS_GNSS_POSITION 3
+#define FS_REFUSED 7
+#define FS_DRAG_GATE FS_LIT(5.0)
+#define FS_AIR_KG_M3 FS_LIT(1.225)
+#define FS_DRAG 23
+
+/* fusion.py:195 */
+void fs_fuse_field(fs_filter *f, const fs_vector3 *measured, const fs_estimator_params *params)
+{
+    const fs_real largest = params->mag_largest_noise_gauss;
+    const fs_noise noise = {
+        .least = params->mag_noise_gauss,
+        .start = largest,
+        .largest = largest,
+        .gate = params->mag_gate,
+        .is_slow = FS_LIT(1.0),
+    };
+    const fs_real holds = FS_LIT(1.0) - params->mag_corrects_tilt;
+    for (int32_t axis = 0; axis < 3; axis++) {
+        const fs_nominal n = fs_read_nominal(f->nominal);
+        const fs_vector3 *earth = &n.earth_field_ned_gauss;
+        const fs_vector3 *body = &n.body_field_frd_gauss;
+        fs_clear(f->h);
+        fs_real expected;
+        fs_real innovation;
+        if (axis == 0) {
+            expected = fs_field_x_jacobian(&n.attitude, earth, body, f->h);
+            innovation = measured->x - expected;
+        } else {
+            if (axis == 1) {
+                expected = fs_field_y_jacobian(&n.attitude, earth, body, f->h);
+                innovation = measured->y - expected;
+            } else {
+                expected = fs_field_z_jacobian(&n.attitude, earth, body, f->h);
+                innovation = measured->z - expected;
+            }
+        }
+        (void)fs_fuse(f, FS_MAG + axis, innovation, &noise, holds);
+    }
+}
+
+/* fusion.py:243 */
+void fs_fuse_rest_velocity(fs_filter *f, const fs_estimator_params *params)
+{
+    const fs_real velocity = params->rest_velocity_noise_m_s;
+    const fs_noise noise = {velocity, velocity, velocity, FS_LIT(5.0), FS_LIT(0.0)};
+    for (int32_t axis = 0; axis < 3; axis++) {
+        fs_clear(f->h);
+        f->h[FS_VELOCITY + axis] = FS_LIT(1.0);
+        (void)fs_fuse(f, FS_REST_VELOCITY + axis, -f->nominal[4 + axis], &noise, FS_LIT(0.0));
+    }
+}
+
+/* fusion.py:254 */
+void fs_fuse_rest_rate(fs_filter *f, const fs_vector3 *rate_rad_s, fs_real variance,
+                       const fs_estimator_params *params)
+{
+    const fs_real deviation = params->rest_rate_noise_rad_s + fs_sqrt(variance);
+    const fs_noise noise = {deviation, deviation, deviation, FS_LIT(3.0), FS_LIT(0.0)};
+    for (int32_t axis = 0; axis < 3; axis++) {
+        fs_clear(f->h);
+        f->h[FS_GYRO_BIAS + axis] = FS_LIT(1.0);
+        const fs_real value = axis == 0 ? rate_rad_s->x : (axis == 1 ? rate_rad_s->y : rate_rad_s->z);
+        (void)fs_fuse(f, FS_REST_RATE + axis, value - f->nominal[10 + axis], &noise, FS_LIT(0.0));
+    }
+}
+
+/* fusion.py:266 */
+void fs_fuse_hold(fs_filter *f, fs_real north_m, fs_real east_m, const fs_estimator_params *params)
+{
+    const fs_noise noise = {
+        .least = params->hold_noise_m,
+        .start = params->hold_noise_m,
+        .largest = params->hold_noise_m,
+        .gate = FS_LIT(100.0),
+        .is_slow = FS_LIT(0.0),
+    };
+    for (int32_t axis = 0; axis < 2; axis++) {
+        fs_clear(f->h);
+        f->h[FS_POSITION + axis] = FS_LIT(1.0);
+        const fs_real held_m = axis == 0 ? north_m : east_m;
+        (void)fs_fuse(f, FS_HOLD_POSITION + axis, held_m - f->nominal[7 + axis], &noise, FS_LIT(0.0));
+    }
+}
+
+/* fusion.py:161 */
+void fs_fuse_baro(fs_filter *f, fs_real altitude_m, fs_real age_s, const fs_estimator_params *params)
+{
+    const bool is_aided = f->clock[0] - f->observations[FS_GNSS_VELOCITY][FS_FUSED_S] < FS_AIDED_S;
+    fs_clear(f->h);
+    f->h[FS_POSITION + 2] = FS_LIT(-1.0);
+    f->h[FS_BARO_BIAS] = FS_LIT(1.0);
+    const fs_real predicted_m = -(f->nominal[9] - age_s * f->nominal[6]) + f->nominal[24];
+    const fs_noise noise = {
+        .least = params->baro_noise_m,
+        .start = FS_LIT(1.0),
+        .largest = params->baro_largest_noise_m,
+        .gate = params->baro_gate,
+        .is_slow = FS_LIT(0.0),
+    };
+    (void)fs_fuse(f, FS_BARO, altitude_m - predicted_m, &noise, is_aided ? FS_LIT(0.0) : FS_HOLDS_HORIZONTAL);
+}
+
+/* fusion.py:177 */
+fs_real fs_cos_tilt_of(const fs_filter *f)
+{
+    const fs_real x = f->nominal[1];
+    const fs_real y = f->nominal[2];
+    const fs_real cosine = FS_LIT(1.0) - FS_LIT(2.0) * (x * x + y * y);
+    return cosine;
+}
+
+/* fusion.py:185 */
+void fs_fuse_range(fs_filter *f, fs_real vertical_m, fs_real ground_m, fs_real age_s,
+                   const fs_estimator_params *params)
+{
+    fs_clear(f->h);
+    f->h[FS_POSITION + 2] = FS_LIT(-1.0);
+    const fs_real height_m = ground_m - (f->nominal[9] - age_s * f->nominal[6]);
+    const fs_noise noise = {
+        .least = params->range_noise_m,
+        .start = params->range_noise_m,
+        .largest = FS_LIT(1.0),
+        .gate = params->range_gate,
+        .is_slow = FS_LIT(0.0),
+    };
+    (void)fs_fuse(f, FS_RANGE, vertical_m - height_m, &noise, FS_LIT(0.0));
+}
+
+/* Return an accuracy that a receiver states; unknown if it states none. Zero is an ideal receiver's. fusion.py:64 */
+static fs_real stated(fs_real accuracy, fs_real unknown)
+{
+    return fs_is_finite(accuracy) && accuracy >= FS_LIT(0.0) ? accuracy : unknown;
+}
+
+/* fusion.py:76 */
+fs_real fs_vertical_accuracy(const fs_real row[10])
+{
+    return stated(row[8], FS_UNKNOWN_VERTICAL_M);
+}
+
+/* fusion.py:70 */
+fs_real fs_horizontal_accuracy(const fs_real row[10])
+{
+    return stated(row[7], FS_UNKNOWN_M);
+}
+
+/* fusion.py:88 */
+fs_real fs_gnss_bias_share(const fs_estimator_params *params, int32_t axis)
+{
+    return params->gnss_bias_share * (axis == 2 ? fs_sqrt(FS_LIT(2.0)) : FS_LIT(1.0));
+}
+
+/* fusion.py:82 */
+fs_real fs_speed_accuracy(const fs_real row[10])
+{
+    return stated(row[9], FS_UNKNOWN_M_S);
+}
+
+/* Propagate the Gauss-Markov process of the GNSS position bias. fusion.py:94 */
+static void drift_gnss_bias(fs_filter *f, fs_real elapsed_s, fs_real eph_m, fs_real epv_m,
+                            const fs_estimator_params *params)
+{
+    const fs_real kept = fs_max(FS_LIT(0.0), FS_LIT(1.0) - elapsed_s / params->gnss_bias_s);
+    for (int32_t at = 24; at < 27; at++) {
+        const fs_real spread = fs_gnss_bias_share(params, at - FS_GNSS_BIAS) *
+                               (at == FS_GNSS_BIAS + 2 ? epv_m : eph_m);
+        f->nominal[at + 1] *= kept;
+        for (int32_t j = 0; j < at + 1; j++) {
+            f->covariance[j][at] *= kept;
+        }
+        for (int32_t j = at; j < 27; j++) {
+            f->covariance[at][j] *= kept;
+        }
+        f->covariance[at][at] += (FS_LIT(1.0) - kept * kept) * spread * spread;
+    }
+}
+
+/*
+ * Adapt the share of the measured IMU noise that counts, so that innovations have their predicted variance.
+ *
+ * Fast motion and vibration look like noise of the IMU, but do not add up to an error of the velocity.
+ *
+ * fusion.py:110
+ */
+static void confirm_imu_noise(fs_filter *f, int32_t row)
+{
+    const fs_real ratio = fs_min(f->observations[row][FS_INNOVATION] * f->observations[row][FS_INNOVATION] /
+                                 f->observations[row][FS_INNOVATION_VARIANCE], FS_LIT(6.0));
+    f->clock[1] = fs_min(fs_max(f->clock[1] * (FS_LIT(1.0) + FS_CONFIRMATION * (ratio - FS_LIT(1.0))),
+                                FS_LEAST_SHARE), FS_LIT(1.0));
+}
+
+/* fusion.py:121 */
+void fs_fuse_gnss(fs_filter *f, const fs_real row[10], fs_real age_s, fs_real elapsed_s, int32_t first,
+                  const fs_vector3 *faults, const fs_estimator_params *params)
+{
+    const fs_real eph_m = fs_horizontal_accuracy(row);
+    const fs_real epv_m = fs_vertical_accuracy(row);
+    const fs_real speed_m_s = fs_speed_accuracy(row);
+    drift_gnss_bias(f, elapsed_s, eph_m, epv_m, params);
+    fs_real fault;
+    fs_real least;
+    fs_noise noise;
+    for (int32_t axis = first; axis < 3; axis++) {
+        fault = axis == 0 ? faults->x : (axis == 1 ? faults->y : faults->z);
+        least = fault == FS_VELOCITY_IS_WRONG ? FS_WRONG_VELOCITY_M_S : params->gnss_velocity_noise_m_s;
+        noise = (fs_noise){
+            .least = least,
+            .start = speed_m_s,
+            .largest = fs_max(FS_LIT(2.0) * speed_m_s, least),
+            .gate = params->gnss_velocity_gate,
+            .is_slow = FS_LIT(0.0),
+        };
+        fs_clear(f->h);
+        f->h[FS_VELOCITY + axis] = FS_LIT(1.0);
+        const bool accepted = fs_fuse(f, FS_GNSS_VELOCITY + axis, row[4 + axis] - f->nominal[4 + axis], &noise,
+                                      FS_LIT(0.0));
+        if (accepted && fault != FS_VELOCITY_IS_WRONG) {
+            confirm_imu_noise(f, FS_GNSS_VELOCITY + axis);
+        }
+    }
+    for (int32_t axis = first; axis < 3; axis++) {
+        fault = axis == 0 ? faults->x : (axis == 1 ? faults->y : faults->z);
+        if (fault == FS_POSITION_DRIFTS) {
+            f->observations[FS_GNSS_POSITION + axis][FS_REFUSED] += FS_LIT(1.0);
+            continue;
+        }
+        const fs_real accuracy_m = axis == 2 ? epv_m : eph_m;
+        least = params->gnss_position_noise_m;
+        noise = (fs_noise){
+            .least = least,
+            .start = accuracy_m,
+            .largest = fs_max(FS_LIT(2.0) * accuracy_m, least),
+            .gate = params->gnss_position_gate,
+            .is_slow = FS_LIT(0.0),
+        };
+        fs_clear(f->h);
+        f->h[FS_POSITION + axis] = FS_LIT(1.0);
+        f->h[FS_GNSS_BIAS + axis] = FS_LIT(1.0);
+        const fs_real then_m = f->nominal[7 + axis] - age_s * f->nominal[4 + axis];
+        (void)fs_fuse(f, FS_GNSS_POSITION + axis, row[1 + axis] - then_m - f->nominal[25 + axis], &noise,
+                      FS_LIT(0.0));
+    }
+}
+
+/* fusion.py:217 */
+void fs_fuse_drag(fs_filter *f, const fs_vector3 *force, const fs_estimator_params *params)
+{
+    const fs_real deviation = fs_sqrt(params->drag_variance);
+    const fs_noise noise = {deviation, deviation, deviation, FS_DRAG_GATE, FS_LIT(0.0)};
+    for (int32_t axis = 0; axis < 2; axis++) {
+        const fs_nominal n = fs_read_nominal(f->nominal);
+        const fs_vector3 *v = &n.velocity_ned_m_s;
+        const fs_vector3 *bias = &n.accel_bias_m_s2;
+        const fs_real north = n.wind_north_m_s;
+        const fs_real east = n.wind_east_m_s;
+        const fs_real speed = fs_sqrt((v->x - north) * (v->x - north) + (v->y - east) * (v->y - east) + v->z * v->z);
+        const fs_real ballistic = axis == 0 ? params->ballistic_x_kg_m2 : params->ballistic_y_kg_m2;
+        const fs_real rate = params->momentum_drag_1_s +
+                             (ballistic > FS_LIT(0.0) ? FS_LIT(0.5) * FS_AIR_KG_M3 * speed / ballistic : FS_LIT(0.0));
+        fs_clear(f->h);
+        fs_real expected;
+        fs_real innovation;
+        if (axis == 0) {
+            expected = fs_drag_x_jacobian(&n.attitude, v, bias, north, east, rate, f->h);
+            innovation = force->x - expected;
+        } else {
+            expected = fs_drag_y_jacobian(&n.attitude, v, bias, north, east, rate, f->h);
+            innovation = force->y - expected;
+        }
+        (void)fs_fuse(f, FS_DRAG + axis, innovation, &noise, FS_LIT(0.0));
+    }
+}

@@ -1,0 +1,80 @@
+/* Generated from Python by flightstack.firmware.generator: do not edit. */
+/* Fusion of each sensor's measurements at the delayed horizon. flightstack/estimation/fusion.py */
+#ifndef FS_FUSION_H
+#define FS_FUSION_H
+
+#include "fs_estimator_params.h"
+#include "fs_kalman.h"
+#include "fs_types.h"
+
+/* Fuse the magnetic field in the body frame, axis by axis. fusion.py:195 */
+void fs_fuse_field(fs_filter *f, const fs_vector3 *measured, const fs_estimator_params *params);
+
+/* Fuse zero velocity of a vehicle that stands. fusion.py:243 */
+void fs_fuse_rest_velocity(fs_filter *f, const fs_estimator_params *params);
+
+/*
+ * Fuse zero rate of a vehicle that stands: rate_rad_s, with this variance of noise, is the bias of the gyro.
+ * fusion.py:254
+ */
+void fs_fuse_rest_rate(fs_filter *f, const fs_vector3 *rate_rad_s, fs_real variance,
+                       const fs_estimator_params *params);
+
+/*
+ * Fuse a horizontal position that is held without a measurement of it, which bounds velocity and tilt. fusion.py:266
+ */
+void fs_fuse_hold(fs_filter *f, fs_real north_m, fs_real east_m, const fs_estimator_params *params);
+
+/*
+ * Fuse a pressure altitude: minus the position down, plus the barometer's bias.
+ *
+ * It leaves horizontal position and velocity alone in dead reckoning: their errors are then so much larger than that
+ * of the height that pressure in turns and gusts, which is not white noise, moves them by metres.
+ *
+ * fusion.py:161
+ */
+void fs_fuse_baro(fs_filter *f, fs_real altitude_m, fs_real age_s, const fs_estimator_params *params);
+
+/* Return the cosine of the angle between the body's down axis and the vertical. fusion.py:177 */
+fs_real fs_cos_tilt_of(const fs_filter *f);
+
+/* Fuse the vertical part of a distance to level ground at ground_m below the origin. fusion.py:185 */
+void fs_fuse_range(fs_filter *f, fs_real vertical_m, fs_real ground_m, fs_real age_s,
+                   const fs_estimator_params *params);
+
+/* Return the accuracy [m] of the altitude of a GNSS measurement. fusion.py:76 */
+fs_real fs_vertical_accuracy(const fs_real row[10]);
+
+/* Return the accuracy [m] of the horizontal position of a GNSS measurement. fusion.py:70 */
+fs_real fs_horizontal_accuracy(const fs_real row[10]);
+
+/*
+ * Return the share of the stated accuracy that is a slow error of one axis: eph covers two axes, epv one.
+ * fusion.py:88
+ */
+fs_real fs_gnss_bias_share(const fs_estimator_params *params, int32_t axis);
+
+/* Return the accuracy [m/s] of the velocity of a GNSS measurement. fusion.py:82 */
+fs_real fs_speed_accuracy(const fs_real row[10]);
+
+/*
+ * Fuse position and velocity from axis first, measured age_s before the time of the state.
+ *
+ * faults has the fault of each axis: a position that drifts is refused, a wrong velocity has more noise.
+ *
+ * fusion.py:121
+ */
+void fs_fuse_gnss(fs_filter *f, const fs_real row[10], fs_real age_s, fs_real elapsed_s, int32_t first,
+                  const fs_vector3 *faults, const fs_estimator_params *params);
+
+/*
+ * Fuse the specific force along the body's x and y axes, which in flight is the drag of the air.
+ *
+ * Drag is -(momentum_drag_1_s + 12 rho |u| / ballistic coefficient) u for the velocity u relative to the air: that of
+ * the rotors' momentum and that of the body. Its change with |u| is left out of the Jacobian.
+ *
+ * fusion.py:217
+ */
+void fs_fuse_drag(fs_filter *f, const fs_vector3 *force, const fs_estimator_params *params);
+
+#endif

@@ -1,0 +1,63 @@
+/* Generated from Python by flightstack.firmware.generator: do not edit. */
+/* Health of an estimate: what commander and arming checks need to know of it. flightstack/estimation/health.py */
+#include "fs_health.h"
+
+#include "fs_math.h"
+
+#define FS_GNSS_POSITION 3
+#define FS_FUSED_S 3
+#define FS_GNSS_VELOCITY 0
+#define FS_POSITION 6
+#define FS_VELOCITY 3
+#define FS_ATTITUDE 0
+#define FS_GYRO_BIAS 9
+#define FS_ACCEL_BIAS 12
+#define FS_TEST_RATIO 2
+#define FS_SMOOTHING FS_LIT(0.1)
+#define FS_BARO 6
+#define FS_MAG 7
+
+/* health.py:86 */
+static fs_real largest(const fs_real values[], int32_t first, int32_t count)
+{
+    fs_real largest_ = FS_LIT(0.0);
+    for (int32_t i = first; i < first + count; i++) {
+        largest_ = fs_max(largest_, fs_abs(values[i]));
+    }
+    return largest_;
+}
+
+/* Return a mean of test ratios after the newest one, the largest of count rows. health.py:94 */
+static fs_real mean_ratio(fs_real mean, const fs_real observations[25][9], int32_t first, int32_t count)
+{
+    fs_real largest_ = FS_LIT(0.0);
+    for (int32_t row = first; row < first + count; row++) {
+        largest_ = fs_max(largest_, fs_abs(observations[row][FS_TEST_RATIO]));
+    }
+    return mean + FS_SMOOTHING * (fs_sqrt(largest_) - mean);
+}
+
+/* health.py:103 */
+void fs_health_kernel(const fs_estimator_memory *memory, fs_real summary[12])
+{
+    const fs_estimator_memory *m = memory;
+    const fs_real position_s = fs_min(m->filter.observations[FS_GNSS_POSITION][FS_FUSED_S],
+                                      m->filter.observations[FS_GNSS_POSITION + 1][FS_FUSED_S]);
+    const fs_real velocity_s = fs_min(m->filter.observations[FS_GNSS_VELOCITY][FS_FUSED_S],
+                                      m->filter.observations[FS_GNSS_VELOCITY + 1][FS_FUSED_S]);
+    summary[0] = m->filter.clock[0] - fs_max(position_s, velocity_s);
+    summary[1] = fs_max(fs_max(m->refused_s[3], m->refused_s[4]), m->refused_s[5]);
+    summary[2] = m->output[0] - m->filter.clock[0];
+    summary[3] = fs_sqrt(m->filter.covariance[FS_POSITION][FS_POSITION] +
+                         m->filter.covariance[FS_POSITION + 1][FS_POSITION + 1]);
+    summary[4] = fs_sqrt(m->filter.covariance[FS_VELOCITY][FS_VELOCITY] +
+                         m->filter.covariance[FS_VELOCITY + 1][FS_VELOCITY + 1]);
+    summary[5] = fs_sqrt(fs_max(m->filter.covariance[FS_ATTITUDE][FS_ATTITUDE],
+                                m->filter.covariance[FS_ATTITUDE + 1][FS_ATTITUDE + 1]));
+    summary[6] = largest(m->filter.nominal, FS_GYRO_BIAS + 1, 3);
+    summary[7] = largest(m->filter.nominal, FS_ACCEL_BIAS + 1, 3);
+    summary[8] = mean_ratio(summary[8], (const fs_real(*)[9])m->filter.observations, FS_GNSS_VELOCITY, 3);
+    summary[9] = mean_ratio(summary[9], (const fs_real(*)[9])m->filter.observations, FS_GNSS_POSITION, 2);
+    summary[10] = mean_ratio(summary[10], (const fs_real(*)[9])m->filter.observations, FS_BARO, 1);
+    summary[11] = mean_ratio(summary[11], (const fs_real(*)[9])m->filter.observations, FS_MAG, 3);
+}

@@ -1,0 +1,30 @@
+/* Generated from Python by flightstack.firmware.generator: do not edit. */
+/*
+ * Accumulation of raw IMU samples to steps of the filter, with coning and sculling, and the noise of the samples.
+ * flightstack/estimation/imu_input.py
+ */
+#ifndef FS_IMU_INPUT_H
+#define FS_IMU_INPUT_H
+
+#include "fs_prediction.h"
+#include "fs_types.h"
+
+/* Add one raw sample. imu_input.py:27 */
+void fs_add_sample(fs_real sums[64], const fs_vector3 *gyro, const fs_vector3 *accel, fs_real dt_s);
+
+/* Return the accumulated step that ends at time_s, and start the next one. imu_input.py:96 */
+fs_delta_sample fs_take_step(fs_real sums[64], fs_real time_s);
+
+/* Read a step from a row of the IMU ring. imu_input.py:121 */
+fs_delta_sample fs_read_step(const fs_real row[]);
+
+/* Return the rate [rad/s], smoothed over 0.1 s. imu_input.py:84 */
+fs_vector3 fs_mean_rate(const fs_real sums[64]);
+
+/* Return the specific force [m/s^2], smoothed over 0.1 s. imu_input.py:90 */
+fs_vector3 fs_mean_force(const fs_real sums[64]);
+
+/* Write a step to a row of the IMU ring, shape (14,). imu_input.py:111 */
+void fs_write_step(fs_real row[], const fs_delta_sample *sample);
+
+#endif

@@ -1,0 +1,188 @@
+/* Generated from Python by flightstack.firmware.generator: do not edit. */
+/*
+ * Scalar measurement updates of the error-state Kalman filter, with gates and adaptive measurement noise.
+ * flightstack/estimation/kalman.py
+ */
+#include "fs_kalman.h"
+
+#include "fs_error_state.h"
+#include "fs_math.h"
+
+#define FS_NOISE 4
+#define FS_LAGGED 5
+#define FS_LARGEST_CORRELATION FS_LIT(0.95)
+#define FS_INNOVATION 0
+#define FS_INNOVATION_VARIANCE 1
+#define FS_TEST_RATIO 2
+#define FS_REFUSED 7
+#define FS_FUSED 6
+#define FS_NIS_SUM 8
+#define FS_ADAPTATION FS_LIT(0.01)
+#define FS_PRIOR FS_LIT(2.0)
+#define FS_HOLDS_HORIZONTAL FS_LIT(2.0)
+#define FS_FUSED_S 3
+
+/* kalman.py:193 */
+void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
+{
+    for (int32_t i = at; i < at + count; i++) {
+        for (int32_t j = 0; j < i; j++) {
+            p[j][i] = FS_LIT(0.0);
+        }
+        for (int32_t j = i; j < 27; j++) {
+            p[i][j] = FS_LIT(0.0);
+        }
+        p[i][i] = variance;
+    }
+}
+
+/* kalman.py:82 */
+void fs_clear(fs_real x[27])
+{
+    for (int32_t i = 0; i < 27; i++) {
+        x[i] = FS_LIT(0.0);
+    }
+}
+
+/* Write P h' to ph and return h P h'. kalman.py:95 */
+static fs_real project(fs_filter *f)
+{
+    fs_clear(f->ph);
+    for (int32_t k = 0; k < 27; k++) {
+        const fs_real slope = f->h[k];
+        if (slope != FS_LIT(0.0)) {
+            for (int32_t i = 0; i < k; i++) {
+                f->ph[i] += slope * f->covariance[i][k];
+            }
+            for (int32_t i = k; i < 27; i++) {
+                f->ph[i] += slope * f->covariance[k][i];
+            }
+        }
+    }
+    fs_real total = FS_LIT(0.0);
+    for (int32_t i = 0; i < 27; i++) {
+        total += f->h[i] * f->ph[i];
+    }
+    return total;
+}
+
+/*
+ * Move the noise variance r towards that of the accepted innovation; the first ones count for more.
+ *
+ * Half the squared difference of two successive innovations has the variance of white noise, and an error of the
+ * model, which both have, does not count. A slow sensor has the whole variance, as its correlation is counted apart.
+ *
+ * kalman.py:135
+ */
+static void adapt_noise(fs_real o[25][9], int32_t row, fs_real r, fs_real projected, fs_real last,
+                        const fs_noise *noise)
+{
+    const fs_real innovation = o[row][FS_INNOVATION];
+    o[row][FS_LAGGED] += FS_ADAPTATION * (innovation * last - o[row][FS_LAGGED]);
+    fs_real share = FS_ADAPTATION;
+    fs_real square = innovation * innovation;
+    if (noise->is_slow == FS_LIT(0.0) && o[row][FS_FUSED] > FS_LIT(1.0)) {
+        share = fs_max(share, FS_LIT(1.0) / (o[row][FS_FUSED] + FS_PRIOR));
+        square = FS_LIT(0.5) * (innovation - last) * (innovation - last);
+    }
+    const fs_real estimate = square - projected;
+    const fs_real least = noise->least * noise->least;
+    const fs_real largest = noise->largest * noise->largest;
+    o[row][FS_NOISE] = fs_min(fs_max(r + share * (estimate - r), least), largest);
+}
+
+/*
+ * Correct state and covariance with gain: P h' / variance, or zero for a state that keeps its value.
+ *
+ * Joseph's form with such a gain subtracts P h' h P / variance from the covariance, except between two states that
+ * both keep their values: one product for each element instead of two.
+ *
+ * kalman.py:112
+ */
+static void correct(fs_filter *f, fs_real innovation)
+{
+    for (int32_t i = 0; i < 27; i++) {
+        fs_real share;
+        if (f->gain[i] != FS_LIT(0.0)) {
+            share = f->gain[i];
+            for (int32_t j = i; j < 27; j++) {
+                f->covariance[i][j] -= share * f->ph[j];
+            }
+        } else {
+            if (f->ph[i] != FS_LIT(0.0)) {
+                share = f->ph[i];
+                for (int32_t j = i; j < 27; j++) {
+                    f->covariance[i][j] -= share * f->gain[j];
+                }
+            }
+        }
+    }
+    for (int32_t i = 0; i < 27; i++) {
+        f->covariance[i][i] = fs_max(f->covariance[i][i], FS_LIT(1e-12));
+        f->gain[i] *= innovation;
+    }
+    const fs_nominal read_nominal = fs_read_nominal(f->nominal);
+    const fs_nominal corrected = fs_corrected(&read_nominal, f->gain);
+    fs_write_nominal(f->nominal, &corrected);
+}
+
+/* kalman.py:153 */
+bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *noise, fs_real holds)
+{
+    const fs_real least = noise->least * noise->least;
+    const fs_real largest = noise->largest * noise->largest;
+    const fs_real r = fs_min(fs_max(f->observations[row][FS_NOISE] > FS_LIT(0.0) ? f->observations[row][FS_NOISE] :
+                                    noise->start * noise->start, least), largest);
+    const fs_real projected = project(f);
+    fs_real variance = projected + r;
+    if (noise->is_slow > FS_LIT(0.0)) {
+        const fs_real correlation = fs_min(fs_max(f->observations[row][FS_LAGGED] / variance, FS_LIT(0.0)),
+                                           FS_LARGEST_CORRELATION);
+        variance = projected + r * (FS_LIT(1.0) + correlation) / (FS_LIT(1.0) - correlation);
+    }
+    const fs_real last = f->observations[row][FS_INNOVATION];
+    const fs_real ratio = innovation * innovation / (noise->gate * noise->gate * variance);
+    f->observations[row][FS_INNOVATION] = innovation;
+    f->observations[row][FS_INNOVATION_VARIANCE] = variance;
+    f->observations[row][FS_TEST_RATIO] = ratio;
+    if (!(ratio <= FS_LIT(1.0))) {
+        f->observations[row][FS_REFUSED] += FS_LIT(1.0);
+        return false;
+    }
+    f->observations[row][FS_FUSED] += FS_LIT(1.0);
+    f->observations[row][FS_NIS_SUM] += innovation * innovation / variance;
+    adapt_noise(f->observations, row, r, projected, last, noise);
+    for (int32_t i = 0; i < 27; i++) {
+        f->gain[i] = f->ph[i] / variance;
+    }
+    if (holds == FS_HOLDS_HORIZONTAL) {
+        for (int32_t i = 0; i < 2; i++) {
+            f->gain[3 + i] = FS_LIT(0.0);
+            f->gain[6 + i] = FS_LIT(0.0);
+        }
+    } else {
+        if (holds > FS_LIT(0.0)) {
+            f->gain[0] = FS_LIT(0.0);
+            f->gain[1] = FS_LIT(0.0);
+            for (int32_t i = 3; i < 9; i++) {
+                f->gain[i] = FS_LIT(0.0);
+            }
+            for (int32_t i = 12; i < 15; i++) {
+                f->gain[i] = FS_LIT(0.0);
+            }
+        }
+    }
+    correct(f, innovation);
+    f->observations[row][FS_FUSED_S] = f->clock[0];
+    return true;
+}
+
+/* kalman.py:204 */
+fs_real fs_deviation(const fs_filter *f, int32_t at, int32_t count)
+{
+    fs_real total = FS_LIT(0.0);
+    for (int32_t i = at; i < at + count; i++) {
+        total += f->covariance[i][i];
+    }
+    return fs_sqrt(total);
+}

@@ -1,0 +1,47 @@
+/* Generated from Python by flightstack.firmware.generator: do not edit. */
+/*
+ * The memory of one estimator: a record of arrays, the meaning of its flags and of its counters of resets.
+ * flightstack/estimation/memory.py
+ */
+#ifndef FS_MEMORY_H
+#define FS_MEMORY_H
+
+#include "fs_estimator_params.h"
+#include "fs_kalman.h"
+#include "fs_rings.h"
+#include "fs_types.h"
+
+/* Parameters, state and waiting measurements of an estimator. */
+typedef struct {
+    fs_estimator_params params;
+    fs_filter filter;
+    fs_rings rings;
+    fs_real means[5][7];
+    fs_real sums[64];
+    fs_real alignment[9];
+    fs_real output[11];
+    fs_real state[13];
+    fs_real earth[4];
+    fs_real field[3];
+    fs_real rate_filter[9];
+    fs_real last_imu_s[1];
+    fs_real imu_gap[3];
+    fs_real last_gnss_s[1];
+    fs_real gnss_speed_m_s[2];
+    fs_real refused_s[6];
+    fs_real ground_m[1];
+    fs_real hold[3];
+    fs_real rest_s[1];
+    fs_real drag_s[1];
+    int32_t flags[8];
+    fs_real resets[19];
+    fs_real yaw_models[5][32];
+    fs_real yaw_fix[4];
+    fs_real followed[1];
+    fs_real checks[25];
+} fs_estimator_memory;
+
+/* Set what is not zero at the start in a memory of zeros that has its parameters. memory.py:86 */
+void fs_start_memory(fs_estimator_memory *memory);
+
+#endif

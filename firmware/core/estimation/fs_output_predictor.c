@@ -1,0 +1,110 @@
+/* Generated from Python by flightstack.firmware.generator: do not edit. */
+/*
+ * The output at the rate of the IMU: integrates each sample and follows the filter, which is late by its delay.
+ * flightstack/estimation/output_predictor.py
+ */
+#include "fs_output_predictor.h"
+
+#include "fs_error_state.h"
+#include "fs_geometry.h"
+#include "fs_math.h"
+#include "fs_rings.h"
+
+#define FS_IMU_RING 4
+#define FS_IMU_ROWS 64
+
+/* output_predictor.py:20 */
+void fs_write_motion(fs_real row[], fs_real time_s, const fs_motion *motion)
+{
+    const fs_quaternion *q = &motion->attitude;
+    row[0] = time_s;
+    row[1] = q->w;
+    row[2] = q->x;
+    row[3] = q->y;
+    row[4] = q->z;
+    fs_write_vector(row, 5, &motion->velocity_ned_m_s);
+    fs_write_vector(row, 8, &motion->position_ned_m);
+}
+
+/* output_predictor.py:14 */
+fs_motion fs_read_motion(const fs_real row[])
+{
+    return (fs_motion){
+        .attitude = {row[1], row[2], row[3], row[4]},
+        .velocity_ned_m_s = fs_read_vector(row, 5),
+        .position_ned_m = fs_read_vector(row, 8),
+    };
+}
+
+/* output_predictor.py:75 */
+static fs_vector3 between(const fs_vector3 *a, const fs_vector3 *b, fs_real share)
+{
+    return (fs_vector3){
+        .x = a->x + share * (b->x - a->x),
+        .y = a->y + share * (b->y - a->y),
+        .z = a->z + share * (b->z - a->z),
+    };
+}
+
+/*
+ * Move a row that followed from before so that it follows from after: its specific force turns too.
+ * output_predictor.py:29
+ */
+static void replayed(fs_real row[], const fs_quaternion *correction, const fs_motion *before, const fs_motion *after,
+                     fs_real gravity, fs_real start_s)
+{
+    const fs_motion late = fs_read_motion(row);
+    const fs_real age_s = row[0] - start_s;
+    fs_vector3 u = before->velocity_ned_m_s;
+    const fs_vector3 *v = &late.velocity_ned_m_s;
+    fs_vector3 p = before->position_ned_m;
+    const fs_vector3 *q = &late.position_ned_m;
+    const fs_real fall = gravity * age_s;
+    const fs_vector3 v_2 = {v->x - u.x, v->y - u.y, v->z - u.z - fall};
+    const fs_vector3 dv = fs_rotate(correction, &v_2);
+    const fs_vector3 v_3 = {
+        .x = q->x - p.x - u.x * age_s,
+        .y = q->y - p.y - u.y * age_s,
+        .z = q->z - p.z - (u.z + FS_LIT(0.5) * fall) * age_s,
+    };
+    const fs_vector3 dp = fs_rotate(correction, &v_3);
+    u = after->velocity_ned_m_s;
+    p = after->position_ned_m;
+    const fs_vector3 velocity = {u.x + dv.x, u.y + dv.y, u.z + dv.z + fall};
+    const fs_vector3 place = {
+        .x = p.x + u.x * age_s + dp.x,
+        .y = p.y + u.y * age_s + dp.y,
+        .z = p.z + (u.z + FS_LIT(0.5) * fall) * age_s + dp.z,
+    };
+    const fs_motion motion = {
+        .attitude = fs_quaternion_product(correction, &late.attitude),
+        .velocity_ned_m_s = velocity,
+        .position_ned_m = place,
+    };
+    fs_write_motion(row, row[0], &motion);
+}
+
+/* output_predictor.py:51 */
+void fs_follow(fs_rings *rings, fs_real output[], const fs_motion *target, fs_real share, fs_real gravity)
+{
+    fs_real *oldest = rings->track[fs_slot_of(rings, FS_IMU_RING, FS_IMU_ROWS, 0)];
+    const fs_motion start = fs_read_motion(oldest);
+    const fs_real start_s = oldest[0];
+    const fs_quaternion conjugate = fs_conjugate(&start.attitude);
+    const fs_quaternion quaternion_product = fs_quaternion_product(&target->attitude, &conjugate);
+    const fs_vector3 turn = fs_rotation_vector(&quaternion_product);
+    const fs_quaternion correction = fs_rotation_over(&turn, share);
+    const fs_motion after = {
+        .attitude = fs_quaternion_product(&correction, &start.attitude),
+        .velocity_ned_m_s = between(&start.velocity_ned_m_s, &target->velocity_ned_m_s, share),
+        .position_ned_m = between(&start.position_ned_m, &target->position_ned_m, share),
+    };
+    for (int32_t number = 0; number < 64; number++) {
+        if (number >= rings->cursors[FS_IMU_RING][1]) {
+            break;
+        }
+        fs_real *row = rings->track[fs_slot_of(rings, FS_IMU_RING, FS_IMU_ROWS, number)];
+        replayed(row, &correction, &start, &after, gravity, start_s);
+    }
+    replayed(output, &correction, &start, &after, gravity, start_s);
+}

@@ -1,0 +1,168 @@
+/* Generated from Python by flightstack.firmware.generator: do not edit. */
+/*
+ * Horizontal position and velocity: GNSS from its first fix to resets, and the position held without it.
+ * flightstack/estimation/position_sources.py
+ */
+#include "fs_position_sources.h"
+
+#include "fs_error_state.h"
+#include "fs_fusion.h"
+#include "fs_height_sources.h"
+#include "fs_kalman.h"
+#include "fs_math.h"
+#include "fs_resets.h"
+#include "fs_source_checks.h"
+
+#define FS_HAS_GNSS 3
+#define FS_GNSS_LOST_S FS_LIT(1.0)
+#define FS_MOVES_M_S FS_LIT(0.15)
+#define FS_HAS_YAW 6
+#define FS_GNSS_VELOCITY 0
+#define FS_FUSED_S 3
+#define FS_VELOCITY 3
+#define FS_HOLD_PERIOD_S FS_LIT(0.2)
+#define FS_POSITION 6
+#define FS_BARO_BIAS 23
+#define FS_GNSS_BIAS 24
+#define FS_GNSS_POSITION 3
+#define FS_GNSS_FAULT 17
+#define FS_LANDED 1
+#define FS_HAS_BARO 2
+#define FS_COUNTED_M FS_LIT(0.5)
+#define FS_LONGEST_INTERVAL_S FS_LIT(2.5)
+#define FS_SPEED_SMOOTHING_S FS_LIT(2.0)
+
+/* position_sources.py:130 */
+bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f)
+{
+    const fs_real north = m->gnss_speed_m_s[0];
+    const fs_real east = m->gnss_speed_m_s[1];
+    const bool is_measured = m->flags[FS_HAS_GNSS] == 1 && f->clock[0] - m->last_gnss_s[0] < FS_GNSS_LOST_S;
+    return !is_measured || fs_sqrt(north * north + east * east) < FS_MOVES_M_S;
+}
+
+/* position_sources.py:123 */
+bool fs_is_velocity_measured(const fs_filter *f)
+{
+    const fs_real fused_s = f->observations[FS_GNSS_VELOCITY][FS_FUSED_S];
+    return fused_s > FS_LIT(0.0) && f->clock[0] - fused_s < FS_GNSS_LOST_S;
+}
+
+/* position_sources.py:138 */
+bool fs_hold_position(fs_estimator_memory *m, fs_filter *f, const fs_estimator_params *params)
+{
+    const fs_real now_s = f->clock[0];
+    const bool is_used = m->flags[FS_HAS_GNSS] == 1 && m->flags[FS_HAS_YAW] == 1;
+    if (fs_is_velocity_measured(f) || (is_used && fs_deviation(f, FS_VELOCITY, 2) < params->hold_velocity_m_s)) {
+        m->hold[2] = FS_LIT(0.0);
+        return false;
+    }
+    if (m->hold[2] == FS_LIT(0.0)) {
+        m->hold[0] = f->nominal[7];
+        m->hold[1] = f->nominal[8];
+    }
+    if (now_s - m->hold[2] < FS_HOLD_PERIOD_S) {
+        return false;
+    }
+    fs_fuse_hold(f, m->hold[0], m->hold[1], params);
+    m->hold[2] = now_s;
+    return true;
+}
+
+/*
+ * Account for the errors of the first GNSS position, which becomes the origin, in the covariance.
+ *
+ * The slow part of that error is the bias of the next ones too: position and bias have opposite errors.
+ *
+ * position_sources.py:98
+ */
+static void start_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params)
+{
+    for (int32_t axis = 0; axis < 3; axis++) {
+        const fs_real accuracy_m = axis == 2 ? fs_vertical_accuracy(row) : fs_horizontal_accuracy(row);
+        const fs_real variance = accuracy_m * accuracy_m;
+        const int32_t at = FS_POSITION + axis;
+        f->covariance[at][at] += variance;
+        if (axis == 2) {
+            f->covariance[at][FS_BARO_BIAS] += variance;
+            f->covariance[FS_BARO_BIAS][FS_BARO_BIAS] += variance;
+        }
+        const fs_real share = fs_gnss_bias_share(params, axis);
+        const fs_real slow = fs_min(share * share, FS_LIT(1.0)) * variance;
+        fs_reset_variance(f->covariance, FS_GNSS_BIAS + axis, 1, slow);
+        f->covariance[at][FS_GNSS_BIAS + axis] = -slow;
+        if (axis == 2) {
+            f->covariance[FS_BARO_BIAS][FS_GNSS_BIAS + axis] = -slow;
+        }
+    }
+    m->last_gnss_s[0] = row[0];
+    m->flags[FS_HAS_GNSS] = 1;
+}
+
+/*
+ * Add up the time between refused measurements; an accepted one ends it. Time without any does not count.
+ * position_sources.py:84
+ */
+static void count_refused(fs_estimator_memory *m, const fs_filter *f, int32_t first, fs_real elapsed_s)
+{
+    for (int32_t i = 0; i < 6; i++) {
+        const int32_t axis = i >= 3 ? i - 3 : i;
+        if (axis < first || f->observations[FS_GNSS_VELOCITY + i][FS_FUSED_S] == f->clock[0]) {
+            m->refused_s[i] = FS_LIT(0.0);
+        } else {
+            if (m->refused_s[i] == FS_LIT(0.0)) {
+                m->refused_s[i] = FS_LIT(1e-06); /* the series begins */
+            } else {
+                m->refused_s[i] += elapsed_s;
+            }
+        }
+    }
+}
+
+/* position_sources.py:48 */
+void fs_take_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params)
+{
+    if (m->flags[FS_HAS_GNSS] == 0) {
+        start_gnss(m, f, row, params);
+    }
+    const fs_real elapsed_s = fs_max(FS_LIT(0.0), row[0] - m->last_gnss_s[0]);
+    m->last_gnss_s[0] = row[0];
+    const int32_t first = m->flags[FS_HAS_YAW] == 1 ? 0 : 2;
+    const fs_real outage_s = f->clock[0] - f->observations[FS_GNSS_POSITION][FS_FUSED_S];
+    const fs_vector3 position = fs_read_vector(f->nominal, 7);
+    const fs_vector3 velocity = fs_read_vector(f->nominal, 4);
+    fs_follow_drift(m->checks, f, row, fs_horizontal_accuracy(row));
+    const fs_vector3 read_vector = fs_read_vector(m->checks, FS_GNSS_FAULT);
+    fs_fuse_gnss(f, row, f->clock[0] - row[0], elapsed_s, first, &read_vector, params);
+    if (m->flags[FS_LANDED] == 0) {
+        fs_take_gnss_innovations(m->checks, f, elapsed_s, m->flags[FS_HAS_BARO] == 1);
+        if (first == 0) {
+            fs_take_horizontal_innovations(m->checks, f, elapsed_s);
+        }
+    }
+    const fs_real dx = f->nominal[7] - position.x;
+    const fs_real dy = f->nominal[8] - position.y;
+    if (outage_s > FS_GNSS_LOST_S && dx * dx + dy * dy > FS_COUNTED_M * FS_COUNTED_M) {
+        fs_count_correction(m, f, &position, &velocity);
+    }
+    count_refused(m, f, first, fs_min(elapsed_s, FS_LONGEST_INTERVAL_S));
+    const fs_real share = fs_min(elapsed_s / FS_SPEED_SMOOTHING_S, FS_LIT(1.0));
+    for (int32_t axis = 0; axis < 2; axis++) {
+        m->gnss_speed_m_s[axis] += share * (row[4 + axis] - m->gnss_speed_m_s[axis]);
+    }
+    const fs_real limit_s = params->reset_s;
+    const fs_real velocity_s = fs_max(m->refused_s[0], m->refused_s[1]);
+    const fs_real position_s = fs_max(m->refused_s[3], m->refused_s[4]);
+    if (velocity_s > limit_s) {
+        fs_reset_velocity(m, f, row, 0, 2);
+    }
+    if (velocity_s > limit_s || (position_s > limit_s && !fs_position_drifts(m->checks))) {
+        fs_reset_position(m, f, row, 0, 2);
+    }
+    if (m->refused_s[2] > limit_s) {
+        fs_reset_velocity(m, f, row, 2, 1);
+    }
+    if (m->refused_s[5] > limit_s) {
+        fs_reset_height(m, f, row);
+    }
+}

@@ -1,0 +1,154 @@
+/* Generated from Python by flightstack.firmware.generator: do not edit. */
+/*
+ * Prediction of the filter's state and covariance with one accumulated IMU sample.
+ * flightstack/estimation/prediction.py
+ */
+#include "fs_prediction.h"
+
+#include "fs_derived_generated.h"
+#include "fs_error_state.h"
+#include "fs_geometry.h"
+#include "fs_math.h"
+
+#define FS_ATTITUDE 0
+#define FS_TURN_S FS_LIT(1.0)
+#define FS_VELOCITY 3
+#define FS_POSITION 6
+#define FS_GYRO_BIAS 9
+#define FS_ACCEL_BIAS 12
+#define FS_EARTH_FIELD 15
+#define FS_BODY_FIELD 18
+#define FS_WIND 21
+#define FS_BARO_BIAS 23
+
+/* prediction.py:75 */
+fs_motion fs_motion_of(const fs_nominal *n)
+{
+    return (fs_motion){n->attitude, n->velocity_ned_m_s, n->position_ned_m};
+}
+
+/* prediction.py:55 */
+fs_vector3 fs_less_bias(const fs_vector3 *v, const fs_vector3 *bias, fs_real dt_s)
+{
+    return (fs_vector3){v->x - bias->x * dt_s, v->y - bias->y * dt_s, v->z - bias->z * dt_s};
+}
+
+/* prediction.py:61 */
+fs_motion fs_moved(const fs_motion *start, const fs_vector3 *angle, const fs_vector3 *delta_velocity, fs_real dt_s,
+                   fs_real gravity)
+{
+    const fs_vector3 dv = fs_rotate(&start->attitude, delta_velocity);
+    const fs_vector3 *v = &start->velocity_ned_m_s;
+    const fs_vector3 end = {v->x + dv.x, v->y + dv.y, v->z + dv.z + gravity * dt_s};
+    const fs_vector3 *p = &start->position_ned_m;
+    const fs_real half = FS_LIT(0.5) * dt_s;
+    const fs_quaternion rotation_over = fs_rotation_over(angle, FS_LIT(1.0));
+    const fs_quaternion quaternion_product = fs_quaternion_product(&start->attitude, &rotation_over);
+    return (fs_motion){
+        .attitude = fs_normalised(&quaternion_product),
+        .velocity_ned_m_s = end,
+        .position_ned_m = {
+            .x = p->x + half * (v->x + end.x),
+            .y = p->y + half * (v->y + end.y),
+            .z = p->z + half * (v->z + end.z),
+        },
+    };
+}
+
+/* prediction.py:99 */
+static void add(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
+{
+    for (int32_t i = at; i < at + count; i++) {
+        p[i][i] += variance;
+    }
+}
+
+/*
+ * Return the variance of each axis of the attitude by errors of scale and alignment of the gyro in a step.
+ *
+ * An error e gives e omega T after a turn of duration T. As white noise that is a density of (e omega)^2 T, with T =
+ * 1 s.
+ *
+ * prediction.py:116
+ */
+static fs_real turn_variance(const fs_vector3 *angle, fs_real dt_s, const fs_estimator_params *params)
+{
+    const fs_real square = angle->x * angle->x + angle->y * angle->y + angle->z * angle->z;
+    const fs_real error = params->gyro_scale_error;
+    return error * error * square * (FS_TURN_S / dt_s);
+}
+
+/* Add the noise of one axis of the body, a unit vector in the world frame. prediction.py:105 */
+static void add_body_noise(fs_real p[27][27], int32_t at, const fs_vector3 *axis, fs_real variance)
+{
+    p[at][at] += variance * axis->x * axis->x;
+    p[at][at + 1] += variance * axis->x * axis->y;
+    p[at][at + 2] += variance * axis->x * axis->z;
+    p[at + 1][at + 1] += variance * axis->y * axis->y;
+    p[at + 1][at + 2] += variance * axis->y * axis->z;
+    p[at + 2][at + 2] += variance * axis->z * axis->z;
+}
+
+/* prediction.py:127 */
+static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vector3 *angle,
+                              const fs_delta_sample *sample, const fs_estimator_params *params)
+{
+    const fs_real share = f->clock[1];
+    const fs_real dt_s = sample->dt_s;
+    const fs_real gyro = params->gyro_noise;
+    const fs_real accel = params->accel_noise;
+    const fs_vector3 v = {FS_LIT(1.0), FS_LIT(0.0), FS_LIT(0.0)};
+    const fs_vector3 x = fs_rotate(q, &v);
+    const fs_vector3 v_2 = {FS_LIT(0.0), FS_LIT(1.0), FS_LIT(0.0)};
+    const fs_vector3 y = fs_rotate(q, &v_2);
+    const fs_vector3 z = fs_cross(&x, &y);
+    add(f->covariance, FS_ATTITUDE, 3, turn_variance(angle, dt_s, params));
+    add_body_noise(f->covariance, FS_ATTITUDE, &x, fs_max(gyro * gyro, share * sample->gyro_density.x) * dt_s);
+    add_body_noise(f->covariance, FS_ATTITUDE, &y, fs_max(gyro * gyro, share * sample->gyro_density.y) * dt_s);
+    add_body_noise(f->covariance, FS_ATTITUDE, &z, fs_max(gyro * gyro, share * sample->gyro_density.z) * dt_s);
+    add_body_noise(f->covariance, FS_VELOCITY, &x, fs_max(accel * accel, share * sample->accel_density.x) * dt_s);
+    add_body_noise(f->covariance, FS_VELOCITY, &y, fs_max(accel * accel, share * sample->accel_density.y) * dt_s);
+    add_body_noise(f->covariance, FS_VELOCITY, &z, fs_max(accel * accel, share * sample->accel_density.z) * dt_s);
+    add(f->covariance, FS_POSITION, 3, FS_LIT(1e-08) * dt_s);
+    add(f->covariance, FS_GYRO_BIAS, 3, params->gyro_bias_walk * params->gyro_bias_walk * dt_s);
+    add(f->covariance, FS_ACCEL_BIAS, 3, params->accel_bias_walk * params->accel_bias_walk * dt_s);
+    add(f->covariance, FS_EARTH_FIELD, 3, params->earth_field_walk * params->earth_field_walk * dt_s);
+    add(f->covariance, FS_BODY_FIELD, 3, params->body_field_walk * params->body_field_walk * dt_s);
+    add(f->covariance, FS_WIND, 2, params->wind_walk * params->wind_walk * dt_s);
+    add(f->covariance, FS_BARO_BIAS, 1, params->baro_walk * params->baro_walk * dt_s);
+}
+
+/* prediction.py:81 */
+fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion)
+{
+    return (fs_nominal){
+        .attitude = motion->attitude,
+        .velocity_ned_m_s = motion->velocity_ned_m_s,
+        .position_ned_m = motion->position_ned_m,
+        .gyro_bias_rad_s = n->gyro_bias_rad_s,
+        .accel_bias_m_s2 = n->accel_bias_m_s2,
+        .earth_field_ned_gauss = n->earth_field_ned_gauss,
+        .body_field_frd_gauss = n->body_field_frd_gauss,
+        .wind_north_m_s = n->wind_north_m_s,
+        .wind_east_m_s = n->wind_east_m_s,
+        .baro_bias_m = n->baro_bias_m,
+        .gnss_bias_ned_m = n->gnss_bias_ned_m,
+    };
+}
+
+/* prediction.py:152 */
+void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_params *params)
+{
+    const fs_nominal n = fs_read_nominal(f->nominal);
+    const fs_vector3 angle = fs_less_bias(&sample->angle_rad, &n.gyro_bias_rad_s, sample->dt_s);
+    const fs_vector3 delta_velocity = fs_less_bias(&sample->velocity_m_s, &n.accel_bias_m_s2, sample->dt_s);
+    const fs_quaternion rotation_over = fs_rotation_over(&angle, FS_LIT(0.5));
+    const fs_quaternion middle = fs_quaternion_product(&n.attitude, &rotation_over);
+    const fs_motion motion_of = fs_motion_of(&n);
+    const fs_motion after = fs_moved(&motion_of, &angle, &delta_velocity, sample->dt_s, params->gravity_m_s2);
+    fs_predict_covariance(f->covariance, &middle, &delta_velocity, sample->dt_s);
+    add_process_noise(f, &middle, &angle, sample, params);
+    const fs_nominal with_motion = fs_with_motion(&n, &after);
+    fs_write_nominal(f->nominal, &with_motion);
+    f->clock[0] = sample->time_s;
+}

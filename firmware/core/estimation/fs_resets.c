@@ -1,0 +1,100 @@
+/* Generated from Python by flightstack.firmware.generator: do not edit. */
+/*
+ * Resets: a part of the state is set to a measurement, and its change is counted for guidance and position control.
+ * flightstack/estimation/resets.py
+ */
+#include "fs_resets.h"
+
+#include "fs_fusion.h"
+#include "fs_kalman.h"
+#include "fs_math.h"
+
+#define FS_YAW_RESET 16
+#define FS_RESET_CHANGE 1
+#define FS_YAW_RESET_SUM 18
+#define FS_RESET_S 7
+#define FS_POSITION_RESET 0
+#define FS_VELOCITY_RESET 8
+#define FS_RESET_SUM 4
+#define FS_LEAST_SPEED_M_S FS_LIT(0.3)
+#define FS_VELOCITY 3
+#define FS_LEAST_POSITION_M FS_LIT(0.5)
+#define FS_POSITION 6
+#define FS_GNSS_BIAS 24
+
+/* resets.py:80 */
+void fs_count_yaw_reset(fs_estimator_memory *m, fs_real turn_rad)
+{
+    m->resets[FS_YAW_RESET] += FS_LIT(1.0);
+    m->resets[FS_YAW_RESET + FS_RESET_CHANGE] = turn_rad;
+    m->resets[FS_YAW_RESET_SUM] += turn_rad;
+}
+
+/* Count a reset of position or velocity; the changes of one step of the filter are added up. resets.py:63 */
+static void count_(fs_estimator_memory *m, const fs_filter *f, int32_t kind)
+{
+    m->resets[kind] += FS_LIT(1.0);
+    if (m->resets[kind + FS_RESET_S] != f->clock[0]) {
+        m->resets[kind + FS_RESET_S] = f->clock[0];
+        for (int32_t axis = 0; axis < 3; axis++) {
+            m->resets[kind + FS_RESET_CHANGE + axis] = FS_LIT(0.0);
+        }
+    }
+}
+
+/* resets.py:74 */
+static void add_change(fs_estimator_memory *m, int32_t kind, int32_t axis, fs_real change)
+{
+    m->resets[kind + FS_RESET_CHANGE + axis] += change;
+    m->resets[kind + FS_RESET_SUM + axis] += change;
+}
+
+/* resets.py:51 */
+void fs_count_correction(fs_estimator_memory *m, const fs_filter *f, const fs_vector3 *position_m,
+                         const fs_vector3 *velocity_m_s)
+{
+    count_(m, f, FS_POSITION_RESET);
+    count_(m, f, FS_VELOCITY_RESET);
+    add_change(m, FS_POSITION_RESET, 0, f->nominal[7] - position_m->x);
+    add_change(m, FS_POSITION_RESET, 1, f->nominal[8] - position_m->y);
+    add_change(m, FS_VELOCITY_RESET, 0, f->nominal[4] - velocity_m_s->x);
+    add_change(m, FS_VELOCITY_RESET, 1, f->nominal[5] - velocity_m_s->y);
+}
+
+/* resets.py:25 */
+void fs_reset_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t first, int32_t count)
+{
+    const fs_real speed_m_s = fs_max(fs_speed_accuracy(row), FS_LEAST_SPEED_M_S);
+    count_(m, f, FS_VELOCITY_RESET);
+    for (int32_t axis = first; axis < first + count; axis++) {
+        add_change(m, FS_VELOCITY_RESET, axis, row[4 + axis] - f->nominal[4 + axis]);
+        f->nominal[4 + axis] = row[4 + axis];
+        m->refused_s[axis] = FS_LIT(0.0);
+    }
+    fs_reset_variance(f->covariance, FS_VELOCITY + first, count, speed_m_s * speed_m_s);
+}
+
+/* resets.py:36 */
+void fs_reset_position(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t first, int32_t count)
+{
+    fs_real accuracy_m = first == 2 ? fs_vertical_accuracy(row) : fs_horizontal_accuracy(row);
+    accuracy_m = fs_max(accuracy_m, FS_LEAST_POSITION_M);
+    const fs_real age_s = f->clock[0] - row[0];
+    count_(m, f, FS_POSITION_RESET);
+    for (int32_t axis = first; axis < first + count; axis++) {
+        const fs_real now_m = row[1 + axis] + age_s * f->nominal[4 + axis];
+        add_change(m, FS_POSITION_RESET, axis, now_m - f->nominal[7 + axis]);
+        f->nominal[7 + axis] = now_m;
+        f->nominal[25 + axis] = FS_LIT(0.0);
+        m->refused_s[3 + axis] = FS_LIT(0.0);
+    }
+    fs_reset_variance(f->covariance, FS_POSITION + first, count, accuracy_m * accuracy_m);
+    fs_reset_variance(f->covariance, FS_GNSS_BIAS + first, count, FS_LIT(0.0001));
+}
+
+/* resets.py:88 */
+fs_real fs_count_of_resets(const fs_estimator_memory *m)
+{
+    const fs_real total = m->resets[FS_POSITION_RESET] + m->resets[FS_VELOCITY_RESET] + m->resets[FS_YAW_RESET];
+    return total;
+}

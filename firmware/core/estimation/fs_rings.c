@@ -1,0 +1,102 @@
+/* Generated from Python by flightstack.firmware.generator: do not edit. */
+/*
+ * Ring buffers of rows of floats, for measurements that wait until the delayed horizon reaches their time.
+ * flightstack/estimation/rings.py
+ */
+#include "fs_rings.h"
+
+#include "fs_law_math.h"
+#include "fs_math.h"
+
+#define FS_GNSS_RING 0
+#define FS_GNSS_ROWS 8
+#define FS_LAST_S 6
+#define FS_COUNT 4
+#define FS_PUSHED_S 5
+
+/* rings.py:37 */
+int32_t fs_slot_of(const fs_rings *rings, int32_t ring, int32_t size, int32_t number)
+{
+    const int32_t slot = rings->cursors[ring][0] + number;
+    return slot >= size ? slot - size : slot;
+}
+
+/* rings.py:97 */
+fs_real fs_newest_fix_time(const fs_rings *rings)
+{
+    const int32_t count = rings->cursors[FS_GNSS_RING][1];
+    if (count == 0) {
+        return -FS_INFINITY;
+    }
+    const fs_real newest_s = rings->gnss[fs_slot_of(rings, FS_GNSS_RING, FS_GNSS_ROWS, count - 1)][0];
+    return newest_s;
+}
+
+/* rings.py:70 */
+void fs_pop(fs_rings *rings, int32_t ring, int32_t size)
+{
+    rings->cursors[ring][0] = fs_slot_of(rings, ring, size, 1);
+    rings->cursors[ring][1] -= 1;
+}
+
+/* rings.py:60 */
+int32_t fs_push(fs_rings *rings, int32_t ring, int32_t size)
+{
+    if (rings->cursors[ring][1] >= size) {
+        fs_pop(rings, ring, size);
+    }
+    const int32_t slot = fs_slot_of(rings, ring, size, rings->cursors[ring][1]);
+    rings->cursors[ring][1] += 1;
+    return slot;
+}
+
+/* rings.py:107 */
+void fs_write_row(fs_real row[], int32_t row_size, const fs_real values[])
+{
+    for (int32_t column = 0; column < row_size; column++) {
+        row[column] = values[column];
+    }
+}
+
+/* rings.py:77 */
+bool fs_take_mean(fs_real mean[], fs_real row[], int32_t row_size, fs_real period_s)
+{
+    if (row[0] - mean[FS_LAST_S] > period_s) { /* a gap: the older samples are outdated */
+        for (int32_t i = 0; i < 5; i++) {
+            mean[i] = FS_LIT(0.0);
+        }
+    }
+    mean[FS_LAST_S] = row[0];
+    for (int32_t i = 0; i < row_size; i++) {
+        mean[i] += row[i];
+    }
+    mean[FS_COUNT] += FS_LIT(1.0);
+    if (row[0] - mean[FS_PUSHED_S] < FS_LIT(0.9) * period_s) {
+        return false;
+    }
+    mean[FS_PUSHED_S] = row[0];
+    for (int32_t i = 0; i < row_size; i++) {
+        row[i] = mean[i] / mean[FS_COUNT];
+    }
+    for (int32_t i = 0; i < 5; i++) {
+        mean[i] = FS_LIT(0.0);
+    }
+    return true;
+}
+
+/* rings.py:44 */
+int32_t fs_count_of_measurements(const fs_rings *rings)
+{
+    int32_t total = 0;
+    for (int32_t ring = 0; ring < 4; ring++) {
+        total += rings->cursors[ring][1];
+    }
+    return total;
+}
+
+/* rings.py:53 */
+bool fs_is_due(const fs_rings *rings, int32_t ring, fs_real row_s, fs_real now_s)
+{
+    const int32_t count = rings->cursors[ring][1];
+    return count > 0 && row_s <= now_s;
+}

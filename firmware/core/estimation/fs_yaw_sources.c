@@ -1,0 +1,221 @@
+/* Generated from Python by flightstack.firmware.generator: do not edit. */
+/*
+ * Yaw: the magnetometer with the Earth's field, and GNSS velocity through the bank of yaw models.
+ * flightstack/estimation/yaw_sources.py
+ */
+#include "fs_yaw_sources.h"
+
+#include "fs_alignment.h"
+#include "fs_error_state.h"
+#include "fs_estimation_geometry.h"
+#include "fs_estimation_math.h"
+#include "fs_fusion.h"
+#include "fs_geometry.h"
+#include "fs_kalman.h"
+#include "fs_math.h"
+#include "fs_prediction.h"
+#include "fs_resets.h"
+#include "fs_yaw_estimator.h"
+
+#define FS_YAW_UPDATES 2
+#define FS_MAG_FAULT 7
+#define FS_HAS_MAG 5
+#define FS_HAS_YAW 6
+#define FS_LANDED 1
+#define FS_HAS_GNSS 3
+#define FS_YAW_TURN 0
+#define FS_YAW_VARIANCE 1
+#define FS_CONVERGED_RAD FS_LIT(0.262)
+#define FS_YAW_WRONG_S 3
+#define FS_ATTITUDE 0
+#define FS_WRONG_YAW_RAD FS_LIT(0.436)
+#define FS_CERTAIN_SQUARE FS_LIT(16.0)
+#define FS_REFUSED_S FS_LIT(1.0)
+#define FS_LARGEST_TURN_RAD FS_LIT(0.5)
+#define FS_EARTH_FIELD 15
+#define FS_DECLINATION_NOISE_RAD FS_LIT(0.01)
+#define FS_DECLINATION 22
+#define FS_KNOWN_FIELD 19
+#define FS_COUNTED_TURN_RAD FS_LIT(0.01)
+
+/* yaw_sources.py:126 */
+void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_sample *step)
+{
+    if (m->yaw_fix[FS_YAW_UPDATES] > FS_LIT(0.0)) {
+        const fs_vector3 read_vector = fs_read_vector(f->nominal, 10);
+        const fs_vector3 angle = fs_less_bias(&step->angle_rad, &read_vector, step->dt_s);
+        const fs_vector3 read_vector_2 = fs_read_vector(f->nominal, 13);
+        const fs_vector3 velocity = fs_less_bias(&step->velocity_m_s, &read_vector_2, step->dt_s);
+        fs_predict_models(m->yaw_models, &angle, &velocity, step->dt_s);
+    }
+}
+
+/* yaw_sources.py:60 */
+void fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params)
+{
+    const fs_vector3 field = fs_read_vector(row, 1);
+    if (m->flags[FS_MAG_FAULT] == 1) {
+        return;
+    }
+    m->field[0] = field.x;
+    m->field[1] = field.y;
+    m->field[2] = field.z;
+    if (m->flags[FS_HAS_MAG] == 0) {
+        m->flags[FS_HAS_MAG] = 1;
+        if (m->flags[FS_HAS_YAW] == 0) {
+            const fs_vector3 read_vector = fs_read_vector(m->earth, 0);
+            const fs_real turn_rad = fs_align_yaw(f, &field, &read_vector, m->earth[3], params);
+            fs_count_yaw_reset(m, turn_rad);
+            m->flags[FS_HAS_YAW] = 1;
+        } else {
+            const fs_nominal read_nominal = fs_read_nominal(f->nominal);
+            const fs_vector3 level = fs_rotate(&read_nominal.attitude, &field);
+            const fs_vector3 read_vector_2 = fs_read_vector(m->earth, 0);
+            fs_set_field(f, &level, &read_vector_2, m->earth[3], params);
+        }
+    }
+    fs_fuse_field(f, &field, params);
+}
+
+/* Take tilt and yaw from the models, velocity and position from GNSS. yaw_sources.py:173 */
+static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
+{
+    m->yaw_fix[FS_YAW_WRONG_S] = FS_LIT(0.0);
+    const fs_nominal read_nominal = fs_read_nominal(f->nominal);
+    const fs_quaternion before = read_nominal.attitude;
+    const int32_t best = fs_likeliest((const fs_real(*)[32])m->yaw_models);
+    fs_quaternion q = fs_attitude_of((const fs_real(*)[32])m->yaw_models, best);
+    const fs_vector3 world_rotation = {
+        .x = FS_LIT(0.0),
+        .y = FS_LIT(0.0),
+        .z = m->yaw_fix[FS_YAW_TURN] - fs_turn_between(&before, &q),
+    };
+    q = fs_turned(&q, &world_rotation);
+    f->nominal[0] = q.w;
+    f->nominal[1] = q.x;
+    f->nominal[2] = q.y;
+    f->nominal[3] = q.z;
+    for (int32_t axis = 0; axis < 2; axis++) {
+        fs_reset_variance(f->covariance, FS_ATTITUDE + axis, 1,
+                          fs_tilt_variance((const fs_real(*)[32])m->yaw_models, best, axis));
+    }
+    fs_reset_variance(f->covariance, FS_ATTITUDE + 2, 1, m->yaw_fix[FS_YAW_VARIANCE]);
+    fs_count_yaw_reset(m, fs_turn_between(&before, &q));
+    m->flags[FS_HAS_YAW] = 1;
+    fs_reset_velocity(m, f, row, 0, 2);
+    fs_reset_position(m, f, row, 0, 2);
+}
+
+/*
+ * Return True if the models have contradicted the yaw for a second, or do while GNSS velocities are refused.
+ * yaw_sources.py:159
+ */
+static bool is_wrong(fs_estimator_memory *m, fs_real time_s)
+{
+    const bool differs = fs_abs(m->yaw_fix[FS_YAW_TURN]) > FS_WRONG_YAW_RAD;
+    if (!(differs && m->yaw_fix[FS_YAW_TURN] * m->yaw_fix[FS_YAW_TURN] > FS_CERTAIN_SQUARE *
+          m->yaw_fix[FS_YAW_VARIANCE])) {
+        m->yaw_fix[FS_YAW_WRONG_S] = FS_LIT(0.0);
+    } else {
+        if (m->yaw_fix[FS_YAW_WRONG_S] == FS_LIT(0.0)) {
+            m->yaw_fix[FS_YAW_WRONG_S] = time_s;
+        }
+    }
+    const bool lasts = m->yaw_fix[FS_YAW_WRONG_S] > FS_LIT(0.0) && time_s - m->yaw_fix[FS_YAW_WRONG_S] > FS_REFUSED_S;
+    const bool is_refused = fs_max(m->refused_s[0], m->refused_s[1]) > FS_REFUSED_S;
+    return lasts || (differs && is_refused);
+}
+
+/* yaw_sources.py:135 */
+void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
+{
+    if (m->flags[FS_LANDED] == 1 || m->flags[FS_HAS_GNSS] == 0) {
+        m->yaw_fix[FS_YAW_UPDATES] = FS_LIT(0.0);
+        return;
+    }
+    const fs_nominal read_nominal = fs_read_nominal(f->nominal);
+    const fs_quaternion attitude = read_nominal.attitude;
+    const fs_real noise_m_s = fs_max(fs_speed_accuracy(row), FS_LIT(0.1));
+    if (m->yaw_fix[FS_YAW_UPDATES] == FS_LIT(0.0)) {
+        fs_start_models(m->yaw_models, &attitude, row[4], row[5], noise_m_s * noise_m_s);
+    } else {
+        fs_update_models(m->yaw_models, row[4], row[5], noise_m_s * noise_m_s);
+    }
+    m->yaw_fix[FS_YAW_UPDATES] += FS_LIT(1.0);
+    m->yaw_fix[FS_YAW_TURN] = fs_mean_turn((const fs_real(*)[32])m->yaw_models, &attitude);
+    m->yaw_fix[FS_YAW_VARIANCE] = fs_variance_of((const fs_real(*)[32])m->yaw_models, &attitude,
+                                                 m->yaw_fix[FS_YAW_TURN]);
+    if (m->yaw_fix[FS_YAW_VARIANCE] > FS_CONVERGED_RAD * FS_CONVERGED_RAD) {
+        return;
+    }
+    if (m->flags[FS_HAS_YAW] == 0) {
+        reset_to_models(m, f, row);
+    } else {
+        if (is_wrong(m, row[0])) {
+            m->flags[FS_MAG_FAULT] = m->flags[FS_HAS_MAG];
+            reset_to_models(m, f, row);
+        }
+    }
+}
+
+/*
+ * Turn the Earth's field by a change of the declination; the yaw follows as far as it depends on it.
+ * yaw_sources.py:108
+ */
+static void fuse_declination(fs_filter *f, fs_real was_rad, fs_real change_rad)
+{
+    const fs_real north = f->nominal[16];
+    const fs_real east = f->nominal[17];
+    const fs_real square = north * north + east * east;
+    fs_clear(f->h);
+    f->h[FS_EARTH_FIELD] = -east / square;
+    f->h[FS_EARTH_FIELD + 1] = north / square;
+    const fs_noise noise = {
+        .least = FS_DECLINATION_NOISE_RAD,
+        .start = FS_DECLINATION_NOISE_RAD,
+        .largest = FS_DECLINATION_NOISE_RAD,
+        .gate = FS_LIT(1000.0),
+        .is_slow = FS_LIT(0.0),
+    };
+    (void)fs_fuse(f, FS_DECLINATION, change_rad, &noise, FS_LIT(0.0));
+    fs_real sine;
+    fs_real cosine;
+    fs_sin_cos(was_rad + change_rad, &sine, &cosine);
+    const fs_real along = north * cosine + east * sine;
+    const fs_real across = f->nominal[17] * cosine - f->nominal[16] * sine;
+    /* the linear update would lengthen the field */
+    f->nominal[16] = along * cosine - across * sine;
+    f->nominal[17] = along * sine + across * cosine;
+}
+
+/* yaw_sources.py:79 */
+void fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, const fs_estimator_params *params)
+{
+    if (m->flags[FS_HAS_MAG] == 0 || m->flags[FS_MAG_FAULT] == 1) {
+        return;
+    }
+    const fs_vector3 known = fs_read_vector(m->earth, 0);
+    const fs_nominal before = fs_read_nominal(f->nominal);
+    const fs_vector3 *held = &before.earth_field_ned_gauss;
+    const fs_real was_rad = fs_atan2(held->y, held->x);
+    const fs_real change_rad = fs_wrap_pi(fs_atan2(known.y, known.x) - was_rad);
+    if (m->flags[FS_LANDED] == 1 || fs_abs(change_rad) > FS_LARGEST_TURN_RAD) {
+        const fs_vector3 read_vector = fs_read_vector(m->field, 0);
+        (void)fs_align_yaw(f, &read_vector, &known, m->earth[3], params);
+    } else {
+        fuse_declination(f, was_rad, change_rad);
+        for (int32_t axis = 0; axis < 3; axis++) {
+            const fs_real value = axis == 0 ? known.x : (axis == 1 ? known.y : known.z);
+            const fs_real noise = params->earth_field_gauss + params->field_scale * fs_abs(value);
+            fs_clear(f->h);
+            f->h[FS_EARTH_FIELD + axis] = FS_LIT(1.0);
+            const fs_noise of_model = {noise, noise, noise, FS_LIT(1000.0), FS_LIT(0.0)};
+            (void)fs_fuse(f, FS_KNOWN_FIELD + axis, value - f->nominal[16 + axis], &of_model, FS_LIT(0.0));
+        }
+    }
+    const fs_nominal read_nominal = fs_read_nominal(f->nominal);
+    const fs_real turn_rad = fs_turn_between(&before.attitude, &read_nominal.attitude);
+    if (fs_abs(turn_rad) > FS_COUNTED_TURN_RAD) {
+        fs_count_yaw_reset(m, turn_rad);
+    }
+}

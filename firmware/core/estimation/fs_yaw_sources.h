@@ -1,0 +1,35 @@
+/* Generated from Python by flightstack.firmware.generator: do not edit. */
+/*
+ * Yaw: the magnetometer with the Earth's field, and GNSS velocity through the bank of yaw models.
+ * flightstack/estimation/yaw_sources.py
+ */
+#ifndef FS_YAW_SOURCES_H
+#define FS_YAW_SOURCES_H
+
+#include "fs_estimator_params.h"
+#include "fs_kalman.h"
+#include "fs_memory.h"
+#include "fs_prediction.h"
+#include "fs_rings.h"
+#include "fs_types.h"
+
+/* Move the models over a step of the flight. yaw_sources.py:126 */
+void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_sample *step);
+
+/* Fuse a magnetic field; the first one after the alignment gives the yaw if that is unknown. yaw_sources.py:60 */
+void fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params);
+
+/* Weigh the models with a GNSS velocity; reset the yaw if it is unknown, or wrong. yaw_sources.py:135 */
+void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[]);
+
+/*
+ * Correct yaw and field with the Earth's field, now known.
+ *
+ * On the ground, or if it is far off, the yaw is aligned again. In flight it changes as far as it depends on the
+ * field.
+ *
+ * yaw_sources.py:79
+ */
+void fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, const fs_estimator_params *params);
+
+#endif

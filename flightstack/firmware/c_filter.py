@@ -1,0 +1,126 @@
+"""The estimator in C, compiled for this machine, with the kernels' signatures."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import numpy as np
+
+from flightstack.core.contract import FloatArray, Record, RecordArray
+from flightstack.estimation.estimator_params import EstimatorParams
+from flightstack.estimation.memory import MEMORY, EstimatorMemory
+from flightstack.firmware.generator.types import INT, Array, Scalar, has_arrays
+from flightstack.firmware.generator.types import Record as RecordType
+from flightstack.firmware.sources import c_files, files, firmware_root
+from flightstack.firmware.toolchain.build import EXACT, cached, host_compiler, includes
+
+FOLDERS = ("core", "core/estimation", "laws")
+"""Folders with the headers of the estimator."""
+MOST_VALUES = 10
+"""Of a measurement."""
+
+
+def filter_sources() -> list[Any]:
+    """Return the C files of the estimator and of the mathematics that it calls."""
+    core = firmware_root() / "core"
+    return [*c_files("core/estimation"), core / "fs_math.c", core / "fs_portable_math.c"]
+
+
+def c_layout(kind: type, real: str) -> np.dtype[np.void]:
+    """Return the layout in C of a record that a NamedTuple declares; ``real``: f4 or f8."""
+    fields: list[Any] = []
+    for name, inner in RecordType(kind).fields.items():
+        if isinstance(inner, Array):
+            fields.append((name, "i4" if inner.item is INT else real, inner.shape))
+        elif has_arrays(inner):
+            assert isinstance(inner, RecordType)
+            fields.append((name, c_layout(inner.kind, real)))
+        else:
+            assert not isinstance(inner, Scalar)
+            fields.append((name, real, (len(inner.fields),)))  # type: ignore[union-attr]
+    return np.dtype(fields, align=True)
+
+
+class CFilter:
+    """One estimator in C: a memory, and the functions on it. ``real`` is ``double`` or ``float``."""
+
+    def __init__(self, params: EstimatorParams | None = None, real: str = "double") -> None:
+        """Compile the estimator if needed; raise BuildError."""
+        self._item = "f8" if real == "double" else "f4"
+        self.memory: RecordArray = np.zeros(1, c_layout(EstimatorMemory, self._item))
+        """The memory in C, shape (1,)."""
+        self._library = _library(real)
+        self._place = self.memory.ctypes.data_as(ctypes.c_void_p)
+        self._row = np.zeros(MOST_VALUES, self._item)
+        self._row_place = self._row.ctypes.data_as(ctypes.c_void_p)
+        self.start(params or EstimatorParams())
+
+    def start(self, params: EstimatorParams) -> None:
+        """Start with an empty memory."""
+        self.memory[:] = np.zeros(1, self.memory.dtype)
+        self.memory[0]["params"] = params
+        self._library.fs_start_memory(self._place)
+
+    def imu(self, row: FloatArray) -> None:
+        """Take a sample of the IMU in its array form, shape (8,)."""
+        self._library.fs_imu_kernel(self._place, self._pointer(row))
+
+    def push(self, ring: int, row: FloatArray) -> None:
+        """Store a measurement of a ring."""
+        self._library.fs_push_kernel(self._place, ring, self._pointer(row), len(row))
+
+    def field(self) -> None:
+        """Take the Earth's field in the memory."""
+        self._library.fs_field_kernel(self._place)
+
+    def health(self, summary: FloatArray) -> FloatArray:
+        """Return the summary of the health after ``summary``, shape (12,)."""
+        made = summary.astype(self._item)
+        self._library.fs_health_kernel(self._place, made.ctypes.data_as(ctypes.c_void_p))
+        return made.astype(np.float64)
+
+    def call(self, name: str, *numbers: float) -> float:
+        """Return the result of a function of numbers, in double: ``exp``, ``log`` or ``atan2``."""
+        function = self._library[f"fs_{name}"]
+        function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double] * len(numbers)
+        result: float = function(*numbers)
+        return result
+
+    def _pointer(self, row: FloatArray) -> ctypes.c_void_p:
+        self._row[: len(row)] = row
+        return self._row_place
+
+    def read(self) -> RecordArray:
+        """Return the memory as the estimator in Python has it, shape (1,)."""
+        made = np.zeros(1, MEMORY)
+        copy_memory(self.memory[0], made[0])
+        return made
+
+    def write(self, memory: RecordArray) -> None:
+        """Take over the memory of an estimator in Python."""
+        for name, values in _leaves(self.memory[0]):
+            values[...] = memory[0][name]
+
+
+def copy_memory(held: Record, shown: Record) -> None:
+    """Copy a memory in C to one in Python's layout."""
+    for name, values in _leaves(held):
+        shown[name] = values
+
+
+def _leaves(record: Record) -> list[tuple[str, Any]]:
+    """Return names and arrays of a record and of the records in it."""
+    found: list[tuple[str, Any]] = []
+    for name in record.dtype.names:
+        inner = record[name]
+        found += _leaves(inner) if inner.dtype.names else [(name, inner)]
+    return found
+
+
+def _library(real: str) -> ctypes.CDLL:
+    flags = [*EXACT, "-shared", "-fPIC", *includes(*FOLDERS), *(["-DFS_DOUBLE"] if real == "double" else [])]
+    headers = files(*FOLDERS)
+    library = ctypes.CDLL(str(cached(f"filter-{real}.so", host_compiler(), flags, filter_sources(), headers)))
+    library.fs_push_kernel.argtypes = [ctypes.c_void_p, ctypes.c_int32, ctypes.c_void_p, ctypes.c_int32]
+    return library

@@ -1,0 +1,135 @@
+"""The estimator in C as a ``FilterCore``: in this process, or on a target behind its link."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flightstack.core.contract import FloatArray, RecordArray
+from flightstack.estimation.estimator_params import EstimatorParams
+from flightstack.estimation.memory import LANDED, MEMORY, EstimatorMemory
+from flightstack.firmware.c_filter import CFilter, c_layout, copy_memory
+from flightstack.firmware.pil import sensing
+from flightstack.firmware.pil.sensing import MOST_PARAMS, PAGES, WORDS, Event, ReadWords, SenseEvents
+from flightstack.firmware.pil.target_loops import TargetLoops
+
+_CURRENT = ("state", "flags", "resets")
+"""Fields of the memory that are up to date after each call."""
+
+
+class HostFilter:
+    """The estimator in C in this process; implements ``FilterCore``."""
+
+    def __init__(self, real: str = "float") -> None:
+        """Compile the estimator if needed; raise BuildError. ``real`` is ``float`` or ``double``."""
+        self._filter = CFilter(real=real)
+        self.memory: RecordArray = np.zeros(1, MEMORY)
+        held, shown = self._filter.memory[0], self.memory[0]
+        self._current = [(shown[name], held[name]) for name in _CURRENT]
+
+    def start(self, params: EstimatorParams) -> None:
+        """Start with an empty memory."""
+        self._filter.start(params)
+        self.refresh()
+
+    def set_params(self, params: EstimatorParams) -> None:
+        """Set the parameters."""
+        self._filter.memory[0]["params"] = params
+
+    def set_landed(self, landed: bool) -> None:
+        """Set whether the vehicle stands on the ground."""
+        self._filter.memory[0]["flags"][LANDED] = landed
+
+    def set_earth(self, earth: FloatArray, is_known: bool) -> None:
+        """Set the Earth's field, shape (4,); correct the state with it if ``is_known``."""
+        self._filter.memory[0]["earth"] = earth
+        if is_known:
+            self._filter.field()
+            self._show()
+
+    def imu(self, row: FloatArray) -> None:
+        """Take a sample of the IMU in its array form, shape (8,)."""
+        self._filter.imu(row)
+        self._show()
+
+    def push(self, ring: int, row: FloatArray) -> None:
+        """Store a measurement of a ring."""
+        self._filter.push(ring, row)
+
+    def refresh(self) -> None:
+        """Copy the whole memory."""
+        copy_memory(self._filter.memory[0], self.memory[0])
+
+    def _show(self) -> None:
+        for shown, held in self._current:
+            shown[:] = held
+
+
+class TargetFilter:
+    """The estimator on a target; implements ``FilterCore``.
+
+    Measurements wait for the next sample of the IMU and are sent with it: each exchange costs the latency of the link.
+    """
+
+    def __init__(self, loops: TargetLoops) -> None:
+        self._loops = loops
+        self.memory: RecordArray = np.zeros(1, MEMORY)
+        self._held: RecordArray = np.zeros(1, c_layout(EstimatorMemory, "f4"))
+        self._words = self._held.view("<u4")
+        self._record = self.memory[0]
+        self._bits = np.arange(len(self._record["flags"]))
+        self._waiting: list[Event] = []
+        self._next = 0
+        self._is_fresh = False
+
+    def start(self, params: EstimatorParams) -> None:
+        """Start with an empty memory; raise TargetError, also for a target without an estimator."""
+        self._waiting = [Event(sensing.CLEAR)]
+        self.set_params(params)
+        self._waiting.append(Event(sensing.START))
+        self.refresh()
+
+    def set_params(self, params: EstimatorParams) -> None:
+        """Set the parameters with the next sample."""
+        for first in range(0, len(params), MOST_PARAMS):
+            values = params[first : first + MOST_PARAMS]
+            self._waiting.append(Event(sensing.PARAMS, (float(first), float(len(values)), *values)))
+
+    def set_landed(self, landed: bool) -> None:
+        """Set with the next sample whether the vehicle stands on the ground."""
+        self._waiting.append(Event(sensing.LANDED, (float(landed),)))
+
+    def set_earth(self, earth: FloatArray, is_known: bool) -> None:
+        """Set the Earth's field, shape (4,); correct the state with it if ``is_known``. Raise TargetError."""
+        self._waiting.append(Event(sensing.EARTH, (*earth.tolist(), float(is_known))))
+        self._send()
+
+    def imu(self, row: FloatArray) -> None:
+        """Take a sample of the IMU in its array form, shape (8,); raise TargetError."""
+        self._waiting.append(Event(sensing.IMU, row.tolist()))
+        self._send()
+
+    def push(self, ring: int, row: FloatArray) -> None:
+        """Store a measurement of a ring with the next sample."""
+        self._waiting.append(Event(ring, row.tolist()))
+
+    def refresh(self) -> None:
+        """Read the whole memory; raise TargetError."""
+        if self._waiting:
+            self._send()
+        if self._is_fresh:
+            return
+        self._is_fresh = True
+        pages = range(0, len(self._words), WORDS)
+        for at in range(0, len(pages), PAGES):
+            self._loops.run_operation(ReadWords(self._next, pages[at : at + PAGES], self._words))
+        copy_memory(self._held[0], self._record)
+
+    def _send(self) -> None:
+        events, self._waiting = self._waiting, []
+        answer = self._loops.run_operation(SenseEvents(self._next, events))
+        self._next = (self._next + len(events)) & 0xFFFF_FFFF
+        self._is_fresh = False
+        record = self._record
+        if events[-1].kind in (sensing.IMU, sensing.EARTH):
+            record["state"], record["resets"] = answer.state, answer.resets
+        record["flags"] = (answer.flags >> self._bits) & 1
