@@ -212,8 +212,9 @@ class HostLoops:
         self._in = self.input.ctypes.data_as(_DOUBLES)
         self._out = self.output.ctypes.data_as(_DOUBLES)
         functions.fs_sil_real_size.restype = ctypes.c_uint32
-        real = "double" if functions.fs_sil_real_size() == 8 else "float"
-        self.version = f"C, {real}, sources {source_hash().hex()}"
+        self.real = "double" if functions.fs_sil_real_size() == 8 else "float"
+        """Arithmetic of the loops: ``float`` or ``double``."""
+        self.version = f"C, {self.real}, sources {source_hash().hex()}"
         functions.fs_sil_init(self._loops)
         for name, value in (*FIRST_NUMBERS.items(), *numbers.items()):
             self.set(name, value)

@@ -16,9 +16,9 @@ import numpy as np
 from unicorn import Uc, UcError, arm_const, unicorn_const
 from unicorn.unicorn_py3.unicorn import uclib
 
-from flightstack.firmware.coverage import merged
-from flightstack.firmware.elf import Elf, ElfError
-from flightstack.firmware.pil_record import Trace
+from flightstack.firmware.pil.record import Trace
+from flightstack.firmware.toolchain.coverage import merged
+from flightstack.firmware.toolchain.elf import Elf, ElfError
 
 FLASH_AT, FLASH_SIZE = 0x0000_0000, 512 * 1024
 RAM_AT, RAM_SIZE = 0x2000_0000, 128 * 1024

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 from flightstack.control.control_law import CStep
 from flightstack.control.controller import AnyController, controller_of
 from flightstack.core.errors import ConfigError
-from flightstack.firmware.build import BuildError, host_library
 from flightstack.firmware.law_tree import firmware_for
+from flightstack.firmware.toolchain.build import BuildError, host_library
 
 VECTORS = 1000
 

@@ -20,17 +20,18 @@ from flightstack.control.controller import AnyController, Controller, controller
 from flightstack.control.controller_loading import fields_of, load_controller
 from flightstack.control.loop_parameters import LawValues, loop_numbers, own_values
 from flightstack.core.errors import ConfigError
-from flightstack.firmware.build import COMPILE_LIMIT_S, EXACT, BuildError, cache_root, host_compiler
 from flightstack.firmware.c_loops import LoopsSetup
 from flightstack.firmware.generator.text import snake_case
 from flightstack.firmware.sources import firmware_root, source_hash, using_firmware
+from flightstack.firmware.toolchain.build import COMPILE_LIMIT_S, EXACT, BuildError, cache_root, host_compiler
 
 _LAW_MATH = "fs_law_math.h"
 _GENERAL = frozenset(
     ("fs_attitude_reference.c", "fs_position_pid.c", "fs_attitude_pid.c", "fs_attitude_backstepping.c")
 )
 """Generated files that are the same for every controller."""
-_KEPT = 8
+KEPT_TREES = 8
+"""Number of generated firmware trees that are kept."""
 WARNINGS = (
     "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wconversion", "-Wdouble-promotion", "-Wshadow",
     "-Wstrict-prototypes", "-Wmissing-prototypes", "-Wundef", "-Wvla", "-Wcast-qual", "-Wpointer-arith",
@@ -138,7 +139,7 @@ def law_tree(controller: AnyController) -> Path:
                 raise
     os.utime(place)  # the copy has the time of its source
     trees = [path for path in base.iterdir() if path.is_dir() and not path.name.startswith(".")]
-    for old in sorted(trees, key=lambda path: path.stat().st_mtime, reverse=True)[_KEPT:]:
+    for old in sorted(trees, key=lambda path: path.stat().st_mtime, reverse=True)[KEPT_TREES:]:
         shutil.rmtree(old, ignore_errors=True)
     return place
 

@@ -10,6 +10,10 @@ from pathlib import Path
 
 PORTABLE = ("core", "mavlink", "app")
 """Folders of the code common to all targets."""
+SENSING = ("core/estimation", "sensing")
+"""Folders of the estimator, for targets with room for it."""
+SENSING_INCLUDES = (*PORTABLE, *SENSING, "laws")
+"""Folders with the headers of a target with an estimator."""
 HASH_SIZE = 8
 """Bytes of the hash in FS_PIL_IDENTITY."""
 
@@ -59,5 +63,13 @@ def digest(paths: list[Path]) -> bytes:
 
 
 def source_hash() -> bytes:
-    """Return the hash reported by a target with these sources: the first bytes of the digest of all portable files."""
-    return digest(files(*PORTABLE))[:HASH_SIZE]
+    """Return the hash reported by a target with these sources: the first bytes of the digest of all portable files.
+
+    The estimator's count too, also for a target without it.
+    """
+    return digest(files(*PORTABLE, *SENSING))[:HASH_SIZE]
+
+
+def sensing_files() -> list[Path]:
+    """Return the C files of a target with an estimator: those common to all targets, and the estimator's."""
+    return [path for folder in (*PORTABLE, *SENSING) for path in c_files(folder)]

@@ -113,12 +113,12 @@ def _aim(m: Record, inputs: FloatArray, flags: int) -> None:
 @compiled
 def _filter(m: Record, attitude: Quaternion, expected: FloatArray) -> None:
     """Write the expected attitude reference."""
-    aim = blend(
+    target = blend(
         attitude_target(m["last_target"]).attitude, attitude_target(m["target"]).attitude, m["fraction"][0]
     )
     _, filtered = attitude_reference_step(
         ReferenceMemory(*as_tuple(m["reference"], REFERENCE_MEMORY_SIZE)),
-        aim,
+        target,
         ReferenceParams(*as_tuple(m["reference_params"], REFERENCE_PARAMS_SIZE)),
         m["dt_s"],
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 from flightstack.control.backend import ControlBackend
 from flightstack.control.loops import PythonLoops
 from flightstack.core.errors import INSTALL_FIRMWARE, ConfigError, WrongFirmwareError
-from flightstack.firmware.build import BuildError, host_library, host_program
+from flightstack.estimation.filter_core import FilterCore
 from flightstack.firmware.c_loops import CLoops, HostLoops, LoopsSetup
 from flightstack.firmware.choice import (
     DEFAULT_BAUD,
@@ -21,12 +21,14 @@ from flightstack.firmware.choice import (
     LoopsChoice,
     parse_loops,
 )
-from flightstack.firmware.free_loops import FreeLoops
 from flightstack.firmware.law_tree import firmware_for
-from flightstack.firmware.line_model import free_running_baud
-from flightstack.firmware.line_rate import RatedLink, negotiate_baud
-from flightstack.firmware.pil_client import DEFAULT_TIMING, PilTiming
-from flightstack.firmware.target_loops import TargetLoops
+from flightstack.firmware.pil.client import DEFAULT_TIMING, PilTiming
+from flightstack.firmware.pil.free_loops import FreeLoops
+from flightstack.firmware.pil.line_model import free_running_baud
+from flightstack.firmware.pil.session import RatedLink, negotiate_baud
+from flightstack.firmware.pil.target_filter import HostFilter, TargetFilter
+from flightstack.firmware.pil.target_loops import TargetLoops
+from flightstack.firmware.toolchain.build import BuildError, host_compiler, host_library, host_program
 from flightstack.transports.byte_link import ByteLink, LineError
 from flightstack.transports.serial_port import SerialPort
 
@@ -111,6 +113,17 @@ def make_loops(loops: str, setup: LoopsSetup, lockstep: bool = True) -> ControlB
         raise ConfigError("--loops", loops, str(error).removeprefix(f"{choice.device}: ")) from error
 
 
+def make_filter(loops: ControlBackend) -> FilterCore | None:
+    """Return the filter that runs where the loops run; None for one in Python. Raise BuildError.
+
+    A free-running target has no filter: its measurements would have to arrive at its own time.
+    """
+    executor = loops.executor if isinstance(loops, CLoops) else None
+    if isinstance(executor, HostLoops):
+        return HostFilter(executor.real)
+    return TargetFilter(executor) if isinstance(executor, TargetLoops) else None
+
+
 def _check_clock(choice: LoopsChoice, loops: str, lockstep: bool) -> None:
     if choice.ending == FREE and choice.kind == EMULATED:
         raise ConfigError("--loops", loops, "cannot run by its own timer: an emulated target has none")
@@ -131,10 +144,22 @@ def open_link(choice: LoopsChoice) -> ByteLink:
     return HostTarget(host_program())
 
 
+def check_tools(choice: LoopsChoice) -> None:
+    """Raise BuildError if a compiler or the emulator for this target is missing; nothing is compiled."""
+    host_compiler()
+    if choice.kind != EMULATED:
+        return
+    try:
+        from flightstack.firmware.toolchain.cortex_m4 import cross_compiler  # noqa: PLC0415  # unicorn is optional
+    except ImportError as error:
+        raise BuildError(f"unicorn is not installed: {INSTALL_FIRMWARE}") from error
+    cross_compiler()
+
+
 def _emulated() -> ByteLink:
     try:
-        from flightstack.firmware.cortex_m4 import emulated_target  # noqa: PLC0415  # unicorn is optional
         from flightstack.firmware.emulator import EmulationError  # noqa: PLC0415
+        from flightstack.firmware.toolchain.cortex_m4 import emulated_target  # noqa: PLC0415  # unicorn is optional
     except ImportError as error:
         raise BuildError(f"unicorn is not installed: {INSTALL_FIRMWARE}") from error
     try:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from flightstack.firmware.boards import BOARDS, GCC, ZIG, board_image, flash_file
-from flightstack.firmware.build import BuildError
 from flightstack.firmware.law_tree import controller_named, firmware_for
 from flightstack.firmware.sources import source_hash
+from flightstack.firmware.toolchain.boards import BOARDS, GCC, ZIG, board_image, flash_file
+from flightstack.firmware.toolchain.build import BuildError
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.output import Output
 

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from flightstack.core.errors import ConfigError
-from flightstack.firmware.coverage import FileCoverage, line_coverage
 from flightstack.firmware.law_tree import controller_named, firmware_for
-from flightstack.firmware.stack_usage import stack_usage
+from flightstack.firmware.toolchain.coverage import FileCoverage, line_coverage
+from flightstack.firmware.toolchain.stack_usage import stack_usage
 from gcs_cli.pil.target_record import TargetRecord
 
 _JUDGED = ("core/",)

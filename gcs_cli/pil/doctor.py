@@ -11,11 +11,11 @@ from rich.console import Console
 from rich.table import Table
 
 from flightstack.core.errors import TargetError
-from flightstack.firmware.build import BuildError
 from flightstack.firmware.choice import DEFAULT_BAUD, SERIAL, LoopsChoice
-from flightstack.firmware.line_rate import RatedLink, negotiate_baud, restore_baud
+from flightstack.firmware.pil.session import RatedLink, negotiate_baud, restore_baud
 from flightstack.firmware.sources import source_hash
 from flightstack.firmware.targets import open_link, timing_of
+from flightstack.firmware.toolchain.build import BuildError
 from flightstack.transports.byte_link import ByteLink, LineError
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
 from gcs_cli.pil.advice import Port, advice

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from flightstack.firmware.choice import EMULATED, FREE
-from flightstack.firmware.pil_record import LINK_FILE
+from flightstack.firmware.pil.record import LINK_FILE
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly.fly_display import FlyConsole
 from gcs_cli.fly.fly_flags import FlyOptions, RunOptions

@@ -1,7 +1,7 @@
 """The file of ``--limits``: limits of signals in place of the built-in ones.
 
-A table for each comparison (``flight``, ``replay``, ``stages``), in it one for each signal, with the keys ``ulp``,
-``rms_ulp`` and ``slope_ppm``. A value that the file does not give stays as it is.
+A table for each comparison (``flight``, ``sensed``, ``replay``, ``stages``), in it one for each signal, with the keys
+``ulp``, ``rms_ulp`` and ``slope_ppm``. A value that the file does not give stays as it is.
 """
 
 from __future__ import annotations

@@ -14,6 +14,7 @@ from rich.console import Console
 from flightstack.core.atomic_file import write_bytes_atomically
 from flightstack.firmware.law_parity import law_parity
 from flightstack.firmware.law_tree import controller_named, generated_names, is_built_in, write_tree
+from flightstack.params.config import ESTIMATED
 from flightstack.process.clock import nearest_outer_hz
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.fly.fly_display import FlyConsole
@@ -39,7 +40,8 @@ def run_flights(options: FlyOptions, judge: JudgeOptions, target: str) -> None:
     checked_target(target)
     items, limits, began_s = checked_plan(options), _checked(judge), time.monotonic()
     console = FlyConsole(stderr=judge.as_json, highlight=False)
-    finished = run(options, items, target, judge.out, console, judge.overwrite, limits.flight)
+    of_flight = limits.sensed if options.state == ESTIMATED else limits.flight
+    finished = run(options, items, target, judge.out, console, judge.overwrite, of_flight)
     _finish(finished.outcome, finished.folder, console, judge, "pil.fly", began_s)
     if finished.problem is not None:
         raise finished.problem
@@ -177,7 +179,7 @@ def print_outcome(console: Console, result: dict[str, Any], folder: Path) -> Non
         unit = result["profile"]["unit"]
         words = f"mean {figures['mean']:.1f}, p99 {figures['p99']:.0f}, max {figures['max']:.0f} {unit}"
         console.print(f"[bright_black]{stage:<9}[/]{words}", highlight=False)
-    for line in _code_lines(result):
+    for line in code_lines(result):
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     style = "green" if result["verdict"] == PASSED else "red"
     console.print(f"[bright_black]verdict  [/][{style}]{result['verdict']}[/]", highlight=False)
@@ -185,7 +187,7 @@ def print_outcome(console: Console, result: dict[str, Any], folder: Path) -> Non
     console.print(f"{folder}/  pil.html pil.json", markup=False, highlight=False, soft_wrap=True)
 
 
-def _code_lines(result: dict[str, Any]) -> Iterator[str]:
+def code_lines(result: dict[str, Any]) -> Iterator[str]:
     """Yield a line for each of CPU load, coverage and stack that is known."""
     load, coverage, usage = result["load"], result["coverage"], result["stack_usage"]
     if load is not None:

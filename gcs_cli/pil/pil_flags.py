@@ -1,4 +1,7 @@
-"""The options that ``gcs pil fly`` and ``gcs pil replay`` share."""
+"""The options that ``gcs pil fly`` and ``gcs pil replay`` share.
+
+A module of its own: the help imports no report.
+"""
 
 from __future__ import annotations
 

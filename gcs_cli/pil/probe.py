@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flightstack.core.contract import LoopFlags
-from flightstack.firmware.identity import described
-from flightstack.firmware.pil_client import DEFAULT_TIMING, PilCounters, PilTiming
-from flightstack.firmware.pil_session import PilSession
+from flightstack.firmware.pil.client import DEFAULT_TIMING, PilCounters, PilTiming
+from flightstack.firmware.pil.identity import described
+from flightstack.firmware.pil.session import PilSession
 from flightstack.transports.byte_link import ByteLink
 
 EXCHANGES = 300

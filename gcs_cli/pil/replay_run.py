@@ -205,6 +205,11 @@ def _conditions(log: Path, target: str, replay: Replay) -> dict[str, Any]:
     return {"log": str(log), "target": target, **{name: info[name] for name in names if name in info}}
 
 
+def _charts(pair: str, first: FlightSamples, made: FlightSamples) -> list[DeviationChart]:
+    charts = [DeviationChart(BY_NAME[name], {pair: deviation(BY_NAME[name], first, made)}) for name in _SHOWN]
+    return [chart for chart in charts if np.size(chart.pairs[pair].size)]
+
+
 def judged(
     replay: Replay,
     outputs: FloatArray,
@@ -237,15 +242,7 @@ def judged(
         *target_tiles(record),
     ]
     first = flight if differences or expected is None else expected
-    charts = [
-        DeviationChart(BY_NAME[name], {shown: deviation(BY_NAME[name], first, made)}) for name in _SHOWN
-    ]
-    return Outcome(
-        result,
-        [chart for chart in charts if np.size(chart.pairs[shown].size)],
-        profiles_of(record),
-        costs_of(record),
-    )
+    return Outcome(result, _charts(shown, first, made), profiles_of(record), costs_of(record))
 
 
 def _left_out(modelled: bool, tells_targets: bool) -> str:

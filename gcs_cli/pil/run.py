@@ -18,13 +18,14 @@ from gcs_cli.fly.flight import Flight
 from gcs_cli.fly.fly_display import BarDisplay, Display, draws_bars
 from gcs_cli.fly.fly_flags import FlyOptions
 from gcs_cli.fly.fly_options import outer_rate_hz
-from gcs_cli.fly.fly_run import fly, write_results
+from gcs_cli.fly.fly_results import write_results
+from gcs_cli.fly.fly_run import fly
 from gcs_cli.pil.code_facts import code_facts
 from gcs_cli.pil.flight_samples import read_samples
 from gcs_cli.pil.report import render_report
 from gcs_cli.pil.result import COMPLETED, Flown, Outcome, closed_loop
 from gcs_cli.pil.target_record import TargetRecord, read_record
-from gcs_cli.pil.targets import check_there, checked_target, has_same_bits, meaning
+from gcs_cli.pil.targets import FirmwareBuild, building, checked_target, has_same_bits, meaning
 from gcs_cli.pil.verdict import DEFAULT_LIMITS, MIL, PIL, SIL, Limits
 from gcs_cli.run_directory import LOG_NAME, RUNS, fresh_directory
 
@@ -71,19 +72,12 @@ def run(
     A flight that fails ends the run; the flights until then are compared.
     """
     choice = checked_target(target)
-    tree = check_there(choice, options.controller)
-    if tree is not None:
-        console.print(f"C    of {options.controller}: {tree}", markup=False, highlight=False, soft_wrap=True)
-    folder = make_pil_directory(options.plan_path.stem, out, overwrite)
-    flights: dict[str, Flown] = {}
-    problem = None
-    for stage, loops in ((MIL, PYTHON), (SIL, C), (PIL, target)):
-        console.print(f"[bold]{stage}[/]  loops {loops}", highlight=False)
-        flown = dataclasses.replace(options, loops=loops)
-        flights[stage], problem = fly_stage(stage, flown, plan, folder, console, overwrite)
-        console.print(f"     {_words(flights[stage])}", markup=False, highlight=False, soft_wrap=True)
-        if problem is not None:
-            break
+    with building(choice, options.controller) as firmware:
+        if firmware.tree is not None:
+            words = f"C    of {options.controller}: {firmware.tree}"
+            console.print(words, markup=False, highlight=False, soft_wrap=True)
+        folder = make_pil_directory(options.plan_path.stem, out, overwrite)
+        flights, problem = _fly_stages(options, plan, target, folder, console, overwrite, firmware)
     record = _record(folder) if PIL in flights else None
     facts = {
         "title": f"{options.plan_path.stem}: MIL, SIL and PIL",
@@ -96,6 +90,29 @@ def run(
     outcome = closed_loop(flights, record, has_same_bits(choice), facts, limits)
     write_outcome(folder, outcome)
     return Finished(folder, outcome, problem)
+
+
+def _fly_stages(
+    options: FlyOptions,
+    plan: Plan,
+    target: str,
+    folder: Path,
+    console: Console,
+    overwrite: bool,
+    firmware: FirmwareBuild,
+) -> tuple[dict[str, Flown], CliError | None]:
+    """Fly MIL, SIL and PIL until one is not completed; return their results, and the error of that flight."""
+    flights: dict[str, Flown] = {}
+    for stage, loops in ((MIL, PYTHON), (SIL, C), (PIL, target)):
+        console.print(f"[bold]{stage}[/]  loops {loops}", highlight=False)
+        if loops != PYTHON:
+            firmware.wait()
+        flown = dataclasses.replace(options, loops=loops)
+        flights[stage], problem = fly_stage(stage, flown, plan, folder, console, overwrite)
+        console.print(f"     {_words(flights[stage])}", markup=False, highlight=False, soft_wrap=True)
+        if problem is not None:
+            return flights, problem
+    return flights, None
 
 
 def make_pil_directory(name: str, out: Path | None, overwrite: bool = False) -> Path:
@@ -166,6 +183,7 @@ def _conditions(options: FlyOptions, target: str) -> dict[str, Any]:
         "vehicle": options.vehicle,
         "controller": options.controller,
         "gains": options.gains,
+        "state": options.state,
         "plant": options.plant,
         "inner loop": f"{options.inner_hz:g} Hz",
         "outer loop": f"{outer_rate_hz(options):g} Hz",

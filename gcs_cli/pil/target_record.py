@@ -12,8 +12,8 @@ import numpy as np
 
 from flightstack.core.contract import FloatArray
 from flightstack.core.errors import ConfigError
-from flightstack.firmware.pil_record import COST_UNITS, LINK_FILE, STEPS_FILE
-from flightstack.firmware.pil_steps import BAD_INPUT, OVERRUN
+from flightstack.firmware.pil.record import COST_UNITS, LINK_FILE, STEPS_FILE
+from flightstack.firmware.pil.steps import BAD_INPUT, OVERRUN
 
 StatusArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 NO_STATUSES: StatusArray = np.zeros(0, np.int64)
@@ -25,7 +25,7 @@ STATES = ("ready", "stepping", SAFE, RESTARTED, "free-running")
 
 
 class TargetRecord(NamedTuple):
-    """See ``flightstack.firmware.pil_record``."""
+    """See ``flightstack.firmware.pil.record``."""
 
     identity: Mapping[str, Any]
     link: Mapping[str, Any]

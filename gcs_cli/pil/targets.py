@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from contextvars import copy_context
 from pathlib import Path
+from typing import NamedTuple
 
-from flightstack.firmware.build import BuildError, host_library
 from flightstack.firmware.choice import EMULATED, HOST, SERIAL, C, LoopsChoice, parse_loops
 from flightstack.firmware.law_tree import controller_named, firmware_for, is_built_in
-from flightstack.firmware.targets import open_link
+from flightstack.firmware.targets import check_tools, open_link
+from flightstack.firmware.toolchain.build import BuildError, host_library
+from flightstack.firmware.toolchain.stack_usage import stack_usage
 from flightstack.transports.byte_link import LineError
 from gcs_cli.errors import USAGE, CliError
 
@@ -65,6 +71,48 @@ def check_there(target: LoopsChoice, controller: str) -> Path | None:
             return None if is_built_in(law) else tree
     except (BuildError, LineError) as error:
         raise CliError(str(error), USAGE) from None
+
+
+@contextmanager
+def building(target: LoopsChoice, controller: str) -> Iterator[FirmwareBuild]:
+    """Compile the firmware of a controller for this machine and the target in a thread, while the first flight flies.
+
+    Raise CliError (usage) if a tool is missing or a board does not answer, ConfigError if the controller has no C. The
+    end of the context waits for the compilers.
+    """
+    law = controller_named(controller)
+    with ThreadPoolExecutor(1) as executor, firmware_for(law) as tree:
+        try:
+            check_tools(target)
+            if target.kind == SERIAL:  # before a flight
+                open_link(target).close()
+        except (BuildError, LineError) as error:
+            raise CliError(str(error), USAGE) from None
+        built = executor.submit(copy_context().run, _build, target)
+        yield FirmwareBuild(None if is_built_in(law) else tree, built)
+
+
+class FirmwareBuild(NamedTuple):
+    """Firmware that is being compiled."""
+
+    tree: Path | None
+    """Folder of the firmware that was generated for a user's controller."""
+    built: Future[None]
+
+    def wait(self) -> None:
+        """Wait until it is compiled; raise CliError (usage) if that fails."""
+        try:
+            self.built.result()
+        except (BuildError, LineError) as error:
+            raise CliError(str(error), USAGE) from None
+
+
+def _build(target: LoopsChoice) -> None:
+    """Compile what the flights and the report need: loops, target, and the stack usage, which is kept."""
+    host_library()
+    if target.kind != SERIAL:
+        open_link(target).close()
+    stack_usage()
 
 
 def has_same_bits(target: LoopsChoice) -> bool:

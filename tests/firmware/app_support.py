@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 
 from flightstack.mavlink.dialect import mavlink
-from tests.firmware.codec_support import ROOT, WARNINGS, compiler
+from tests.firmware.codec_support import ROOT, WARNINGS, compiler, filled_stack
 
 FIRMWARE = ROOT / "firmware"
 PORTABLE = ("core", "mavlink", "app")
+SENSING = ("core/estimation", "sensing")
 LIBRARY = "FLIGHTSTACK_TEST_APP"
 """Environment variable: run the tests with this library, which somebody has compiled in another way."""
 PROGRAM = "fs_host_program.c"
@@ -48,12 +49,12 @@ def sources(*folders: str) -> list[Path]:
 def host_sources() -> list[Path]:
     """Return what makes the application on the host, without the program's main."""
     own = [path for path in sources("ports/host") if path.name.startswith("fs_host") and path.name != PROGRAM]
-    return [*sources(*PORTABLE), *own]
+    return [*sources(*PORTABLE, *SENSING), *own]
 
 
 def build(output: Path, *flags: str, cc: Sequence[str] = (), program: bool = False) -> Path:
     """Compile library or program into ``output``; the compiler's words are the failure."""
-    folders = [f"-I{FIRMWARE / folder}" for folder in (*PORTABLE, "ports/host")]
+    folders = [f"-I{FIRMWARE / folder}" for folder in (*PORTABLE, *SENSING, "laws", "ports/host")]
     kind = [] if program else ["-shared", "-fPIC"]
     files = [*host_sources(), *([FIRMWARE / "ports/host" / PROGRAM] if program else [])]
     command = [*(cc or compiler()), *WARNINGS, *flags, "-fno-math-errno", *kind, *folders, *map(str, files)]
@@ -68,7 +69,9 @@ def build(output: Path, *flags: str, cc: Sequence[str] = (), program: bool = Fal
 def cached(name: str, *flags: str, program: bool = False) -> Path:
     """Return what ``build`` makes, compiled once for each state of the sources."""
     digest = hashlib.sha256(" ".join([*compiler(), *flags]).encode())
-    headers = [path for folder in (*PORTABLE, "ports/host") for path in (FIRMWARE / folder).glob("*.h")]
+    headers = [
+        path for folder in (*PORTABLE, *SENSING, "ports/host") for path in (FIRMWARE / folder).glob("*.h")
+    ]
     for path in sorted([*host_sources(), *headers, FIRMWARE / "ports/host" / PROGRAM]):
         digest.update(path.read_bytes())
     folder = Path(tempfile.gettempdir()) / f"flightstack-app-{os.getuid()}" / digest.hexdigest()[:16]
@@ -96,13 +99,15 @@ class Port(ctypes.Structure):
         ("baud", ctypes.c_uint32),
         ("can_set_baud", BaudCall),
         ("set_baud", BaudCall),
+        ("sense", ctypes.c_void_p),
+        ("read_estimator", ctypes.c_void_p),
     ]
 
 
 @functools.cache
 def library(path: str = "", real: str = "float") -> ctypes.CDLL:
     """Load the application with float or double, or what the environment names instead."""
-    flags = ["-O2", *(["-DFS_DOUBLE"] if real == "double" else [])]
+    flags = ["-O2", *filled_stack(), *(["-DFS_DOUBLE"] if real == "double" else [])]
     if not path and real == "float":
         path = os.environ.get(LIBRARY, "")
     loaded = ctypes.CDLL(path or str(cached(f"app-{real}.so", *flags)))
@@ -127,6 +132,7 @@ class Target:
         own_port: bool = False,
         bauds: Sequence[int] = (),
         overhead: int = 0,
+        has_estimator: bool = False,
     ) -> None:
         """``ticks``: what the clock shows at each call; without, it stands still; None: there is no clock.
 
@@ -146,6 +152,9 @@ class Target:
             4096, Clock(lambda: 321), START_BAUD,
             *((BaudCall(lambda baud: baud in bauds), BaudCall(self._set_baud)) if bauds else ()),
         )  # fmt: skip
+        if has_estimator:
+            self._port.sense = ctypes.cast(self._library.fs_sensing_take, ctypes.c_void_p)
+            self._port.read_estimator = ctypes.cast(self._library.fs_sensing_read, ctypes.c_void_p)
         port = None if own_port else ctypes.byref(self._port)
         self._app = ctypes.c_void_p(self._library.fs_host_app_new(port))
         self.now_ms = 0

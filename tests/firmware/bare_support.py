@@ -8,8 +8,8 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from flightstack.firmware.build import EXACT, cached, definitions, host_compiler, includes
 from flightstack.firmware.sources import PORTABLE, c_files, firmware_root
+from flightstack.firmware.toolchain.build import EXACT, cached, definitions, host_compiler, includes
 from tests.firmware.step_machines import state_flag
 
 C = Path(__file__).parent / "c"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flightstack.firmware.boards import (
+from flightstack.firmware.toolchain.boards import (
     ARM_GCC,
     GCC,
     STRICT,

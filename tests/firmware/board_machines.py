@@ -15,8 +15,8 @@ from typing import Any, ClassVar
 from unicorn import Uc, UcError, arm_const, riscv_const, unicorn_const
 from unicorn.unicorn_py3.unicorn import uclib
 
-from flightstack.firmware.build import cached, host_compiler
-from flightstack.firmware.elf import Elf
+from flightstack.firmware.toolchain.build import cached, host_compiler
+from flightstack.firmware.toolchain.elf import Elf
 from tests.firmware.step_machines import state_flag
 
 C = Path(__file__).parent / "c"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import functools
 import os
 import random
 import shutil
@@ -51,6 +52,9 @@ NAMES = [
         "FS_PIL_STATE",
         "FS_PIL_DRIVE",
         "FS_PIL_TIMING",
+        "FS_PIL_SENSE",
+        "FS_PIL_ESTIMATE",
+        "FS_PIL_MEMORY",
     ),
 ]
 KINDS: dict[int, Any] = {kind.id: kind for kind in mavlink.mavlink_map.values() if kind.msgname in NAMES}
@@ -71,6 +75,14 @@ def compiler(wanted: str | None = None) -> list[str]:
     elif shutil.which(wanted):
         return [wanted]
     return missing(f"no {wanted or 'C compiler'} on this machine")
+
+
+@functools.cache
+def filled_stack() -> tuple[str, ...]:
+    """Return the flag that fills variables without a value, so that tests find one that is read; empty if unknown."""
+    flag = "-ftrivial-auto-var-init=pattern"
+    command = [*compiler(), flag, "-fsyntax-only", "-x", "c", os.devnull]
+    return (flag,) if subprocess.run(command, check=False, capture_output=True).returncode == 0 else ()
 
 
 def compile_c(output: Path, sources: list[Path], *flags: str, cc: list[str] | None = None) -> Path:
@@ -97,7 +109,7 @@ def c_name(name: str) -> str:
 def load(folder: Path) -> ctypes.CDLL:
     """Build the codec and the shim as a library, and tell ctypes what its functions return."""
     sources = [*SOURCES, HARNESS / "codec_shim.c"]
-    path = compile_c(folder / "codec.so", sources, "-shared", "-fPIC", "-O2", *WARNINGS)
+    path = compile_c(folder / "codec.so", sources, "-shared", "-fPIC", "-O2", *filled_stack(), *WARNINGS)
     library = ctypes.CDLL(str(path))
     encoders = [f"{c_name(name)}_encode" for name in NAMES]
     for name in ("fs_message_kind_of", "fs_frame_encode", "fs_trimmed", "codec_recode", *encoders):

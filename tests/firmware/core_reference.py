@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from flightstack.control.attitude_backstepping import (
@@ -22,10 +21,9 @@ from flightstack.control.mixer import WORK_ROWS, mix, relative_rotor_speed
 from flightstack.control.position_pid import PositionMemory, PositionParams, position_pid_step
 from flightstack.core.array_items import as_tuple, store
 from flightstack.core.arrays import position_setpoint, vehicle_state
+from flightstack.core.compiled import compiled
 from flightstack.core.contract import AttitudeReference, Quaternion, Vector3, Wrench
 from flightstack.core.geometry import blend, conjugate, quaternion_product, rotation_vector
-
-compiled = numba.njit(error_model="numpy")
 
 
 @compiled

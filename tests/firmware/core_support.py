@@ -69,7 +69,7 @@ def library_path(real: str, cc: str = "", flags: tuple[str, ...] = ("-O2",)) -> 
     define = ["-DFS_DOUBLE"] if real == "double" else []
     command = [cc, *EXACT, *flags, *define, f"-I{CORE}", "-shared", "-fPIC", "-fno-math-errno"]
     digest = hashlib.sha256(" ".join(command).encode())
-    for path in [*sorted(CORE.iterdir()), DRIVER]:
+    for path in [*sorted(CORE.glob("*.[ch]")), DRIVER]:
         digest.update(path.read_bytes())
     folder = Path(tempfile.gettempdir()) / f"flightstack-core-{os.getuid()}"
     folder.mkdir(exist_ok=True)

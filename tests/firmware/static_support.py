@@ -19,7 +19,11 @@ CPPCHECK = Path(__file__).parent / "cppcheck"
 OWN_DRIVERLIB = Path(__file__).parent / "c" / "f28377s_chip" / "own"
 PORTABLE = ("core", "mavlink", "app")
 """Folders of what runs on every target, a C28x among them."""
-INCLUDES = [f"-I{FIRMWARE / folder}" for folder in PORTABLE]
+ESTIMATION = [
+    path for folder in ("core/estimation", "sensing") for path in sorted((FIRMWARE / folder).glob("*.c"))
+]
+"""C files of the estimator and of its events, which are portable too."""
+INCLUDES = [f"-I{FIRMWARE / folder}" for folder in (*PORTABLE, "core/estimation", "sensing", "laws")]
 LANGUAGE = ["-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math"]
 WARNINGS = [
     *("-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wconversion", "-Wdouble-promotion", "-Wshadow"),

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flightstack.firmware.build import EXACT, cached, host_compiler, includes
-from flightstack.firmware.cortex_m4 import emulated_image, instruction_counter
 from flightstack.firmware.emulator import MAX_RECEIVED, Emulator
 from flightstack.firmware.sources import c_files, firmware_root
+from flightstack.firmware.toolchain.build import EXACT, cached, host_compiler, includes
+from flightstack.firmware.toolchain.cortex_m4 import emulated_image, instruction_counter
 from tests.support.tools import missing
 
 C = Path(__file__).parent / "c"

@@ -12,8 +12,8 @@ from fastcrc import crc16
 
 from flightstack.core.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, STATE_SIZE, FloatArray
 from flightstack.mavlink.dialect import mavlink
-from flightstack.testing import World
 from flightstack.testing.engine import Engine
+from tests.support.truth import World
 
 OUTER_DUE, SET_TARGET, RESET = 1, 2, 4
 OUTER_DIVISOR = 5

@@ -171,13 +171,27 @@ def test_the_terminal_of_the_host_takes_every_rate() -> None:
     target.close()
 
 
+def test_trial_counts_from_the_change_and_not_from_the_command(target: Target) -> None:
+    target.is_sending = True
+    assert set_baud(target, FAST) == ACCEPTED
+    target.poll(500)
+    target.is_sending = False
+    target.poll(1)
+    target.poll(999)
+    target.heard()
+    target.poll(1)
+    assert target.baud == FAST
+    target.poll(1)
+    assert target.baud == START_BAUD
+
+
 def test_a_change_that_cannot_begin_is_dropped(target: Target) -> None:
     target.is_sending = True
     assert set_baud(target, FAST) == ACCEPTED
     target.poll(1_000)
+    target.heard()
     target.is_sending = False
     target.poll(1)
-    target.heard()
     assert target.baud == START_BAUD
     assert set_baud(target, OTHER) == ACCEPTED
     target.poll(1)

@@ -264,6 +264,17 @@ def test_stopping_ends_the_ticks(target: Target) -> None:
     assert free_run(target, 1, 1) == ACCEPTED  # although the flight had not ended
 
 
+def test_ticks_begin_anew_after_a_pause(target: Target) -> None:
+    at(target, 0, state(1, RESET))
+    assert free_run(target, 0) == ACCEPTED
+    at(target, 50 * PERIOD_US)
+    assert free_run(target, 1, 1) == ACCEPTED
+    at(target, 100 * PERIOD_US + 7, state(2, RESET))
+    (drive,) = at(target, 101 * PERIOD_US + 7)
+    assert drive.late_us == 0
+    assert timing(target).missed == 0
+
+
 def test_stopping_does_not_end_the_safe_state(target: Target) -> None:
     at(target, 0, state(1, RESET))
     target.run(200_000)

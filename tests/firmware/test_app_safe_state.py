@@ -94,6 +94,17 @@ def test_the_safe_state_ends_with_a_sound_reset_alone(target: Target) -> None:
     assert target.step(10).status & OUT_OF_ORDER == 0
 
 
+def test_answered_steps_are_not_repeated_in_the_safe_state(target: Target) -> None:
+    """Their rotor commands are of the flight that ended."""
+    target.step(0, RESET | OUTER_DUE)
+    assert max(target.step(1).rotor_command) > 0.0
+    target.step(2, 0, [math.nan] * 13)
+    refusal = target.step(1)
+    assert refusal.status & BAD_INPUT
+    assert set(numbers(refusal)) == {0.0}
+    assert target.status().repeats == 0
+
+
 def test_the_text_is_said_once(target: Target) -> None:
     nan = [math.nan] * 13
     first = kinds(target.ask(step(0, RESET, nan)))

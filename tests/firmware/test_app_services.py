@@ -264,6 +264,25 @@ def test_a_step_behind_a_damaged_one_is_answered_without_waiting_for_more(target
     assert (status.bad_frames, status.skipped_octets, status.frames) == (1, 3, 2)
 
 
+def test_fields_without_a_meaning_are_zero(target: Target) -> None:
+    """Memory that was not written holds a pattern, if the compiler can fill it."""
+    target.poll()
+    target.give(target.pack(command(mavlink.MAV_CMD_DO_SET_MODE)))
+    target.give(target.pack(step(0, RESET, [math.nan] * 13)))
+    heard = {message.get_type(): message for message in target.heard()}
+    assert heard["HEARTBEAT"].custom_mode == 0
+    text, ack = heard["STATUSTEXT"], heard["COMMAND_ACK"]
+    assert (text.id, text.chunk_seq, ack.progress, ack.result_param2) == (0, 0, 0, 0)
+
+
+def test_frames_of_unknown_messages_count_as_bad(target: Target) -> None:
+    """Their checksums cannot be verified: dialect and link may be at fault."""
+    frame = bytearray(target.pack(mavlink.MAVLink_ping_message(1, 1, 0, 0)))
+    frame[7:10] = (0xCD, 0xAB, 0x0F)
+    target.give(bytes(frame))
+    assert target.status().bad_frames == 1
+
+
 # ------------------------------------------------------------------------------------------------ ground stations
 
 

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from flightstack.firmware.boards import (
+from flightstack.firmware.toolchain.boards import (
     BOARDS,
     board_compilers,
     board_image,
     raw_image,
     uf2_image,
 )
-from flightstack.firmware.build import BuildError
-from flightstack.firmware.elf import Elf
+from flightstack.firmware.toolchain.build import BuildError
+from flightstack.firmware.toolchain.elf import Elf
 from gcs_cli.errors import DONE, USAGE
 from tests.firmware.board_builds import image
 from tests.support.commands import gcs

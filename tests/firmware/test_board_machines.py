@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flightstack.firmware.boards import GCC, ZIG
-from flightstack.firmware.build import host_library
 from flightstack.firmware.c_loops import HostLoops
 from flightstack.firmware.numbers import default_numbers
 from flightstack.firmware.sources import firmware_root
+from flightstack.firmware.toolchain.boards import GCC, ZIG
+from flightstack.firmware.toolchain.build import host_library
 from gcs_cli.pil.conformance.check import FAILED, PASSED
 from gcs_cli.pil.conformance.line import Line
 from gcs_cli.pil.conformance.link_checks import all_bytes, burst, cut_frame, sizes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flightstack.testing import World
+from tests.support.truth import World
 
 
 def flight(loops: str) -> np.ndarray:

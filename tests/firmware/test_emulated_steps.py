@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flightstack.firmware.build import EXACT
 from flightstack.firmware.numbers import default_numbers
+from flightstack.firmware.toolchain.build import EXACT
 from tests.firmware.step_machines import (
     INCLUDES,
     LOOPS,

@@ -9,15 +9,15 @@ from pathlib import Path
 import pytest
 
 from flightstack.firmware import emulator
-from flightstack.firmware.cortex_m4 import (
+from flightstack.firmware.emulator import EmulationError, Emulator
+from flightstack.firmware.sources import source_hash
+from flightstack.firmware.toolchain.cortex_m4 import (
     cortex_m4_image,
     emulated_image,
     emulated_target,
     instruction_counter,
 )
-from flightstack.firmware.elf import Elf, ElfError
-from flightstack.firmware.emulator import EmulationError, Emulator
-from flightstack.firmware.sources import source_hash
+from flightstack.firmware.toolchain.elf import Elf, ElfError
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
 from tests.firmware.step_streams import random_steps

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from flightstack.firmware.build import EXACT, includes
-from flightstack.firmware.cortex_m4 import emulated_target
 from flightstack.firmware.sources import PORTABLE, c_files, firmware_root
+from flightstack.firmware.toolchain.build import EXACT, includes
+from flightstack.firmware.toolchain.cortex_m4 import emulated_target
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
 from tests.firmware.step_machines import run, tool

@@ -9,6 +9,7 @@ import pytest
 
 from tests.firmware.static_support import (
     CPPCHECK,
+    ESTIMATION,
     FIRMWARE,
     INCLUDES,
     LANGUAGE,
@@ -23,22 +24,30 @@ from tests.firmware.static_support import (
     run,
     without_comments,
 )
+from tests.support.tools import NIGHTLY
 
+BY_DAY = ("gcc", "gcc, AVR")
+"""Compilers of the estimator by day: it takes each of them three seconds."""
 POISON = ["gcc", "-std=c99", "-fsyntax-only", "-include", CPPCHECK / "poison.h", *INCLUDES]
 SIZEOF_IS_OF_AN_OBJECT = {
-    "fs_wire.c": ["memcpy(&bits, &value, sizeof bits);", "memcpy(&value, &bits, sizeof value);"]
+    "fs_wire.c": ["memcpy(&bits, &value, sizeof bits);", "memcpy(&value, &bits, sizeof value);"],
 }
 """The only two: memcpy counts chars as sizeof does, and both objects have 32 bits on every target."""
+ALLOWED = {
+    "fs_wire.c": ["-DPOISON_ALLOWS_MEMCPY"],
+    "fs_sensing.c": ["-DPOISON_ALLOWS_MEMCPY", "-DPOISON_ALLOWS_UNION"],
+}
 
 
 @pytest.mark.parametrize("name", TARGETS)
 def test_no_compiler_has_anything_to_say(name: str, tmp_path: Path) -> None:
     target = available(TARGETS[name])
     only = ["-r", "-o", "all.o"] if target.command == ZIG else ["-c"]
-    command = [*target.command, *LANGUAGE, *WARNINGS, *target.flags, *INCLUDES, *only, *portable_sources()]
+    sources = [*portable_sources(), *(ESTIMATION if NIGHTLY or name in BY_DAY else [])]
+    command = [*target.command, *LANGUAGE, *WARNINGS, *target.flags, *INCLUDES, *only, *sources]
     done = run(command, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
-    assert len(list(tmp_path.glob("*.o"))) == (1 if target.command == ZIG else len(portable_sources()))
+    assert len(list(tmp_path.glob("*.o"))) == (1 if target.command == ZIG else len(sources))
 
 
 @pytest.mark.parametrize("name", ["gcc", "clang"])
@@ -55,10 +64,10 @@ def test_the_boards_port_compiles_on_a_host_without_a_word(name: str, tmp_path: 
 def test_no_source_uses_what_a_target_lacks() -> None:
     """The poison header ends the compilation at the first such word; gcc names the file."""
     available(TARGETS["gcc"])
-    sources = portable_sources()
-    copying = [path for path in sources if path.name in SIZEOF_IS_OF_AN_OBJECT]
-    others = [path for path in sources if path not in copying]
-    for command in ([*POISON, *others], [*POISON, "-DPOISON_ALLOWS_MEMCPY", *copying]):
+    sources = [*portable_sources(), *ESTIMATION]
+    others = [path for path in sources if path.name not in ALLOWED]
+    apart = [[*POISON, *ALLOWED[path.name], path] for path in sources if path.name in ALLOWED]
+    for command in ([*POISON, *others], *apart):
         done = run(command)
         assert (done.returncode, done.stderr) == (0, "")
 

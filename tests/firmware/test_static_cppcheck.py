@@ -23,7 +23,7 @@ from tests.firmware.static_support import (
 from tests.parity import generated_laws
 from tests.support.tools import missing
 
-CHECKED = (*PORTABLE, "ports/bare", "ports/f28377s")
+CHECKED = (*PORTABLE, "sensing", "ports/bare", "ports/f28377s")
 TEMPLATE = "{file}|{line}|{id}|{message}"
 BUILD = [
     *("--std=c99", f"--platform={CPPCHECK / 'c28x.xml'}", f"-I{CPPCHECK / 'include'}"),
@@ -89,9 +89,12 @@ def findings(tmp_path_factory: pytest.TempPathFactory) -> list[Finding]:
     for name in CHECKED:
         shutil.copytree(FIRMWARE / name, root / name, ignore=shutil.ignore_patterns("*.dump", "*.ctu-info"))
     folders = [root / name for name in CHECKED]
+    headers = [root / "core" / "estimation", FIRMWARE / "laws"]
     assert [folder.name for folder in folders if not list(folder.glob("*.c"))] == []
-    includes = [f"-I{folder}" for folder in folders]
-    not_ours = [f"--suppress=*:{folder}/*" for folder in (OWN_DRIVERLIB, CPPCHECK / "include")]
+    includes = [f"-I{folder}" for folder in (*folders, *headers)]
+    not_ours = [
+        f"--suppress=*:{folder}/*" for folder in (OWN_DRIVERLIB, CPPCHECK / "include", FIRMWARE / "laws")
+    ]
     return cppcheck(root, "--addon=misra", *includes, f"-I{OWN_DRIVERLIB}", *not_ours, *folders)
 
 

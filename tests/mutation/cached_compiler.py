@@ -38,7 +38,8 @@ class CachedCompiler:
     def run(self, command: list[str], **options: Any) -> subprocess.CompletedProcess[str]:
         """Compile and link; everything else is run as it is."""
         if "-shared" not in command:
-            return subprocess.run(command, check=False, **options)
+            options.setdefault("check", False)
+            return subprocess.run(command, **options)  # noqa: PLW1510
         sources = [part for part in command if part.endswith(".c")]
         output = command[command.index("-o") + 1]
         flags = [p for p in command[1:] if p not in {*sources, "-o", output, "-shared", "-lm"}]

@@ -39,7 +39,7 @@ TESTS = {
     "mavlink": ["tests/firmware/test_codec_messages.py", "tests/firmware/test_codec_parser.py"],
     "app": [
         f"tests/firmware/test_app_{what}.py"
-        for what in ("pil", "params", "windows", "baud", "free", "services")
+        for what in ("pil", "params", "windows", "baud", "free", "services", "safe_state", "damage")
     ],
 }
 HOST = Path("ports/host")

@@ -145,10 +145,9 @@ def test_a_parser_that_does_not_look_inside_what_was_bad(plant: Plant, tmp_path:
 
 
 def test_a_length_that_was_never_written(plant: Plant, tmp_path: Path) -> None:
-    """What lay on the stack is as good as right, mostly: only MemorySanitizer tells."""
+    """What lay on the stack is right by chance, or not: MemorySanitizer does not depend on it."""
     right = "candidate->size = FS_HEADER_V1;"
     plant("mavlink/fs_parser.c", right, ";")
-    assert not caught(test_codec_builds.test_nothing_undefined_happens, "clang", tmp_path)
     assert caught(test_codec_builds.test_nothing_is_decided_by_memory_that_was_never_written, tmp_path)
 
 

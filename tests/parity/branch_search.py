@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from flightstack.firmware.build import EXACT
 from flightstack.firmware.generator.call_c import EDGES, ROTOR_COUNT, CFunction
 from flightstack.firmware.generator.law import Function
 from flightstack.firmware.generator.types import BOOL, INT, ROTORS, Array, Record, Type
 from flightstack.firmware.generator.unit import Program, write
 from flightstack.firmware.sources import firmware_root
+from flightstack.firmware.toolchain.build import EXACT
 from tests.firmware.core_support import run_tool
 
 FEEDBACK = Path(__file__).parent / "c" / "coverage_feedback.c"

@@ -9,8 +9,8 @@ import sys
 
 import numpy as np
 
-from flightstack.testing import World
 from tests.support.plan_items import item
+from tests.support.truth import World
 
 
 def flight_rows(vehicle: str, controller: str, ticks: int) -> np.ndarray:

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from flightstack.testing import World
+from tests.support.truth import World
 
 CONTROLLERS = ("pid", "backstepping")
 

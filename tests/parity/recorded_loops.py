@@ -13,8 +13,8 @@ from flightstack.control.loops import PythonLoops
 from flightstack.core.contract import FloatArray, LoopRow
 from flightstack.firmware.numbers import target_numbers
 from flightstack.params.gains_file import open_gains
-from flightstack.testing import World
 from flightstack.testing.engine import Engine
+from tests.support.truth import World
 
 OUTER_DUE, SET_TARGET, RESET = 1, 2, 4
 

@@ -20,12 +20,12 @@ from flightstack.control.position_pid import position_pid_step
 from flightstack.core import geometry, portable_math
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import Vector3, Wrench
-from flightstack.firmware.build import EXACT
 from flightstack.firmware.c_loops import LoopsSetup
 from flightstack.firmware.generator.call_c import CFunction, Vectors, differences
 from flightstack.firmware.generator.unit import Program
 from flightstack.firmware.sources import firmware_root
 from flightstack.firmware.targets import make_loops
+from flightstack.firmware.toolchain.build import EXACT
 from flightstack.guidance.trajectory import setpoint_of, trajectory_step
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle

@@ -14,19 +14,19 @@ from rich.console import Console
 from flightstack.control.control_law import ControlLaw, CStep
 from flightstack.control.controller import controller_of
 from flightstack.core.errors import ConfigError
-from flightstack.firmware.build import host_library
 from flightstack.firmware.c_loops import HostLoops, LoopsSetup
 from flightstack.firmware.law_parity import law_parity
 from flightstack.firmware.law_tree import firmware_for, law_tree
 from flightstack.firmware.targets import make_loops
+from flightstack.firmware.toolchain.build import host_library
 from flightstack.params.config import StackConfig
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
-from flightstack.process.assembly import check
-from flightstack.testing import World
+from flightstack.process.config_check import check
 from gcs_cli.pil import pil_commands
 from gcs_cli.pil.replay_run import fed, judged, prepared
 from tests.support.plugin_site import ROOT
+from tests.support.truth import World
 
 
 @pytest.fixture
@@ -34,7 +34,7 @@ def law(monkeypatch: pytest.MonkeyPatch) -> ControlLaw:
     """The example's law, which ``--controller rate-pd`` names."""
     monkeypatch.syspath_prepend(str(ROOT / "examples" / "c_law"))
     found: ControlLaw = importlib.import_module("rate_pd").CONTROLLER
-    for module in ("flightstack.process.assembly", "flightstack.testing.setup"):
+    for module in ("flightstack.process.config_check", "flightstack.testing.setup"):
         monkeypatch.setattr(f"{module}.load_controller", lambda _: found)
     return found
 

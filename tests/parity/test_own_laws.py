@@ -14,18 +14,18 @@ from flightstack.control.attitude_pid import CONTROLLER as ATTITUDE_PID
 from flightstack.control.control_law import ControlLaw
 from flightstack.control.controller import Controller
 from flightstack.control.controller_loading import form_problem, load_controller
-from flightstack.control.loop_parameters import loop_numbers
-from flightstack.firmware.build import host_library
+from flightstack.control.loop_parameters import LoopParameters, loop_numbers
 from flightstack.firmware.c_loops import HostLoops
 from flightstack.firmware.law_parity import law_parity
 from flightstack.firmware.law_tree import firmware_for
 from flightstack.firmware.numbers import default_numbers, laws_with
+from flightstack.firmware.toolchain.build import host_library
 from flightstack.params.gains_file import BUILT_IN, open_gains
 from flightstack.params.vehicle import load_vehicle
-from flightstack.testing import World
 from tests.firmware.core_support import PARTS, same_bits
 from tests.parity.recorded_loops import record
 from tests.support.plugin_site import ROOT, install
+from tests.support.truth import World
 
 LAWS = ROOT / "examples" / "own_laws"
 
@@ -71,8 +71,6 @@ def test_parameters_of_own_laws_are_the_vehicles() -> None:
     names = {spec.name for spec in loops.parameter_specs}
     assert {"LEASH_LENGTH", "CAS_VEL_I", "PID_ROLL_P", "MPC_TILTMAX_AIR"} <= names
     assert not any(name.startswith("POS_") for name in names)  # of the position law that does not fly
-    world.param_set("MPC_TILTMAX_AIR", 20.0)
-    assert loops._parameters._slots["MPC_TILTMAX_AIR"].values[6] == np.radians(20.0)
 
 
 def test_table_of_an_own_law_is_read_from_the_gains_file(tmp_path: Path) -> None:
@@ -83,6 +81,11 @@ def test_table_of_an_own_law_is_read_from_the_gains_file(tmp_path: Path) -> None
     assert numbers.laws["position"][0] == 2.5
     assert numbers.laws["position"][6] == 0.5
     assert numbers.laws["guidance"].tolist() == [7.0]
+    memories = {role: np.array(law.initial_memory) for role, law in cascade().laws.items()}
+    parameters = LoopParameters(numbers, cascade(), memories)
+    parameters.set("MPC_TILTMAX_AIR", 20.0)
+    assert numbers.laws["position"][6] == np.radians(20.0)
+    assert parameters.get("MPC_TILTMAX_AIR") == 20.0
 
 
 def test_firmware_has_a_number_for_every_parameter_of_an_own_law() -> None:

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from flightstack.testing import World
 from gcs_cli.pil.excitation import excitation
 from gcs_cli.pil.replay_run import prepared
 from tests.support.tools import NIGHTLY
+from tests.support.truth import World
 from tools.generated import ROOT
 from tools.pil_faults.faults import BACKSTEPPING, PID, Fault
 from tools.pil_faults.page import named_check

@@ -15,9 +15,9 @@ import pytest
 from flightstack.core.errors import ConfigError, TargetError
 from flightstack.firmware import targets
 from flightstack.firmware.choice import LoopsChoice
-from flightstack.firmware.line_rate import negotiate_baud
-from flightstack.firmware.pil_client import DEFAULT_TIMING
-from flightstack.firmware.target_loops import TargetLoops
+from flightstack.firmware.pil.client import DEFAULT_TIMING
+from flightstack.firmware.pil.session import negotiate_baud
+from flightstack.firmware.pil.target_loops import TargetLoops
 from flightstack.firmware.targets import make_loops
 from flightstack.transports.byte_link import LineError
 from flightstack.transports.serial_port import SerialPort

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flightstack.core.contract import LoopFlags
-from flightstack.firmware.line_model import (
+from flightstack.firmware.pil.line_model import (
     Line,
     Octets,
     exchange_s,
@@ -18,7 +18,7 @@ from flightstack.firmware.line_model import (
     replay_hz,
     spare_latency_s,
 )
-from flightstack.firmware.target_loops import TargetLoops
+from flightstack.firmware.pil.target_loops import TargetLoops
 from tests.firmware.app_support import Target
 from tests.support.modelled_line import ModelledLine
 from tests.support.pil_setups import HASH, setup

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from flightstack.firmware.build import EXACT, firmware_root, host_compiler
 from flightstack.firmware.generator.law import python_function
 from flightstack.firmware.generator.unit import Program, write
+from flightstack.firmware.toolchain.build import EXACT, firmware_root, host_compiler
 
 WARNINGS = (
     "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wconversion", "-Wshadow", "-Wstrict-prototypes",

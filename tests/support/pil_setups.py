@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from flightstack.control.attitude_pid import CONTROLLER as PID
-from flightstack.firmware.build import host_library
 from flightstack.firmware.c_loops import CLoops, HostLoops, LoopsSetup
+from flightstack.firmware.toolchain.build import host_library
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
 

@@ -77,7 +77,7 @@ def test_oldest_generated_firmware_is_removed(
 ) -> None:
     from flightstack.firmware import law_tree as trees  # noqa: PLC0415
 
-    monkeypatch.setattr(trees, "_KEPT", 1)
+    monkeypatch.setattr(trees, "KEPT_TREES", 1)
     first = law_tree(lqr)
     os.utime(first, (1.0, 1.0))
     second = law_tree(lqr._replace(name="other"))

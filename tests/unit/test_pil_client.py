@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flightstack.core.contract import LoopFlags
-from flightstack.firmware.pil_client import PilClient, PilReport, PilTiming
-from flightstack.firmware.pil_steps import BAD_INPUT, OUT_OF_ORDER, REPEATED, WANT_REFERENCE, StepInput
+from flightstack.firmware.pil.client import PilClient, PilReport, PilTiming
+from flightstack.firmware.pil.steps import BAD_INPUT, OUT_OF_ORDER, REPEATED, WANT_REFERENCE, StepInput
 from flightstack.mavlink.dialect import mavlink
 
 REST = [0.0] * 13 + [1.0] * 11

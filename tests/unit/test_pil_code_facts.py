@@ -8,10 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from flightstack.firmware.coverage import FileCoverage, _names, line_coverage, merged
-from flightstack.firmware.stack_usage import deepest, read_graphs
+from flightstack.firmware.toolchain.coverage import FileCoverage, file_names, line_coverage, merged
+from flightstack.firmware.toolchain.stack_usage import deepest, read_graphs
 from gcs_cli.pil.code_facts import coverage_json
-from gcs_cli.pil.pil_commands import _code_lines
+from gcs_cli.pil.pil_commands import code_lines
 from gcs_cli.pil.profile import EMULATED_CLOCK_HZ, cpu_load, stage_profiles
 from gcs_cli.pil.report import render_report
 from gcs_cli.pil.result import assembled, profiles_of
@@ -62,11 +62,11 @@ def test_files_are_named_by_folder_however_their_path_is_split(
     """A compiler that runs above its sources writes their folders into the name of the file."""
     entry = SimpleNamespace(dir_index=place, name=name.encode())
     header = {"version": version, "include_directory": [folder.encode()], "file_entry": [entry]}
-    assert list(_names(header)) == ["core/fs_b.c"]
+    assert list(file_names(header)) == ["core/fs_b.c"]
 
 
 def test_an_image_without_lines_of_the_loops_has_no_line_of_coverage() -> None:
-    assert list(_code_lines({"load": None, "coverage": coverage_json({}), "stack_usage": None})) == []
+    assert list(code_lines({"load": None, "coverage": coverage_json({}), "stack_usage": None})) == []
 
 
 def test_total_coverage_is_that_of_the_loops() -> None:

@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from flightstack.firmware.choice import LoopsChoice
-from flightstack.firmware.pil_client import PilCounters
+from flightstack.firmware.pil.client import PilCounters
 from flightstack.firmware.sources import source_hash
 from flightstack.firmware.targets import open_link, timing_of
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError

@@ -23,7 +23,6 @@ from flightstack.params.gains_file import BUILT_IN
 from flightstack.params.toml_file import Table
 from flightstack.params.tunable import Tunable
 from flightstack.params.vehicle import Vehicle
-from flightstack.testing import World
 from gcs_cli.errors import CliError
 from gcs_cli.pil.flight_samples import FlightSamples, read_samples
 from gcs_cli.pil.replay import UnfitLogError, recording
@@ -31,6 +30,7 @@ from gcs_cli.pil.replay_run import Replay, fed, judged, prepared
 from gcs_cli.pil.result import Outcome
 from tests.support.plugin_site import example_module
 from tests.support.synthetic_flight import synthetic_flight_bytes
+from tests.support.truth import World
 
 FACTS: dict[str, Any] = {"title": "", "about": "", "meaning": "", "conditions": {}}
 
@@ -243,7 +243,7 @@ def needy_controller() -> Controller:
 def test_a_law_that_needs_its_own_gains_table_is_replayed(
     log: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for module in ("flightstack.process.assembly", "flightstack.firmware.law_tree"):
+    for module in ("flightstack.process.config_check", "flightstack.firmware.law_tree"):
         monkeypatch.setattr(f"{module}.load_controller", lambda _: needy_controller())
     gains = tmp_path / "gains.toml"
     gains.write_text((BUILT_IN / "tuned.toml").read_text() + "\n[attitude_lqr]\niz_kg_m2 = 0.02\n")

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from flightstack.firmware.pil_steps import BAD_INPUT, OVERRUN, REPEATED
+from flightstack.firmware.pil.steps import BAD_INPUT, OVERRUN, REPEATED
 from gcs_cli.pil.report import render_report
 from gcs_cli.pil.result import COMPLETED, WALL_TIME, Flown, Outcome, closed_loop
 from gcs_cli.pil.signals import SIGNALS, STAGES

@@ -12,11 +12,11 @@ from rich.console import Console
 from scipy.io import loadmat
 
 from flightstack.core.errors import ConfigError
-from flightstack.testing import World
 from gcs_cli.pil.excitation import excitation
 from gcs_cli.pil.replay import Recording
 from gcs_cli.pil.replay_run import configured, fed, judged, prepared, read_flight
 from gcs_cli.pil.vectors import Vectors, read_vectors, vectors_of, write_vectors
+from tests.support.truth import World
 
 FACTS: dict[str, Any] = {"title": "", "about": "", "meaning": "", "conditions": {}}
 

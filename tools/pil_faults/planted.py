@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from flightstack.control.controller_loading import load_controller
-from flightstack.firmware.build import EXACT, host_compiler
 from flightstack.firmware.c_loops import HostLoops, LoopsSetup
 from flightstack.firmware.sources import firmware_root
+from flightstack.firmware.toolchain.build import EXACT, host_compiler
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
 from flightstack.params.vehicle import load_vehicle
 from gcs_cli.pil.compare import compared

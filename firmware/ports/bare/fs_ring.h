@@ -19,7 +19,7 @@ void fs_ring_init(fs_ring *ring, volatile fs_octet *octets, uint16_t size);
 uint16_t fs_ring_held(const fs_ring *ring);
 uint16_t fs_ring_room(const fs_ring *ring);
 
-/* Put one octet at the end; 0, and nothing happens, when the ring is full. */
+/* Put one octet at the end; return 0, without effect, if the ring is full. */
 uint16_t fs_ring_put(fs_ring *ring, fs_octet octet);
 
 /* Take the oldest octet; 0, and *octet is unchanged, when the ring is empty. */

@@ -1,7 +1,8 @@
-/* The application on the emulated Cortex-M4F: one exchange takes what came, lets time pass, and sends what is due. */
+/* The application on the emulated Cortex-M4F: one exchange reads input, advances time and sends output. */
 #include "emulated_start.h"
 #include "fs_app.h"
 #include "fs_build.h"
+#include "fs_sensing.h"
 
 #define CHUNK 64U /* octets received or sent before the other direction has its turn */
 
@@ -35,6 +36,8 @@ static void begin(void)
     port.source_hash = source_hash;
     port.stack_size = (uint32_t)(fs_stack_top - fs_stack_bottom) * 4U;
     port.stack_high_water = stack_high_water;
+    port.sense = fs_sensing_take;
+    port.read_estimator = fs_sensing_read;
     fs_app_init(&app, &port);
     is_begun = 1U;
 }

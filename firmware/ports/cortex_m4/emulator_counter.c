@@ -23,7 +23,7 @@ typedef struct {
 uint32_t fs_counter_size(void);
 void fs_counter_block(void *emulator, uint64_t address, uint32_t size, void *counter);
 
-/* Size of fs_counter in octets, for who allocates it. */
+/* Size of fs_counter in octets, for its allocation. */
 uint32_t fs_counter_size(void)
 {
     return (uint32_t)sizeof(fs_counter);

@@ -47,7 +47,7 @@ int mps2_uart_take(void);             /* next octet received, or -1 */
 uint16_t mps2_uart_room(void);        /* octets that mps2_uart_give can take now */
 void mps2_uart_give(uint16_t octet);  /* queue an octet; only while there is room */
 uint16_t mps2_uart_can_set_baud(uint32_t baud);
-uint16_t mps2_uart_set_baud(uint32_t baud); /* 0, and nothing happens, while octets are being sent */
+uint16_t mps2_uart_set_baud(uint32_t baud); /* 0, without effect, while octets are being sent */
 uint32_t mps2_uart_overruns(void);    /* octets lost: by the hardware or because the ring was full */
 void mps2_uart_receive_interrupt(void);
 void mps2_uart_send_interrupt(void);

@@ -1,4 +1,4 @@
-/* What a freestanding compiler may call though nobody wrote the call: block operations, and a square root. */
+/* Functions that a freestanding compiler may call implicitly: block operations, and a square root. */
 #include <stddef.h>
 #include <stdint.h>
 

@@ -14,10 +14,10 @@
 static volatile fs_octet receive_octets[F28_RECEIVE_RING], send_octets[F28_SEND_RING];
 static fs_ring received, to_send;
 static volatile uint32_t overruns, errors;
-static volatile uint16_t heard; /* 1: octets came since the main loop last looked */
-static uint16_t flags_seen;     /* the LASTING ones that were up when the main loop last looked */
+static volatile uint16_t heard; /* 1: octets came since the main loop last checked */
+static uint16_t flags_seen;     /* the LASTING ones that were up when the main loop last checked */
 static uint32_t silence_ms;     /* two octets at least, whatever the millisecond's phase */
-static uint16_t has_left;       /* 1: nothing was left to send when the main loop last looked */
+static uint16_t has_left;       /* 1: nothing was left to send when the main loop last checked */
 static uint32_t left_ms;        /* since then */
 static uint32_t active_ms;      /* when the line was last seen busy, while one of them is up */
 
@@ -26,7 +26,7 @@ static void fetch(void)
 {
     uint16_t n;
 
-    /* bounded by what the FIFO can hold: a line that never pauses keeps nobody here */
+    /* bounded by the size of the FIFO: a line without pauses cannot hold the loop here */
     for (n = 0U; n < FIFO_DEPTH && SCI_getRxFIFOStatus(SCIA_BASE) != SCI_FIFO_RX0; n++) {
         /* driverlib's own reads drop the two bits that belong to this octet, and the flags of SCIRXST to none */
         const uint16_t word = HWREGH(SCIA_BASE + SCI_O_RXBUF);

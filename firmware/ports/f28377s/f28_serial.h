@@ -3,7 +3,7 @@
  *
  * The receive interrupt comes with every 8th octet: a burst costs little, and the time of 8 octets is left for it.
  * What lies below that level in the FIFO is fetched by the main loop, since the SCI has no interrupt for a line that
- * fell silent. A damaged octet is counted and kept: the checksum of its frame judges it. Breaks are dealt with by the
+ * fell silent. A damaged octet is counted and kept: the checksum of its frame detects it. Breaks are dealt with by the
  * main loop, lest a line held low keep the processor in its interrupt. Sending goes on in the transmit interrupt for as long as there is something in the ring.
  *
  * After f28_serial_init all of it is for the main loop, with interrupts enabled.
@@ -30,7 +30,7 @@ uint16_t f28_serial_give(const fs_octet *octets, uint16_t count);
 /* Return 1 if the SCI makes this rate within 2 %. */
 uint16_t f28_serial_can_set_baud(uint32_t baud);
 
-/* Change the rate; 0, and nothing happens, until the last octet has left. To be called until it returns 1. */
+/* Change the rate; return 0 and change nothing until the last octet was sent. To be called until it returns 1. */
 uint16_t f28_serial_set_baud(uint32_t baud);
 
 /* Totals since the start, modulo 2^32. */

@@ -36,7 +36,7 @@ static __interrupt void on_millisecond(void)
     f28_interrupt_ends(began);
 }
 
-/* Let a timer count down from `last` to 0, over and over, at SYSCLK. */
+/* Make a timer count down from `last` to 0, over and over, at SYSCLK. */
 static void start_timer(uint32_t base, uint32_t last)
 {
     CPUTimer_stopTimer(base);

@@ -18,7 +18,7 @@ uint16_t f28_watchdog_was_cause(void)
 void f28_watchdog_start(uint32_t now_ms)
 {
     last_ms = now_ms;
-    /* 256 counts of INTOSC1 (10 MHz) / 512 / 8: 105 ms. It resets, as it does out of reset, and interrupts nobody. */
+    /* 256 counts of INTOSC1 (10 MHz) / 512 / 8: 105 ms. It resets, as it does out of reset, and raises no interrupt. */
     SysCtl_setWatchdogPrescaler(SYSCTL_WD_PRESCALE_8);
     SysCtl_serviceWatchdog();
     SysCtl_enableWatchdog();

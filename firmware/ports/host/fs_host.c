@@ -43,7 +43,7 @@ static uint64_t now_ns(void)
 {
     struct timespec now;
 
-    (void)clock_gettime(CLOCK_MONOTONIC, &now); /* POSIX lets it fail only where there is no such clock */
+    (void)clock_gettime(CLOCK_MONOTONIC, &now); /* by POSIX it fails only without such a clock */
     return (uint64_t)now.tv_sec * NANOSECONDS_PER_S + (uint64_t)now.tv_nsec;
 }
 

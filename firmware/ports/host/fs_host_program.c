@@ -20,6 +20,9 @@
 #include <unistd.h>
 
 #include "fs_host.h"
+#ifdef FS_SENSING /* with the estimator */
+#include "fs_sensing.h"
+#endif
 
 #define PIECE 4096
 
@@ -29,11 +32,11 @@ typedef struct {
     size_t first, end;
 } pending;
 
-/* The line, and who watches over this process. */
+/* The line, and the pipe of the parent process. */
 typedef struct {
     int in, out;
     int slave;  /* held open until the client speaks, so that the line does not seem closed before; -1: not held */
-    int parent; /* closed by whoever started this process when it ends; -1: nobody */
+    int parent; /* closed when the parent process ends; -1: no parent */
 } line;
 
 static int fail(const char *what)
@@ -135,7 +138,7 @@ static struct timespec time_left(const fs_app *app)
     return wait;
 }
 
-/* Serve the line until its other end, or whoever started this process, is gone. */
+/* Serve the line until its other end or the parent process is gone. */
 static int serve(line *ends, fs_app *app)
 {
     static pending waiting;
@@ -161,7 +164,7 @@ static int serve(line *ends, fs_app *app)
             return fail("poll");
         }
         fs_app_run(app, fs_host_microseconds() - began_us); /* before the octets: their time is now */
-        fs_app_poll(app, fs_host_milliseconds() - began_ms); /* what is received now came after the wait */
+        fs_app_poll(app, fs_host_milliseconds() - began_ms); /* octets received now came after the wait */
         if ((watched[0].revents & (POLLIN | POLLHUP | POLLERR)) != 0) {
             is_open = (receive_octets(ends, app) == 0);
         }
@@ -169,8 +172,21 @@ static int serve(line *ends, fs_app *app)
             is_open = 0;
         }
     }
-    (void)send_octets(ends, app, &waiting); /* who only closed its sending side still hears the answers */
+    (void)send_octets(ends, app, &waiting); /* a peer that closed only its sending side still gets the answers */
     return 0;
+}
+
+/* The port of this process: the host's, with the estimator if it is compiled in. */
+static const fs_port *own_port(void)
+{
+    static fs_port port;
+
+    port = *fs_host_port();
+#ifdef FS_SENSING
+    port.sense = fs_sensing_take;
+    port.read_estimator = fs_sensing_read;
+#endif
+    return &port;
 }
 
 int main(int argc, char **argv)
@@ -191,7 +207,7 @@ int main(int argc, char **argv)
     if (set_nonblocking(ends.in) != 0 || set_nonblocking(ends.out) != 0) {
         return fail("line");
     }
-    app = fs_host_app_new(NULL);
+    app = fs_host_app_new(own_port());
     if (app == NULL) {
         return fail("memory");
     }

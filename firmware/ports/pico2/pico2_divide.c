@@ -60,7 +60,7 @@ static uint32_t shifted_right(uint32_t value, uint32_t places)
     return value >> places | (((value & ((1UL << places) - 1U)) != 0U) ? 1U : 0U);
 }
 
-/* Divide two finite numbers that are not zero; the signs are not looked at. */
+/* Divide two finite numbers that are not zero; the signs are ignored. */
 static uint32_t divide(uint32_t a, uint32_t b)
 {
     int32_t exponent_a, exponent_b, exponent;

@@ -19,7 +19,7 @@ from rich.console import Console
 
 from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import LocalFrame
-from flightstack.params.config import DEFAULT_HOME
+from flightstack.params.config import DEFAULT_HOME, TRUTH
 from flightstack.plan import Command, Frame, MissionItem, Plan, save_plan
 from flightstack.transports.udp import PortBusyError, UdpSocket
 from gcs_cli.errors import USAGE, CliError
@@ -42,7 +42,7 @@ WHY_SO = (
     "It is a mission, as a pilot uploads it, and not the trajectory of Fig. 7 itself: the vehicle's own guidance flies "
     "from waypoint to waypoint. The plant is the paper's; backstepping flies the rigid body as well, and the PID does "
     "not: there, where rotors react when they spin up, Table II's yaw loop is unstable, oscillates on the ground "
-    "before takeoff, and lets flights that were one rounding apart rise at different times."
+    "before takeoff, and causes flights that were one rounding apart rise at different times."
 )
 TRAJECTORY = "desired"
 _FIRST_INSTANCE = 90
@@ -168,7 +168,7 @@ def _fly(
         path = Path(workshop) / f"{TRAJECTORY}.plan"
         save_plan(path, plan)
         options = FlyOptions(
-            path, controller, GAINS, plant, inner_hz=INNER_HZ, outer_hz=OUTER_HZ,
+            path, controller, GAINS, plant, inner_hz=INNER_HZ, outer_hz=OUTER_HZ, state=TRUTH,
             instance=_free_instance() if instance is None else instance,
         )  # fmt: skip
         console = Console(file=io.StringIO())

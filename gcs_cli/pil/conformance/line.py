@@ -6,8 +6,8 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple, TypeVar
 
-from flightstack.firmware.pil_operations import TARGET_COMPONENT, TARGET_SYSTEM
-from flightstack.firmware.pil_steps import OWN_COMPONENT, OWN_SYSTEM
+from flightstack.firmware.pil.operations import TARGET_COMPONENT, TARGET_SYSTEM
+from flightstack.firmware.pil.steps import OWN_COMPONENT, OWN_SYSTEM
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
 from flightstack.transports.byte_link import ByteLink

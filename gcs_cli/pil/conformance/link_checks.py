@@ -6,7 +6,7 @@ import random
 import struct
 
 from flightstack.core.contract import LoopFlags
-from flightstack.firmware.pil_steps import REPORT_IDS, PilReport
+from flightstack.firmware.pil.steps import REPORT_IDS, PilReport
 from flightstack.mavlink.dialect import LAYOUT_BY_NAME, mavlink
 from flightstack.mavlink.frames import pack_frame
 from flightstack.mavlink.link import Message

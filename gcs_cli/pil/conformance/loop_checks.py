@@ -11,8 +11,8 @@ import numpy as np
 from flightstack.core.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, STATE_SIZE, FloatArray, LoopFlags
 from flightstack.core.float32 import as_float32
 from flightstack.firmware.c_loops import SETPOINT_AT, TARGET_AT, HostLoops
-from flightstack.firmware.pil_operations import TARGET_COMPONENT, TARGET_SYSTEM
-from flightstack.firmware.pil_steps import PilReport
+from flightstack.firmware.pil.operations import TARGET_COMPONENT, TARGET_SYSTEM
+from flightstack.firmware.pil.steps import PilReport
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from gcs_cli.pil.conformance.check import FAILED, NOT_CHECKED, Check, judged

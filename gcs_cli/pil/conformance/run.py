@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from flightstack.firmware.build import host_library
 from flightstack.firmware.c_loops import HostLoops
 from flightstack.firmware.numbers import default_numbers
-from flightstack.firmware.pil_steps import PilReport
+from flightstack.firmware.pil.steps import PilReport
 from flightstack.firmware.sources import source_hash
+from flightstack.firmware.toolchain.build import host_library
 from flightstack.transports.byte_link import ByteLink
 from gcs_cli.pil.conformance import link_checks, loop_checks, state_checks, time_checks
 from gcs_cli.pil.conformance.check import FAILED, NOT_CHECKED, Check

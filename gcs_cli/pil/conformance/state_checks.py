@@ -8,7 +8,7 @@ from typing import Any
 
 from flightstack.core.contract import LoopFlags
 from flightstack.firmware.c_loops import TARGET_AT
-from flightstack.firmware.pil_steps import BAD_INPUT
+from flightstack.firmware.pil.steps import BAD_INPUT
 from flightstack.mavlink.dialect import mavlink
 from gcs_cli.pil.conformance.check import NOT_CHECKED, PASSED, Check, judged
 from gcs_cli.pil.conformance.line import Line

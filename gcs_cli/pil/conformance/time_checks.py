@@ -5,8 +5,8 @@ from __future__ import annotations
 import itertools
 from typing import Any, NamedTuple
 
-from flightstack.firmware.pil_record import COST_UNITS
-from flightstack.firmware.pil_steps import PilReport
+from flightstack.firmware.pil.record import COST_UNITS
+from flightstack.firmware.pil.steps import PilReport
 from gcs_cli.pil.conformance.check import FAILED, NOT_CHECKED, Check, judged
 from gcs_cli.pil.conformance.line import Line, status_of
 

@@ -30,6 +30,9 @@ uint16_t codec_recode(uint32_t id, const fs_octet *payload, uint16_t length, fs_
         RECODE(PIL_STATE, pil_state)
         RECODE(PIL_DRIVE, pil_drive)
         RECODE(PIL_TIMING, pil_timing)
+        RECODE(PIL_SENSE, pil_sense)
+        RECODE(PIL_ESTIMATE, pil_estimate)
+        RECODE(PIL_MEMORY, pil_memory)
     default:
         return 0U;
     }

@@ -26,7 +26,10 @@
 #pragma GCC poison memcpy size_t sizeof
 #endif
 #pragma GCC poison memmove memset memcmp memchr strlen strcpy strncpy strcat strncat strcmp strncmp
-#pragma GCC poison union offsetof
+#ifndef POISON_ALLOWS_UNION /* a view of one record, whose members have 32 bits on every target, as words */
+#pragma GCC poison union
+#endif
+#pragma GCC poison offsetof
 
 /* No heap, nothing printed, no way out but through the end. */
 #pragma GCC poison malloc calloc realloc free alloca

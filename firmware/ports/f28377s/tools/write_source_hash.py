@@ -24,7 +24,7 @@ def main(path: Path) -> None:
     try:
         text = header()
     except BaseException:
-        path.unlink(missing_ok=True)  # an old one would tell of other sources
+        path.unlink(missing_ok=True)  # an old one would belong to other sources
         raise
     if not path.is_file() or path.read_text(encoding="ascii") != text:
         path.write_text(text, encoding="ascii")

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from flightstack.core.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, STATE_SIZE
-from flightstack.firmware.pil_steps import REFERENCE_ATTITUDE_SIZE
+from flightstack.firmware.pil.steps import REFERENCE_ATTITUDE_SIZE
 from flightstack.mavlink.frames import CHECKSUM_SIZE, HEADER_V2
 
 BITS_PER_OCTET = 10.0

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from flightstack.firmware.pil_record import COST_UNITS
+from flightstack.firmware.pil.record import COST_UNITS
 
-PROTOCOL = 2
+PROTOCOL = 3
 """Version of the FS_PIL messages; FS_APP_PROTOCOL in firmware/app/fs_app.h."""
 
 

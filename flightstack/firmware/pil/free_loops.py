@@ -12,10 +12,10 @@ import numpy as np
 from flightstack.core.contract import ATTITUDE_TARGET_SIZE, FloatArray, LoopFlags
 from flightstack.core.errors import TargetError
 from flightstack.firmware.c_loops import INPUT_SIZE, OUTPUT_SIZE
-from flightstack.firmware.free_running import REST, FreeRunning
-from flightstack.firmware.pil_client import DEFAULT_TIMING
-from flightstack.firmware.pil_steps import BAD_INPUT, REFERENCE_AT, REFERENCE_ATTITUDE_SIZE, ROTORS_AT
-from flightstack.firmware.target_loops import FINAL_ATTEMPTS, TargetLoops, sent_numbers
+from flightstack.firmware.pil.client import DEFAULT_TIMING
+from flightstack.firmware.pil.free_running import REST, FreeRunning
+from flightstack.firmware.pil.steps import BAD_INPUT, REFERENCE_AT, REFERENCE_ATTITUDE_SIZE, ROTORS_AT
+from flightstack.firmware.pil.target_loops import FINAL_ATTEMPTS, TargetLoops, sent_numbers
 from flightstack.mavlink.dialect import mavlink
 
 TICKS_PER_COMMAND = 1
@@ -38,7 +38,7 @@ class FreeLoops:
     """
 
     def __init__(self, loops: TargetLoops) -> None:
-        """Let the target of ``loops`` run; raise TargetError."""
+        """Start the free run of the target of ``loops``; raise TargetError."""
         self._loops, self._session = loops, loops.session
         self._free = FreeRunning()
         self._timing = self._session.client.timing
@@ -139,7 +139,7 @@ class FreeLoops:
             raise TargetError(str(error)) from error
 
     def _run(self) -> None:
-        """Set the numbers that were changed and let the target run; raise TargetError."""
+        """Set the numbers that were changed and resume the free run; raise TargetError."""
         client = self._session.client
         client.timing = self._timing
         self._loops.send_numbers()

@@ -10,7 +10,7 @@ import numpy as np
 
 from flightstack.core.contract import LoopFlags
 from flightstack.core.float32 import as_float32
-from flightstack.firmware.pil_steps import BAD_INPUT, OWN_COMPONENT, OWN_SYSTEM
+from flightstack.firmware.pil.steps import BAD_INPUT, OWN_COMPONENT, OWN_SYSTEM
 from flightstack.mavlink.dialect import LAYOUT_BY_NAME
 from flightstack.mavlink.frames import HEADER_V2, Frame, pack_frame
 from flightstack.mavlink.link import Link

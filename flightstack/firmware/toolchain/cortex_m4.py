@@ -8,7 +8,16 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from flightstack.core.errors import INSTALL_FIRMWARE
-from flightstack.firmware.build import (
+from flightstack.firmware.emulator import EmulatedTarget
+from flightstack.firmware.sources import (
+    PORTABLE,
+    SENSING,
+    SENSING_INCLUDES,
+    files,
+    firmware_root,
+    sensing_files,
+)
+from flightstack.firmware.toolchain.build import (
     EXACT,
     BuildError,
     Compiler,
@@ -18,8 +27,6 @@ from flightstack.firmware.build import (
     host_compiler,
     includes,
 )
-from flightstack.firmware.emulator import EmulatedTarget
-from flightstack.firmware.sources import PORTABLE, c_files, files, firmware_root
 
 CPU = ("-target", "thumb-freestanding-eabihf", "-mcpu=cortex_m4+vfp4d16sp")
 """Target flags of zig's clang: hardware single precision; the sources use no doubles."""
@@ -45,9 +52,7 @@ def cross_compiler() -> Compiler:
 
 def cortex_m4_image() -> Path:
     """Return the application for the emulated Cortex-M4F as an ELF file; raise BuildError."""
-    return emulated_image(
-        "emulated.elf", [path for folder in PORTABLE for path in c_files(folder)], "emulated.c"
-    )
+    return emulated_image("emulated.elf", sensing_files(), "emulated.c", flags=includes(*SENSING_INCLUDES))
 
 
 def emulated_image(name: str, sources: Sequence[Path], *parts: str, flags: Sequence[str] = ()) -> Path:
@@ -66,7 +71,9 @@ def emulated_image(name: str, sources: Sequence[Path], *parts: str, flags: Seque
         *includes(*PORTABLE, _PORT),
         *flags,
     ]
-    return cached(name, compiler, command, [*sources, *own], [*files(_PORT), port / "emulated.ld"])
+    return cached(
+        name, compiler, command, [*sources, *own], [*files(_PORT, "laws", *SENSING), port / "emulated.ld"]
+    )
 
 
 def instruction_counter() -> Path:

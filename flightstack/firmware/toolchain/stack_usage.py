@@ -19,8 +19,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from flightstack.core.atomic_file import write_text_atomically
-from flightstack.firmware.build import COMPILE_LIMIT_S, EXACT, cache_root, compiler_version, includes
 from flightstack.firmware.sources import PORTABLE, c_files, source_hash
+from flightstack.firmware.toolchain.build import (
+    COMPILE_LIMIT_S,
+    EXACT,
+    cache_root,
+    compiler_version,
+    includes,
+)
 
 _CORTEX_M4 = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16", "-ffreestanding")
 _COMPILERS = (("arm-none-eabi-gcc", _CORTEX_M4, "Cortex-M4F"), ("gcc", (), "this machine"))

@@ -66,7 +66,7 @@ def _rows(dwarf: Any) -> Iterator[tuple[str, int, int]]:
         program = dwarf.line_program_for_CU(unit)
         if program is None:
             continue
-        names = list(_names(program.header))
+        names = list(file_names(program.header))
         first = 0 if program.header["version"] >= _DWARF_5 else 1
         states = [entry.state for entry in program.get_entries() if entry.state is not None]
         for state, following in pairwise(states):
@@ -75,7 +75,7 @@ def _rows(dwarf: Any) -> Iterator[tuple[str, int, int]]:
                 yield names[state.file - first], state.line, state.address
 
 
-def _names(header: Any) -> Iterator[str]:
+def file_names(header: Any) -> Iterator[str]:
     """Yield folder and name of each file; compilers split a path anywhere between the two columns of the table."""
     is_new = header["version"] >= _DWARF_5
     for entry in header["file_entry"]:

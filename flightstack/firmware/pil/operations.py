@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Protocol, TypeAlias
 
 from flightstack.core.float32 import as_float32
-from flightstack.firmware.pil_steps import PilReport
+from flightstack.firmware.pil.steps import PilReport
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.frames import Frame
 from flightstack.mavlink.link import Link, Message
@@ -23,7 +23,7 @@ class Operation(Protocol):
 
     @property
     def failure(self) -> str | None:
-        """Why it failed, or None."""
+        """Reason of its failure, or None."""
 
     @property
     def result(self) -> Result:

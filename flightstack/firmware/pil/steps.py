@@ -86,7 +86,7 @@ class Step:
         self.failure: str | None = None
         self.is_refused = False
         self.attempts = 0
-        """How often it was sent."""
+        """Number of times that it was sent."""
         self._flags, self._rotors = step.flags, short_rotors
         self._expected: int | None = None
         self._layout = _TICK if short_rotors else _STEP
@@ -163,7 +163,7 @@ class Window:
 
     @property
     def failure(self) -> str | None:
-        """Why a step failed, or None."""
+        """Reason of a failed step, or None."""
         return next((step.failure for step in self.steps if step.failure is not None), None)
 
     @property

@@ -19,7 +19,17 @@ from pathlib import Path
 from typing import NamedTuple
 
 from flightstack.core.errors import INSTALL_FIRMWARE
-from flightstack.firmware.sources import PORTABLE, c_files, digest, files, firmware_root, source_hash
+from flightstack.firmware.sources import (
+    PORTABLE,
+    SENSING,
+    SENSING_INCLUDES,
+    c_files,
+    digest,
+    files,
+    firmware_root,
+    sensing_files,
+    source_hash,
+)
 
 EXACT = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno")
 """Flags that make every compiler round each operation as written."""
@@ -155,6 +165,6 @@ def host_program() -> Path:
     """Return the firmware as a host program on a pseudo-terminal; raise BuildError."""
     compiler, port = host_compiler(), firmware_root() / "ports" / "host"
     parts = [port / f"{name}.c" for name in ("fs_host", "fs_host_app", "fs_host_program")]
-    flags = [*EXACT, *definitions(compiler), *includes(*PORTABLE, "ports/host")]
-    sources = [path for folder in PORTABLE for path in c_files(folder)]
-    return cached("fs_host", compiler, flags, [*sources, *parts], files("ports/host"))
+    flags = [*EXACT, *definitions(compiler), "-DFS_SENSING", *includes(*SENSING_INCLUDES, "ports/host")]
+    headers = files("ports/host", *SENSING, "laws")
+    return cached("fs_host", compiler, flags, [*sensing_files(), *parts], headers)

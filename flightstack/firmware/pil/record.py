@@ -12,8 +12,8 @@ import numpy as np
 
 from flightstack.core.atomic_file import write_bytes_atomically, write_text_atomically
 from flightstack.core.contract import LoopFlags
-from flightstack.firmware.pil_client import PilCounters
-from flightstack.firmware.pil_steps import PilReport
+from flightstack.firmware.pil.client import PilCounters
+from flightstack.firmware.pil.steps import PilReport
 
 LINK_FILE, STEPS_FILE = "pil-link.json", "pil-steps.npz"
 COST_UNITS = ("none", "cycles", "instructions", "ns")
@@ -46,7 +46,7 @@ class TracedLink(Protocol):
 
     @property
     def trace(self) -> Trace:
-        """What ran until now."""
+        """Unit that has run until now."""
 
 
 class PilRecord:

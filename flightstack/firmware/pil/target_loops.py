@@ -14,12 +14,13 @@ from flightstack.core.contract import ATTITUDE_TARGET_SIZE, FloatArray, LoopFlag
 from flightstack.core.errors import TargetError, WrongFirmwareError
 from flightstack.core.float32 import as_float32
 from flightstack.firmware.c_loops import INPUT_SIZE, OUTPUT_SIZE, SETPOINT_AT, TARGET_AT
-from flightstack.firmware.identity import check_identity, described
 from flightstack.firmware.numbers import FIRST_NUMBERS
-from flightstack.firmware.pil_client import DEFAULT_TIMING, PilCounters, PilTiming
-from flightstack.firmware.pil_record import PilRecord, TracedLink
-from flightstack.firmware.pil_session import PilSession
-from flightstack.firmware.pil_steps import WANT_REFERENCE, StepInput
+from flightstack.firmware.pil.client import DEFAULT_TIMING, PilCounters, PilTiming
+from flightstack.firmware.pil.identity import check_identity, described
+from flightstack.firmware.pil.operations import Operation
+from flightstack.firmware.pil.record import PilRecord, TracedLink
+from flightstack.firmware.pil.session import PilSession
+from flightstack.firmware.pil.steps import WANT_REFERENCE, StepInput
 from flightstack.firmware.sources import source_hash
 from flightstack.transports.byte_link import ByteLink
 
@@ -59,27 +60,26 @@ class TargetLoops:
         self._is_setting = False  # the client sets the first one of them
         self._is_closed = False
         self.ending: str | None = None
-        """Why the target failed, or None."""
+        """Reason of the target's failure, or None."""
         self.input: FloatArray = np.zeros(INPUT_SIZE)
         self.output: FloatArray = np.zeros(OUTPUT_SIZE)
-        identity = self._request("FS_PIL_IDENTITY")
-        problem = check_identity(identity, source_hash() if expected_hash is None else expected_hash)
-        if problem is not None:
-            raise WrongFirmwareError(f"{link.name}: {problem}")
+        identity = self._identify(source_hash() if expected_hash is None else expected_hash)
         self.identity = described(identity)
         self._window = max(1, identity.window)
         self._short = ShortSteps(numbers) if short else None
         self.record = PilRecord(link.name, self.identity, self._counters(), note)
-        details = [
-            self.identity["board"],
-            f"sources {self.identity['source_hash']}",
-            self.identity["compiler"],
-            *([] if note is None else [note]),
-        ]
-        self.version = f"C, float, {', '.join(details)}"
+        self.version = _version(self.identity, note)
         for name, value in (*FIRST_NUMBERS.items(), *numbers.items()):
             self.set(name, value)
         self.send_numbers()
+
+    def _identify(self, expected_hash: bytes) -> Any:
+        """Return the target's FS_PIL_IDENTITY; raise WrongFirmwareError for other firmware."""
+        identity = self._request("FS_PIL_IDENTITY")
+        problem = check_identity(identity, expected_hash)
+        if problem is not None:
+            raise WrongFirmwareError(f"{self._link.name}: {problem}")
+        return identity
 
     # ------------------------------------------------------------------ LoopExecutor
 
@@ -183,6 +183,11 @@ class TargetLoops:
             raise TargetError(sentence)
         return result
 
+    def run_operation(self, operation: Operation) -> Any:
+        """Run an operation and return its result; raise TargetError."""
+        self._client.start(operation)
+        return self._finish()
+
     def _request(self, name: str) -> Any:
         self._client.start_request(name)
         return self._finish()
@@ -235,7 +240,7 @@ class TargetLoops:
 
 
 class ShortSteps:
-    """What short steps leave out, and when they ask for the attitude reference.
+    """Omissions of short steps, and the steps that request the attitude reference.
 
     The commander compares attitude and reference in each outer tick, with the row of the tick before.
     """
@@ -272,3 +277,9 @@ def sent_numbers(flags: int, values: FloatArray) -> list[float]:
     if flags & LoopFlags.OUTER_DUE:
         raise ValueError("a step has either a setpoint or an attitude target")
     return [*numbers[:SETPOINT_AT], *numbers[TARGET_AT:], *NOTHING]
+
+
+def _version(identity: Mapping[str, str], note: str | None) -> str:
+    """Return the description of the target's firmware for the flight log."""
+    details = [identity["board"], f"sources {identity['source_hash']}", identity["compiler"]]
+    return f"C, float, {', '.join(details if note is None else [*details, note])}"

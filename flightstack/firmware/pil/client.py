@@ -13,8 +13,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from flightstack.firmware.pil_operations import Command, Operation, Request, Result, SetNumber, message_of
-from flightstack.firmware.pil_steps import (
+from flightstack.firmware.pil.operations import Command, Operation, Request, Result, SetNumber, message_of
+from flightstack.firmware.pil.steps import (
     OWN_COMPONENT,
     OWN_SYSTEM,
     REPORT_IDS,
@@ -82,7 +82,7 @@ class PilClient:
         self.texts: deque[tuple[int, str]] = deque(maxlen=MOST_TEXTS)
         """Severity and text of the newest status texts of the target."""
         self.failure: str | None = None
-        """Why the operation failed, as a clause about the target, or None."""
+        """Reason of the failed operation, as a clause about the target, or None."""
 
     def start_step(self, flags: int, numbers: Sequence[float], short_rotors: int = 0) -> None:
         """Run the next step; ``numbers`` (24,) are the state with the setpoint or attitude target.
@@ -90,25 +90,25 @@ class PilClient:
         ``short_rotors`` is the vehicle's number of rotors for a short step and report, 0 for full ones.
         """
         self._step = (self._step + 1) & 0xFFFF_FFFF
-        self._start(Step(self._step, StepInput(flags, numbers), short_rotors))
+        self.start(Step(self._step, StepInput(flags, numbers), short_rotors))
 
     def start_window(self, steps: Sequence[StepInput]) -> None:
         """Run the next steps, sent together; their number must not exceed the target's FS_PIL_IDENTITY.window."""
         first = (self._step + 1) & 0xFFFF_FFFF
         self._step = (self._step + len(steps)) & 0xFFFF_FFFF
-        self._start(Window(first, steps))
+        self.start(Window(first, steps))
 
     def start_set(self, name: str, value: float) -> None:
         """Set a number of the target; its float32 value must be confirmed bit by bit."""
-        self._start(SetNumber(name, value))
+        self.start(SetNumber(name, value))
 
     def start_request(self, name: str) -> None:
         """Request the message of this name."""
-        self._start(Request(name))
+        self.start(Request(name))
 
     def start_command(self, number: int, refusal: str, *values: float) -> None:
         """Send a command; ``refusal`` is the failure if it is refused."""
-        self._start(Command(number, refusal, values))
+        self.start(Command(number, refusal, values))
 
     @property
     def result(self) -> Result:
@@ -208,7 +208,8 @@ class PilClient:
     def _is_active(self) -> bool:
         return self._deadline_s is not None and self._attempts > 0
 
-    def _start(self, operation: Operation) -> None:
+    def start(self, operation: Operation) -> None:
+        """Run an operation."""
         self.counters.operations += 1
         self._operation = operation
         self.failure = None

@@ -8,7 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from flightstack.firmware.build import (
+from flightstack.firmware.choice import DEFAULT_BAUD
+from flightstack.firmware.sources import PORTABLE, c_files, files, firmware_root
+from flightstack.firmware.toolchain.build import (
     EXACT,
     BuildError,
     Compiler,
@@ -17,10 +19,8 @@ from flightstack.firmware.build import (
     definitions,
     includes,
 )
-from flightstack.firmware.choice import DEFAULT_BAUD
-from flightstack.firmware.cortex_m4 import cross_compiler
-from flightstack.firmware.elf import Elf
-from flightstack.firmware.sources import PORTABLE, c_files, files, firmware_root
+from flightstack.firmware.toolchain.cortex_m4 import cross_compiler
+from flightstack.firmware.toolchain.elf import Elf
 
 GCC, ZIG = "gcc", "zig"
 ARM_GCC = "arm-none-eabi-gcc"
