@@ -15,7 +15,7 @@ from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.core.contract import Vector3
 from flightstack.core.errors import ConfigError
 from flightstack.core.port_numbers import simulator_port, system_id
-from flightstack.process import console
+from flightstack.process import collection, console
 from flightstack.process.command_line import (
     Overwrite,
     PanelCommand,
@@ -135,6 +135,13 @@ def _serve(served: ServerOptions, viewed: str | None) -> int:
         window.close()
 
 
+def _check_open_loop(plant: str, seconds: float, dt: float, seed: int) -> None:
+    arguments.check_plant(plant)
+    arguments.check_range("--seconds", seconds, 0.0, 1e5)
+    arguments.check_range("--dt", dt, 1e-6, 1.0)
+    arguments.check_range("--seed", seed, 0, 2**63)
+
+
 @app.command("open-loop", cls=PanelCommand)
 def open_loop(
     rotors: options.Rotors,
@@ -161,25 +168,20 @@ def open_loop(
 
     Rotor speeds are not limited.
     """
-    arguments.check_plant(plant)
-    arguments.check_range("--seconds", seconds, 0.0, 1e5)
-    arguments.check_range("--dt", dt, 1e-6, 1.0)
-    arguments.check_range("--seed", seed, 0, 2**63)
+    _check_open_loop(plant, seconds, dt, seed)
     initial = _initial(pos, vel, euler_deg, rates, no_ground)
     from flightstack.process.compile_notice import announce_compilation  # noqa: PLC0415
     from sim_bridge.open_loop import OpenLoop, run_open_loop  # noqa: PLC0415
     from sim_bridge.plants import kernels_of  # noqa: PLC0415
 
     loaded = _load_vehicle(vehicle, plant, drag)
+    speeds_rad_s = arguments.parse_rotor_speeds(rotors, loaded)
     disturbance = _disturbance(wind, gust, force, torque, torque_gust)
     announce_compilation("sim-bridge", kernels_of(plant))
-    state = run_open_loop(
-        OpenLoop(
-            loaded, plant, arguments.parse_rotor_speeds(rotors, loaded), initial,
-            seconds, dt, not no_ground, not no_lag, disturbance, seed,
-        ),
-        warn=complain,
-    )  # fmt: skip
+    flight = OpenLoop(
+        loaded, plant, speeds_rad_s, initial, seconds, dt, not no_ground, not no_lag, disturbance, seed
+    )
+    state = run_open_loop(flight, warn=complain)
     print_result(json.dumps(state) if as_json else _table(state))
 
 
@@ -242,7 +244,8 @@ def main(argv: list[str] | None = None) -> int:
     """Run the command line; return the exit code."""
     console.replace_unencodable()
     try:
-        return app(argv, prog_name="sim-bridge", standalone_mode=False) or 0
+        with collection.paused():
+            return app(argv, prog_name="sim-bridge", standalone_mode=False) or 0
     except PlantDivergedError as error:
         complain(error)
         return 1

@@ -10,8 +10,8 @@ from flightstack.core.geodesy import GeoPoint
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.plant.battery import BatteryOptions
-from sim_bridge.plant.fault_checks import Flight, check_faults
-from sim_bridge.plant.fault_schedule import Fault, parse_fault, shortened
+from sim_bridge.plant.faults.checks import Flight, check_faults
+from sim_bridge.plant.faults.schedule import Fault, parse_fault, shortened
 from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.plants import MULTIBODY, NO_MUJOCO, PLANT_NAMES
 

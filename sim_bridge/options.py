@@ -1,4 +1,7 @@
-"""Options of ``sim-bridge`` and ``sim-bridge open-loop``, each with its type and help."""
+"""Options of ``sim-bridge`` and ``sim-bridge open-loop``, each with its type and help.
+
+A module of its own: the help imports no plant.
+"""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from collections import deque
 from typing import NamedTuple
 
 from flightstack.simulator_link.hot_frames import PlantStateFrame
-from sim_bridge.plant.fault_table import Fault, Kind
+from sim_bridge.plant.faults.table import Fault, Kind
 
 
 class _Past(NamedTuple):

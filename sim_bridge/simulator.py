@@ -21,10 +21,10 @@ from flightstack.simulator_link.hot_frames import (
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.plant.battery import INTERVAL_US as BATTERY_INTERVAL_US
 from sim_bridge.plant.battery import battery_report
-from sim_bridge.plant.fault_checks import Flight, check_faults
-from sim_bridge.plant.fault_effects import plant_faults
-from sim_bridge.plant.fault_schedule import Schedule
-from sim_bridge.plant.fault_table import ROWS, STATE_KINDS, Fault, Kind
+from sim_bridge.plant.faults.checks import Flight, check_faults
+from sim_bridge.plant.faults.effects import plant_faults
+from sim_bridge.plant.faults.schedule import Schedule
+from sim_bridge.plant.faults.table import ROWS, STATE_KINDS, Fault, Kind
 from sim_bridge.plant.layout import CONTACT, DIVERGED, OUTPUT
 from sim_bridge.plant.plant import Plant, PlantOptions
 from sim_bridge.plants import make_plant
@@ -261,6 +261,24 @@ class Simulator:
             self._follow_faults()
         if self.sensors is not None:
             self.sensors.measure(self.time_us)
+
+    @property
+    def sends_state_alone(self) -> bool:
+        """True if ``outgoing`` has the true state and, with sensors, messages of sensors, but nothing else."""
+        return self._sent is None and self.time_us < self._battery_due_us
+
+    def quiet_intervals(self) -> int:
+        """Return how many of the next intervals change nothing but the state and the inertial sensor.
+
+        The bytes after each of them are FS_PLANT_STATE and, with sensors, one HIL_SENSOR.
+        """
+        sensors = self.sensors
+        if self._sent is not None or not (sensors is None or sensors.is_quiet):
+            return 0
+        due_us = min(self._change_us, self._battery_due_us)
+        if sensors is not None:
+            due_us = min(due_us, sensors.next_us)
+        return max(0, (due_us - 1 - self.time_us) // self._interval_us)
 
     def _follow_faults(self) -> None:
         """Begin and end faults that are due, and follow the true state with a late one."""

@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 from flightstack.core.contract import FloatArray, RecordArray, Vector3
 from sim_bridge.plant.battery import FULL, BatteryOptions, BatteryState
 from sim_bridge.plant.disturbance import NO_DISTURBANCE, Disturbance
-from sim_bridge.plant.fault_effects import PlantFaults
+from sim_bridge.plant.faults.effects import PlantFaults
 
 
 class InitialState(NamedTuple):

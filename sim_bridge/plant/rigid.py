@@ -113,6 +113,15 @@ def _contact(x: FloatArray, r: Rotation, rates: Vector3, m: Record) -> tuple[Vec
 
 
 @compiled
+def _store_attitude_rate(q: Quaternion, rates: Vector3, out: FloatArray) -> None:
+    """Write the time derivative of the quaternion, ½ q ⊗ (0, ω), to ``out``."""
+    out[6] = -0.5 * (q.x * rates.x + q.y * rates.y + q.z * rates.z)
+    out[7] = 0.5 * (q.w * rates.x + q.y * rates.z - q.z * rates.y)
+    out[8] = 0.5 * (q.w * rates.y + q.z * rates.x - q.x * rates.z)
+    out[9] = 0.5 * (q.w * rates.z + q.x * rates.y - q.y * rates.x)
+
+
+@compiled
 def derivative(x: FloatArray, rotors: RotorForces, m: Record, out: FloatArray) -> None:
     """Write the time derivative of the state ``x``, shape (13,), to ``out``."""
     r = rotation(x)
@@ -135,11 +144,7 @@ def derivative(x: FloatArray, rotors: RotorForces, m: Record, out: FloatArray) -
         tx, ty, tz = tx + torque.x, ty + torque.y, tz + torque.z
     out[0], out[1], out[2] = x[3], x[4], x[5]
     external, mass = m["force"], m["mass"]
-    q = Quaternion(x[6], x[7], x[8], x[9])
-    out[6] = -0.5 * (q.x * rates.x + q.y * rates.y + q.z * rates.z)
-    out[7] = 0.5 * (q.w * rates.x + q.y * rates.z - q.z * rates.y)
-    out[8] = 0.5 * (q.w * rates.y + q.z * rates.x - q.x * rates.z)
-    out[9] = 0.5 * (q.w * rates.z + q.x * rates.y - q.y * rates.x)
+    _store_attitude_rate(Quaternion(x[6], x[7], x[8], x[9]), rates, out)
     inertia, h = m["inertia"], rotors.momentum_n_m_s
     if m["is_loaded"] != 0:
         force = Vector3(push.x + external[0], push.y + external[1], push.z + external[2])

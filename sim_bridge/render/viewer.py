@@ -123,7 +123,7 @@ def show(
 
 
 def _set_camera(camera: Any, stage: Stage) -> None:
-    """Let the camera track the vehicle from behind."""
+    """Track the vehicle with the camera from behind."""
     import mujoco  # noqa: PLC0415
 
     camera.type = mujoco.mjtCamera.mjCAMERA_TRACKING

@@ -22,7 +22,7 @@ from flightstack.mavlink.link import Link, Message
 from flightstack.params.vehicle import Vehicle
 from flightstack.simulator_link.hot_frames import LOCKSTEP_FLAG, ActuatorsFrame
 from flightstack.simulator_link.sensor_frames import HIL_SENSOR_ID
-from sim_bridge.plant.fault_table import ROWS, STATE_KINDS, Kind
+from sim_bridge.plant.faults.table import ROWS, STATE_KINDS, Kind
 from sim_bridge.server.failure_command import inject_failure
 from sim_bridge.server.hil import HilControls, hil_state
 from sim_bridge.simulator import (

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from flightstack.core.contract import Vector3
 from flightstack.mavlink.dialect import mavlink
 from sim_bridge.errors import UsageProblemError
-from sim_bridge.plant.fault_schedule import Fault, Kind
+from sim_bridge.plant.faults.schedule import Fault, Kind
 from sim_bridge.simulator import Simulator
 
 NEARLY_EMPTY = 0.03

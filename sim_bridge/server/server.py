@@ -11,11 +11,12 @@ from typing import NamedTuple
 
 from flightstack.core.geodesy import GeoPoint
 from flightstack.params.vehicle import Vehicle
+from flightstack.process import collection
 from flightstack.process.clock import minimise_timer_slack
 from flightstack.process.compile_notice import announce_compilation
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.output import complain, say
-from sim_bridge.plant.fault_schedule import Fault
+from sim_bridge.plant.faults.schedule import Fault
 from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.plants import kernels_of
 from sim_bridge.render.live_view import LiveView
@@ -76,6 +77,7 @@ def serve(options: ServerOptions) -> int:
             host, port = listener.getsockname()[:2]
             complain(f"waited {options.timeout_s:g} s for a flight stack to connect to {host}:{port}")
             return NO_PEER
+    collection.resume()
     minimise_timer_slack()
     timeout_s = DEFAULT_TIMEOUT_S if options.timeout_s is None else options.timeout_s
     link = FlightStackEndpoint(simulator, options.vehicle, options.home, options.system_id)

@@ -1,14 +1,91 @@
-"""The session of one client: exchanges in lockstep, or in real time if the client has a clock of its own."""
+"""The session of one client: exchanges in lockstep, or in real time if the client has a clock of its own.
+
+``Pacer`` waits for the wall-clock deadlines of simulated time; ``Lateness`` counts how much later it went on.
+"""
 
 from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 
 from flightstack.transports.cpu_affinity import AffinityLeader
 from sim_bridge.server.connection import Connection, StoppedError, StopSignal
 from sim_bridge.server.endpoint import FlightStackEndpoint
-from sim_bridge.server.pacing import Pacer
+
+_BINS = 100_000  # of 1 µs; the last one also counts longer delays
+_SLIP_NS = 500_000_000
+_LONGEST_SLEEP_S = 0.1
+LEAD_NS = 10_000_000
+"""In lockstep, simulated time runs ahead of wall time by less than this before the simulator sleeps.
+
+Most of a tick in real time is the return from sleep, with cold caches, in both processes. ArduPilot's simulator
+accumulates its sleep likewise.
+"""
+
+
+class Lateness:
+    """Distribution of the delays after deadlines, in bins of 1 µs."""
+
+    def __init__(self) -> None:
+        self._bins = [0] * _BINS
+        self._sum_ns = 0
+        self.count = 0
+        self.max_us = 0.0
+
+    def add(self, late_ns: int) -> None:
+        """Count one delay."""
+        self._bins[min(late_ns // 1000, _BINS - 1)] += 1
+        self._sum_ns += late_ns
+        self.count += 1
+        self.max_us = max(self.max_us, late_ns / 1000.0)
+
+    def mean_us(self) -> float:
+        """Return the mean delay."""
+        return self._sum_ns / 1000.0 / max(1, self.count)
+
+    def percentile_us(self, percent: float) -> float:
+        """Return a percentile of the delays, to 1 µs."""
+        wanted, seen = self.count * percent / 100.0, 0
+        for us, number in enumerate(self._bins):
+            seen += number
+            if seen >= wanted:
+                return us + 1.0
+        return float(_BINS)
+
+
+class Pacer:
+    """Paces simulated time at ``speed`` times wall time, by absolute deadlines."""
+
+    def __init__(self, speed: float, stopped: Callable[[], bool]) -> None:
+        self._ns_per_us = 1000.0 / speed
+        self._stopped = stopped
+        self._base_ns: int | None = None
+        self._base_us = 0
+        self.lateness = Lateness()
+        self.slips = 0
+
+    def wait_until(self, time_us: int, lead_ns: int = 0) -> None:
+        """Sleep until the deadline of ``time_us``, if it is at least ``lead_ns`` ahead; the first call sets the origin.
+
+        A delay of more than 0.5 s (a suspended machine, a debugger) resets the origin.
+        """
+        now = time.monotonic_ns()
+        if self._base_ns is None:
+            self._base_ns, self._base_us = now, time_us
+            return
+        deadline = self._base_ns + round((time_us - self._base_us) * self._ns_per_us)
+        if 0 < deadline - now < lead_ns:
+            return
+        while now < deadline and not self._stopped():
+            time.sleep(min(_LONGEST_SLEEP_S, (deadline - now) * 1e-9))
+            now = time.monotonic_ns()
+        late = max(0, now - deadline)
+        self.lateness.add(late)
+        if late > _SLIP_NS:
+            self.slips += 1
+            self._base_ns, self._base_us = now, time_us
+
 
 FREEWHEEL_S = 0.05
 """Wait for an answer while the client's answers have not begun; PX4 takes 20 to 40 steps to start."""
@@ -73,7 +150,7 @@ class Session:
         if self.exchanges == self._move_at and self._leader is not None:
             self._move_at += self._leader.update()
         if self.pacer is not None:
-            self.pacer.wait_until(link.simulator.time_us)
+            self.pacer.wait_until(link.simulator.time_us, LEAD_NS)
 
     def _tick_on_wall_clock(self) -> None:
         link, connection = self.link, self._connection

@@ -9,10 +9,10 @@ from flightstack.core.enums import Mode
 from flightstack.core.geodesy import LocalFrame
 from flightstack.guidance.fence import Fence
 from flightstack.mavlink.dialect import mavlink
-from flightstack.testing import World
 from tests.support.failsafe_phases import select_mode, setpoint
 from tests.support.plan_items import item
 from tests.support.streams import sticks
+from tests.support.truth import World
 
 
 def nothing(world: World) -> None:

@@ -11,9 +11,9 @@ from flightstack.core.enums import Mode
 from flightstack.core.geodesy import LocalFrame
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
-from flightstack.testing import World
 from tests.support.plan_items import item
 from tests.support.streams import sticks
+from tests.support.truth import World
 
 QUICK = {
     "MPC_Z_VEL_MAX_UP": 5,

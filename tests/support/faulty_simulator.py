@@ -5,7 +5,7 @@ from __future__ import annotations
 from flightstack.core.geodesy import GeoPoint
 from flightstack.params.vehicle import load_vehicle
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, ActuatorsFrame
-from sim_bridge.plant.fault_schedule import parse_fault
+from sim_bridge.plant.faults.schedule import parse_fault
 from sim_bridge.simulator import Simulator
 
 PAPER = load_vehicle("paper_quad")

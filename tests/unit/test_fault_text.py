@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from flightstack.core.contract import Vector3
 from sim_bridge.errors import UsageProblemError
-from sim_bridge.plant.fault_schedule import Fault, Kind, parse_fault
-from sim_bridge.plant.fault_table import TABLE, Row
+from sim_bridge.plant.faults.schedule import Fault, Kind, parse_fault
+from sim_bridge.plant.faults.table import TABLE, Row
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from flightstack.core.contract import LoopFlags
-from flightstack.firmware.free_running import DRIVE_TIMEOUT_S, MAX_DELAY_S, REST, Delays, FreeRunning
-from flightstack.firmware.pil_steps import BAD_INPUT
+from flightstack.firmware.pil.free_running import DRIVE_TIMEOUT_S, MAX_DELAY_S, REST, Delays, FreeRunning
+from flightstack.firmware.pil.steps import BAD_INPUT
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.frames import FrameReader
 from gcs_cli.pil.free_run import timing_lines

@@ -12,7 +12,7 @@ from flightstack.core.contract import Vector3
 from flightstack.mavlink.link import Link
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.plant.disturbance import Disturbance
-from sim_bridge.plant.fault_schedule import Kind, parse_fault
+from sim_bridge.plant.faults.schedule import Kind, parse_fault
 from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.simulator import Simulator
 from tests.support.faulty_simulator import LAG_SPEED, PAPER, command, flown, fly, speeds

@@ -1,7 +1,7 @@
 """The table of faults and disturbances: for each one its two notations, its values and its effect.
 
 Parser, error sentences, command help and docs/reference/faults.md follow this table. A new fault is a row here and an
-effect: of the plant in ``fault_effects.py``, of the state that is sent in ``sent_state.py``.
+effect: of the plant in ``effects.py``, of the state that is sent in ``sent_state.py``.
 """
 
 from __future__ import annotations

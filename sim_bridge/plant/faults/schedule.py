@@ -4,7 +4,7 @@
     rotor 2 dead @12.5        the same table in words, as in scenario files
 
 Without ``@`` a fault begins at once. A fault begins and ends at the first exchange at or after its time.
-``fault_table.py`` has all forms.
+``table.py`` has all forms.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from flightstack.core.contract import Vector3
 from sim_bridge.errors import UsageProblemError
-from sim_bridge.plant.fault_table import (
+from sim_bridge.plant.faults.table import (
     NO_END,
     ROTOR_NUMBER,
     ROWS,

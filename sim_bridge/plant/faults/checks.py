@@ -9,7 +9,7 @@ from typing import NamedTuple
 from flightstack.core.contract import Vector3
 from flightstack.params.vehicle import NO_DRAG_PLANT, Vehicle
 from sim_bridge.errors import UsageProblemError
-from sim_bridge.plant.fault_table import NO_END, ROWS, Fault, Kind, Need
+from sim_bridge.plant.faults.table import NO_END, ROWS, Fault, Kind, Need
 from sim_bridge.plant.plant import PlantOptions
 
 _STILL = Vector3(0.0, 0.0, 0.0)
@@ -17,7 +17,7 @@ _OTHER_PLANTS = "use --plant rigid or multibody"
 
 
 class Flight(NamedTuple):
-    """What faults act on."""
+    """Parts of the simulator that faults act on."""
 
     vehicle: Vehicle
     plant: str

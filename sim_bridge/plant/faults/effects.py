@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from flightstack.core.contract import MAX_ROTORS, Vector3
-from sim_bridge.plant.fault_table import Fault, Kind
+from sim_bridge.plant.faults.table import Fault, Kind
 from sim_bridge.plant.loading import AS_BUILT, Loading
 
 _STILL = Vector3(0.0, 0.0, 0.0)

@@ -1,0 +1,1 @@
+"""Faults and disturbances of the simulator: their table, schedule, conditions and effects."""
