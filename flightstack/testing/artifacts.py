@@ -138,6 +138,7 @@ def run_info(flight: Flight, name: str, reason: str, log: Path) -> RunInfo:
         gains=setup.gains,
         plant=setup.plant,
         loops=setup.loops,
+        state=setup.state,
         seed=setup.seed,
         wind=numbers(setup.wind),
         gust=setup.gust or None,

@@ -11,10 +11,12 @@ from flightstack.flight_log.flight_log import FlightLog
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 from flightstack.process import compile_helper
-from flightstack.process.assembly import Stack, build, reboot_config, transfer_state, vehicle_of
+from flightstack.process.assembly import Stack, build, reboot_config, transfer_state
+from flightstack.process.config_check import vehicle_of
 from flightstack.services.logs.log_store import NO_LOGS, LogStore
 from flightstack.simulator_link.endpoint import SimulatorEndpoint
-from flightstack.simulator_link.hot_frames import ActuatorsFrame
+from flightstack.simulator_link.hot_frames import VALID_FLAG, ActuatorsFrame
+from flightstack.testing.quiet_ticks import QuietTicks
 from flightstack.testing.setup import Setup
 from flightstack.vehicle.lockstep import Lockstep
 from sim_bridge.server.failure_command import inject_failure
@@ -23,6 +25,10 @@ from sim_bridge.simulator import SIMULATOR_COMPONENT, Simulator
 _PLANT = "flightstack.testing.setup:compile_plant"
 _TIMING_US = 1_000_000
 """Interval of ``loop_timing`` in the log."""
+
+
+_BYTES = ("tick", "advance", "states", "take_answer")
+"""Methods of ``Engine`` with which another one changes what the parts exchange."""
 
 
 class LogBuffer(io.BytesIO):
@@ -66,8 +72,11 @@ class Engine:
         self.actuators = ActuatorsFrame()
         self.machine_ns = 0
         """Machine time of the exchanges: what passes while the simulator's clock stands still."""
+        self.was_ready = False
+        """True once the vehicle was ready to fly on its state since its boot."""
         self.loses_states = False
         """If True, ticks go on without states, as in real time when a simulator hangs."""
+        self._changes_bytes = any(getattr(type(self), name) is not getattr(Engine, name) for name in _BYTES)
         self._begin()
 
     def _build(self) -> Stack:
@@ -82,12 +91,14 @@ class Engine:
         """Connect the stack to the simulator: it has its first state."""
         self._endpoint, self._now = self.stack.simulator, self.stack.now
         self._interval_us, self._divisor = self.stack.rates.interval_us, self.stack.rates.divisor
-        self._lockstep = Lockstep(self._endpoint, self.stack.autopilot, self._interval_us)
+        self.lockstep = Lockstep(self._endpoint, self.stack.autopilot, self._interval_us)
+        """Ticks of the vehicle on the simulator's clock."""
+        self._quiet = QuietTicks(self.stack, self.lockstep)
         self._missed_us = self._next_timing_us = self._ticks = 0
         if self.stack.estimation is not None:
             self.simulator.start_sensors(self.config.home)
         self._endpoint.receive(memoryview(self.states()))
-        self._now.has_state = self.stack.estimation is None
+        self._now.has_state = self.was_ready = self.stack.estimation is None
 
     def _open_log(self) -> FlightLog:
         self.logs.append(LogBuffer(self._boot_us * 1e-6))
@@ -104,6 +115,10 @@ class Engine:
         """Simulated time from which the times of the newest log count [s]."""
         return self.logs[-1].boot_s if self.logs else 0.0
 
+    def note_readiness(self) -> None:
+        """Look whether the vehicle is ready; once in each outer tick."""
+        self.was_ready = self.was_ready or self.stack.is_ready
+
     def newest_log(self) -> bytes:
         """Return the log of the newest flight, up to now if it is not over; b"" before the first."""
         if not self.logs:
@@ -115,21 +130,46 @@ class Engine:
         return self.logs[-1].getvalue()
 
     def tick(self) -> bool:
-        """Run one exchange: state to the stack, actuators back, all as bytes. Return True after an outer tick."""
+        """Run one exchange: state to the stack, actuators back. Return True after an outer tick."""
         link = self._endpoint
         if self._missed_us:
             commands = self.stack.autopilot.tick(link.time_us + self._missed_us)
         else:
-            commands = self._lockstep.tick(self.machine_ns)
+            commands = self.lockstep.tick(self.machine_ns)
         for severity, text in link.steps.take_notices():
             self.stack.journal.say(severity, text)
-        self.take_answer(link.answer(commands, self._now.status.armed))
+        if self._changes_bytes or not link.answers_exactly:
+            self.take_answer(link.answer(commands, self._now.status.armed))
+        else:
+            self.actuators.rotor_speed_rad_s[:] = commands
+            self.actuators.flags = link.flags(self._now.status.armed) | VALID_FLAG
         self._ticks += 1
+        return self._ends_period()
+
+    def _ends_period(self) -> bool:
+        """Return True after an outer tick; record the timing of the loops when it is due."""
         if self._ticks % self._divisor:
             return False
         if self._now.time_us >= self._next_timing_us:
             self._record_timing()
         return True
+
+    def run(self, most: int) -> tuple[int, bool]:
+        """Run a tick and the quiet ones that follow it, ``most`` at most, up to the end of the outer period.
+
+        Return their number, and True after an outer tick. As after ``tick``, the newest answer is not applied yet.
+        """
+        if self.tick():
+            return 1, True
+        if self._changes_bytes or self.loses_states or self._missed_us:
+            return 1, False
+        count = min(most - 1, -self._ticks % self._divisor, self._quiet.count(self.simulator))
+        if count <= 0:
+            return 1, False
+        self._quiet.run(self.simulator, self.actuators, count)
+        self._ticks += count
+        self.machine_ns += count * self._interval_us * 1000
+        return 1 + count, self._ends_period()
 
     def _record_timing(self) -> None:
         time_us = self._now.time_us
@@ -143,8 +183,19 @@ class Engine:
         self.machine_ns += self._interval_us * 1000
         if self.loses_states:
             self._missed_us += self._interval_us
-        else:
+        elif self._changes_bytes or not self._send_directly():
             self._send_states(self._endpoint)
+
+    def _send_directly(self) -> bool:
+        """Pass state and sensors to the stack without bytes; return False if there are further messages."""
+        simulator, link = self.simulator, self._endpoint
+        if not simulator.sends_state_alone or (simulator.sensors is None) is not (link.sensors is None):
+            return False
+        measurements = () if simulator.sensors is None else simulator.sensors.measurements
+        if not measurements and simulator.sensors is not None:
+            return False
+        link.take(simulator.time_us, simulator.frame, measurements)
+        return True
 
     def _send_states(self, endpoint: SimulatorEndpoint) -> None:
         if not endpoint.receive(memoryview(self.states())):

@@ -15,7 +15,7 @@ from flightstack.core.errors import ConfigError
 from flightstack.plan import NAV_COMMANDS
 from flightstack.testing import properties
 from flightstack.testing.expression import Expression
-from flightstack.testing.flight import Event, Flight
+from flightstack.testing.flight import Event, Flight, start_ned_m
 from flightstack.testing.properties import Margin, parse_window, values_around
 from flightstack.testing.scenario import SEVERITIES, Expect
 from flightstack.testing.state import State
@@ -155,7 +155,7 @@ def _texts(expect: Expect, flight: Flight) -> Iterator[Check]:
 
 
 def corridor_m(flight: Flight) -> float:
-    """Return the largest distance of the flight from the path of its plan: from home over its items; NaN of none."""
+    """Return the largest distance of the flight from the path of its plan, from its start; NaN without a path."""
     _, distance_m = _off_path(flight)
     return float(distance_m.max()) if len(distance_m) else math.nan
 
@@ -163,9 +163,9 @@ def corridor_m(flight: Flight) -> float:
 def _off_path(flight: Flight) -> tuple[FloatArray, FloatArray]:
     """Return times and distances from the path of the plan in flight."""
     data = flight.data
-    time_s, position = data.position
+    time_s, position = data.actual_position
     flying = data.flying(time_s)
-    places = [np.zeros(3)]
+    places = [start_ned_m(flight)]
     for item in flight.plan.items:
         place = item_ned_m(item, data) if item.command in NAV_COMMANDS else None
         if place is not None:
@@ -177,7 +177,7 @@ def _off_path(flight: Flight) -> tuple[FloatArray, FloatArray]:
 
 def _off_setpoint(flight: Flight) -> tuple[FloatArray, FloatArray]:
     """Return times and distances from the position setpoint in flight."""
-    error = flight.data.tracking_error()
+    error = flight.data.actual_error()
     return error.time_s, error.values[:, 0]
 
 

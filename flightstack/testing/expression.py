@@ -14,6 +14,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import reduce
 from itertools import pairwise
+from operator import attrgetter
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -38,7 +39,7 @@ SIGNALS: dict[str, str] = {
     "pitch_deg": "pitch angle",
     "yaw_deg": "yaw angle, −180 to 180",
     "distance_to_home_m": "horizontal distance to home",
-    "error_m": "distance between position and position setpoint in flight; 0 on the ground",
+    "error_m": "distance between true position and position setpoint in flight; 0 on the ground",
     "battery_percent": "charge of the battery",
 }
 """Names in expressions; each is an attribute of ``State`` too."""
@@ -96,9 +97,17 @@ class Expression:
         self.names = tuple(
             sorted({node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name)} & SIGNALS.keys())
         )
+        self._truth = _truth(self._tree)
+
+    @property
+    def has_no_numbers(self) -> bool:
+        """True if the expression is of modes and flags alone."""
+        return self._truth is not None
 
     def of_state(self, state: object) -> bool:
-        """Return True if the expression holds for one ``State``."""
+        """Return True if the expression holds for one ``State``; without numbers, for what the vehicle reports."""
+        if self._truth is not None:
+            return bool(self._truth(state))
         return bool(self.margin({name: getattr(state, name) for name in self.names}) > 0.0)
 
     def margin(self, signals: Values) -> FloatArray:
@@ -127,6 +136,33 @@ class Expression:
                         limits.setdefault(abs(found - abs(margin)), _number(pair))
         nearest = min(limits, default=math.inf)
         return limits[nearest] if nearest <= _ROUNDING * (1.0 + abs(margin)) else None
+
+
+def _truth(node: ast.expr) -> Callable[[object], Any] | None:
+    """Return the function from a state to the value of an expression of modes and flags; None for any other one."""
+    if isinstance(node, ast.Name):
+        return attrgetter(node.id) if node.id in _KINDS else None
+    if isinstance(node, ast.Constant):
+        value = node.value
+        return (lambda _: value) if isinstance(value, (str, bool)) else None
+    operands: Sequence[ast.expr] = ()
+    if isinstance(node, ast.Compare) and len(node.ops) == 1 and isinstance(node.ops[0], _EQUALITY):
+        operands = (node.left, *node.comparators)
+    elif isinstance(node, (ast.BoolOp, ast.UnaryOp)):
+        operands = _operands(node)[0]
+    parts = [part for operand in operands if (part := _truth(operand)) is not None]
+    return _joined(node, parts) if operands and len(parts) == len(operands) else None
+
+
+def _joined(node: ast.expr, parts: Sequence[Callable[[object], Any]]) -> Callable[[object], Any]:
+    """Return the value of an operator of ``_truth`` from those of its operands."""
+    if isinstance(node, ast.Compare):
+        is_equal = isinstance(node.ops[0], ast.Eq)
+        return lambda state: (parts[0](state) == parts[1](state)) is is_equal
+    if isinstance(node, ast.BoolOp):
+        every = all if isinstance(node.op, ast.And) else any
+        return lambda state: every(part(state) for part in parts)
+    return lambda state: not parts[0](state)
 
 
 def _number(sides: Iterable[ast.expr]) -> float | None:

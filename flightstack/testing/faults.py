@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from flightstack.core.errors import ConfigError
 from flightstack.testing.link import Channel
 from sim_bridge.errors import UsageProblemError
-from sim_bridge.plant.fault_schedule import parse_fault
-from sim_bridge.plant.fault_table import STATE_KINDS, Fault, Kind
+from sim_bridge.plant.faults.schedule import parse_fault
+from sim_bridge.plant.faults.table import STATE_KINDS, Fault, Kind
 
 if TYPE_CHECKING:
     from flightstack.testing.world import World

@@ -45,6 +45,13 @@ def await_state(world: World, step: Callable[[], bool | None]) -> None:
         pass
 
 
+def await_first_state(world: World) -> None:
+    """Run until the vehicle is ready for the first time since its boot, at the longest until ``READY_S`` after that."""
+    engine = world.engine
+    while not engine.was_ready and engine.stack.now.time_us < READY_S * 1e6:
+        world.step()
+
+
 def _flown(world: World, limit_s: float, step: Callable[[], bool | None]) -> Outcome:
     """Fly to the end, and return to launch after a mission that ends in the air."""
     end_s = world.time_s + limit_s

@@ -11,6 +11,7 @@ from flightstack.core.enums import Mode
 from flightstack.core.errors import ConfigError
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
+from flightstack.testing.mission_flight import await_first_state
 from gcs_cli.link import calls
 
 if TYPE_CHECKING:
@@ -41,6 +42,8 @@ ORDERS: dict[str, Order] = {
     "mav_cmd": Order(1, 8, lambda _w, v: (int(v[0]), v[1:]), "mav_cmd NUMBER [PARAM1 … PARAM7]"),
 }
 """Requests that an event may make, besides ``mode NAME``."""
+_NEED_STATE = ("arm", "takeoff")
+"""Requests that give a vehicle on its sensors the time until it is ready after its boot."""
 
 
 _POSITION, _VELOCITY = 0b1101_1111_1000, 0b1101_1100_0111
@@ -87,6 +90,8 @@ def order(world: World, text: str, client: Client) -> None:
     elif word in STREAMS:
         client.streams = {word: partial(STREAMS[word].message, values)}
     else:
+        if word in _NEED_STATE:
+            await_first_state(world)
         world.request(word, ORDERS[word].make(world, values), client)
 
 

@@ -1,4 +1,4 @@
-"""The fixture or test that a world belongs to, which ends with it. Imports nothing heavy."""
+"""The fixture or test that a world belongs to, which ends with it. A module of its own: imports nothing heavy."""
 
 from __future__ import annotations
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import shlex
 import sys
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from importlib import invalidate_caches
 from pathlib import Path
+from typing import Any
 
 from flightstack.commander.failsafe import Failsafe
 from flightstack.control.controller_loading import entry_points_of_controllers, load_controller
@@ -24,7 +25,7 @@ from flightstack.testing.expression import Expression
 from flightstack.testing.faults import DIRECTIONS, LINK_FAULTS, check_fault, check_link
 from flightstack.testing.orders import check_command
 from flightstack.testing.properties import parse_window
-from flightstack.testing.setup import Setup
+from flightstack.testing.setup import OPTION_KEYS, Setup
 from flightstack.testing.toml_record import key, read_record
 from gcs_cli.report.flight_outcome import Code
 
@@ -81,8 +82,8 @@ class Expect:
                            "`any` for none", choices=OUTCOMES)  # fmt: skip
     refusal: str | None = key(None, "text of the reason with which the vehicle refuses to start")
     reached: tuple[int, ...] | None = key(None, "mission items in the order in which they are reached", low=0)
-    corridor_m: float | None = key(None, "largest distance from the path of the plan", low=0.0)
-    max_error_m: float | None = key(None, "largest distance between position and setpoint", low=0.0)
+    corridor_m: float | None = key(None, "largest distance of the true path from that of the plan", low=0.0)
+    max_error_m: float | None = key(None, "largest distance between true position and setpoint", low=0.0)
     rms_error_m: float | None = key(None, "root mean square of that distance", low=0.0)
     landing_error_m: float | None = key(None, "largest distance of the touchdown from its place", low=0.0)
     duration_s: tuple[float, ...] | None = key(None, "least and largest duration", low=0.0, lengths=(2,))
@@ -119,6 +120,9 @@ class Scenario:
     )
     duration_s: float | None = key(None, "end the flight after this time", low=0.1)
     params: dict[str, float] | None = key(None, "parameters of the vehicle")  # noqa: RUF009
+    simulated: dict[str, float] | None = key(  # noqa: RUF009
+        None, 'numbers of the simulated vehicle that differ from its file, by path such as `"body.mass_kg"`'
+    )
     wind: Wind = key(Wind(), "wind")  # noqa: RUF009
     force_n: tuple[float, ...] = key((0.0, 0.0, 0.0), "constant force NED", lengths=(3,))
     torque_n_m: tuple[float, ...] = key((0.0, 0.0, 0.0), "constant torque FRD", lengths=(3,))
@@ -165,6 +169,7 @@ class Scenario:
         made = Setup(
             **{name: getattr(self, name) for name in same},
             params=self.params or {},
+            simulated=self.simulated or {},
             wind=self.wind.mean_m_s,
             gust=self.wind.gust_m_s,
             force=self.force_n,
@@ -199,7 +204,10 @@ def forget_controllers() -> None:
 
 
 def is_scenario(path: Path) -> bool:
-    """Return True for a TOML file with a table ``[expect]``, also for one that has errors in its syntax."""
+    """Return True for a TOML file with a table ``[expect]``, also for one that has errors in its syntax.
+
+    A campaign, which has a table ``[campaign]`` too, is none.
+    """
     if path.suffix != ".toml":
         return False
     try:
@@ -207,14 +215,28 @@ def is_scenario(path: Path) -> bool:
     except (OSError, ValueError):
         return False
     try:
-        return "expect" in tomllib.loads(text)
+        document = tomllib.loads(text)
+        return "expect" in document and "campaign" not in document
     except (ValueError, RecursionError):
         return any(line.strip() == "[expect]" for line in text.splitlines())
 
 
 def load_scenario(path: Path) -> Scenario:
     """Read a scenario file; raise ConfigError, which names the key and what is allowed."""
-    scenario = replace(read_record(Scenario, path, read_toml(path).values()), path=path)
+    return check_scenario(read_scenario(path, read_toml(path).values()))
+
+
+def read_scenario(path: Path, values: Mapping[str, Any]) -> Scenario:
+    """Return the scenario that has the content ``values`` in place of its file at ``path``; raise ConfigError.
+
+    Types and ranges are checked here, all else by ``check_scenario``.
+    """
+    return replace(read_record(Scenario, path, values), path=path)
+
+
+def check_scenario(scenario: Scenario) -> Scenario:
+    """Return a scenario that can be flown; raise ConfigError otherwise."""
+    path = scenario.path
     names = [client.name for client in scenario.client]
     for index, name in enumerate(names):
         if not name.isidentifier() or name in ("gcs", *DIRECTIONS, *LINK_FAULTS) or name in names[:index]:
@@ -253,7 +275,7 @@ def _check_texts(scenario: Scenario) -> None:
         setup = scenario.setup(scenario.seed)
         vehicle = setup.check()
     except ConfigError as error:
-        raise error.within(scenario.path, {"--param": "params"}) from None
+        raise error.within(scenario.path, OPTION_KEYS) from None
     expect = scenario.expect
     checks: list[tuple[str, str, Callable[[str], object]]] = [
         (f"expect.{name}[{index}]", text, check)

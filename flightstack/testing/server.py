@@ -213,6 +213,7 @@ def fly_options(setup: Setup, instance: int, speed: float) -> FlyOptions:
         gains=setup.gains,
         plant=setup.plant,
         loops=setup.loops,
+        state=setup.state,
         speed="max" if math.isinf(speed) else repr(float(speed)),
         instance=instance,
         seed=setup.seed,

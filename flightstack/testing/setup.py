@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import difflib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from flightstack.control.controller_loading import load_controller
 from flightstack.control.loop_parameters import loop_numbers
@@ -24,10 +25,10 @@ from flightstack.params.config import (
     StackConfig,
 )
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
-from flightstack.params.vehicle import DEFAULT_VEHICLE, Vehicle, load_vehicle
+from flightstack.params.vehicle import DEFAULT_VEHICLE, Vehicle, load_vehicle, load_vehicle_with
 from flightstack.plan import Plan, load_plan
-from flightstack.process.assembly import vehicle_of
 from flightstack.process.clock import nearest_outer_hz, rates
+from flightstack.process.config_check import vehicle_of
 from flightstack.vehicle.parameters import load_parameters, read_parameters
 from gcs_cli.transfers.plan_files import example_plans
 from sim_bridge.arguments import check_battery, check_boat, check_plant, check_range, check_slope
@@ -36,6 +37,10 @@ from sim_bridge.plant.disturbance import Disturbance, check_wind
 from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.simulator import Simulator
 
+Built = TypeVar("Built")
+
+OPTION_KEYS = {"--param": "params"}
+"""Conditions by the option of ``flightstack`` that sets them, where the names differ."""
 _MOST_WIND_M_S, _MOST_GUST_M_S, _MOST_TORQUE_GUST_N_M = 200.0, 50.0, 100.0
 
 
@@ -87,6 +92,9 @@ class Setup:
     home: GeoPoint = DEFAULT_HOME
     params: Mapping[str, float] = field(default_factory=dict)
     """Parameters of the vehicle that differ from their defaults."""
+    simulated: Mapping[str, float] = field(default_factory=dict)
+    """Numbers of the simulated vehicle that differ from those of its file, on which the flight stack relies, by path:
+    ``{"body.mass_kg": 0.6}``."""
     seed: int = 1
     """Seed of gusts and of the faults of links."""
     folder: Path | Sequence[Path] = Path()
@@ -101,6 +109,17 @@ class Setup:
             if (value := getattr(self, item.name)) != getattr(default, item.name)
         }
 
+    @classmethod
+    def of(cls, conditions: Mapping[str, Any]) -> Setup:
+        """Return the setup with ``conditions`` by name; raise TypeError for a name that is none."""
+        names = [item.name for item in fields(cls)]
+        for name in conditions:
+            if name not in names:
+                near = difflib.get_close_matches(name, names, n=1)
+                hint = f"did you mean {near[0]}?" if near else f"the conditions are {', '.join(names)}"
+                raise TypeError(f"{name} is no condition of a flight: {hint}")
+        return cls(**conditions)
+
     def plan_path(self, plan: str | Path) -> Path:
         """Return the file of a plan: in ``folder``, else an example of the installation."""
         folders = (self.folder,) if isinstance(self.folder, Path) else self.folder
@@ -111,7 +130,13 @@ class Setup:
 
     def load_plan(self, plan: str | Path) -> Plan:
         """Read a plan file, as ``plan_path`` finds it; raise ConfigError."""
-        return load_plan(self.plan_path(plan))
+        path = self.plan_path(plan)
+        if not path.exists():
+            examples = ", ".join(example_plans())
+            raise ConfigError(
+                path, "", f"cannot be read: No such file or directory; the example plans are {examples}"
+            )
+        return load_plan(path)
 
     def stack_config(self) -> StackConfig:
         """Return the configuration of the flight stack."""
@@ -151,6 +176,12 @@ class Setup:
 
     def plant_options(self, vehicle: Vehicle) -> tuple[Vehicle, PlantOptions]:
         """Return the vehicle that is simulated and its conditions; raise ConfigError for those without effect."""
+        if self.simulated:
+            try:
+                vehicle = load_vehicle_with(self.vehicle, self.simulated)
+            except ConfigError as error:
+                raise error.within("simulated", {}) from None
+            vehicle = vehicle.with_ideal_rotors() if self.ideal_rotors else vehicle
         try:
             if self.drag:
                 vehicle = vehicle.with_drag(self.plant)
@@ -197,3 +228,11 @@ def _vector(name: str, values: Sequence[float]) -> Vector3:
 def compile_plant() -> None:
     """Compile the kernels of the default plant, or load them from the cache."""
     Setup().simulator(load_vehicle(DEFAULT_VEHICLE))
+
+
+def built(setup: Setup, make: Callable[[Setup], Built]) -> Built:
+    """Return ``make(setup)``; its ConfigErrors name the conditions, not options of the command line."""
+    try:
+        return make(setup)
+    except ConfigError as error:
+        raise error.as_keyword(OPTION_KEYS) from None

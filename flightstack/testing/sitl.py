@@ -60,7 +60,7 @@ class Sitl:
         options = {name: conditions.pop(name) for name in _WORLD_OPTIONS if name in conditions}
         if setup is None:
             conditions.setdefault("folder", (self._owners.folder, self._rootpath))
-            setup = Setup(**conditions)
+            setup = Setup.of(conditions)
         elif conditions:
             raise TypeError(f"give a Setup or {', '.join(conditions)}, not both")
         flown = Flown(World(setup, **options))
@@ -117,7 +117,7 @@ class SitlServer:
         ``faults`` are those of ``sim-bridge --fault``, with times since the start of the simulator.
         """
         folder = self._make_folder()
-        server = Server(Setup(**conditions), folder, speed=speed, timeout_s=timeout_s, faults=faults)
+        server = Server(Setup.of(conditions), folder, speed=speed, timeout_s=timeout_s, faults=faults)
         self.running.append(server)
         self._owners.add_finalizer(lambda: self._stop(server))
         return server

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from flightstack.core.geodesy import GeoPoint
 from flightstack.core.geometry import euler_from_quaternion
 from flightstack.core.portable_math import distance
 from flightstack.process.assembly import Stack
+from flightstack.testing.expression import Expression
 from sim_bridge.simulator import Simulator
 
 _TOUCH_M = 0.05
@@ -45,7 +47,7 @@ class State(NamedTuple):
     item: int
     """The current mission item, from 0; −1 without a mission."""
     error_m: float
-    """Distance between position and position setpoint in flight; NaN if the setpoint leaves an axis free.
+    """Distance between true position and position setpoint in flight; NaN if the setpoint leaves an axis free.
 
     0 on the ground, into which the setpoint of a landing sinks.
     """
@@ -84,6 +86,33 @@ class State(NamedTuple):
         return "; ".join(parts)
 
 
+class Reported(NamedTuple):
+    """The signals of a state that are modes and flags, in a tenth of the time of a ``State``."""
+
+    mode: str
+    armed: bool
+    landed: bool
+    failsafe: bool
+
+
+def reported_by(stack: Stack) -> Reported:
+    """Return the modes and flags of the present state."""
+    now = stack.now
+    armed, mode = now.status
+    return Reported(mode.name, armed, now.landed, stack.journal.failsafe_acts)
+
+
+def condition_of(
+    condition: Callable[[State], object] | str, state: Callable[[], State], reported: Callable[[], Reported]
+) -> Callable[[], object]:
+    """Return the function that tells whether a condition, a function or an expression, is true now."""
+    if not isinstance(condition, str):
+        return lambda: condition(state())
+    expression = Expression(condition)
+    source = reported if expression.has_no_numbers else state
+    return lambda: expression.of_state(source())
+
+
 def state_of(stack: Stack, simulator: Simulator, start: GeoPoint, time_s: float) -> State:
     """Return the present state; ``start`` is the origin of the simulator, ``time_s`` the time of the world."""
     now, truth = stack.now, simulator.frame.state
@@ -91,7 +120,8 @@ def state_of(stack: Stack, simulator: Simulator, start: GeoPoint, time_s: float)
     euler = euler_from_quaternion(Quaternion(*truth[6:10].tolist()))
     roll, pitch, yaw = (math.degrees(angle) for angle in euler)
     flies = now.status.armed and not now.landed and -position.z > _TOUCH_M
-    offset = stack.places.frame.to_ned(start)  # 0 unless the vehicle had to find out where it is
+    # of the start in the local frame, 0 unless the vehicle had to find out where it is; heights count from there
+    offset = stack.places.frame.to_ned(start)._replace(z=0.0)
     home = stack.places.frame.to_ned(stack.area.home)
     in_frame = position + np.array(offset)
     return State(

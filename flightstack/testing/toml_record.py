@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from functools import cache
 from types import UnionType
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
@@ -35,7 +36,7 @@ def key(default: Any, help: str, **limits: Any) -> Any:  # as in Typer and argpa
 
 def read_record(kind: type[T], file: object, values: Mapping[str, Any], path: str = "") -> T:
     """Return a record of ``kind``; raise ConfigError, which names the key and what is allowed."""
-    types = get_type_hints(kind)
+    types = _types(kind)  # type: ignore[arg-type]  # a class is hashable
     fields = {field.name: field for field in dataclasses.fields(kind) if "key" in field.metadata}  # type: ignore[arg-type]
     for name in values:
         if name not in fields:
@@ -47,6 +48,12 @@ def read_record(kind: type[T], file: object, values: Mapping[str, Any], path: st
         elif field.default is dataclasses.MISSING:
             raise ConfigError(file, _join(path, name), "is missing")
     return kind(**found)
+
+
+@cache
+def _types(kind: Any) -> dict[str, Any]:
+    """Return the types of the fields of a record: a campaign reads a scenario for each of its flights."""
+    return get_type_hints(kind)
 
 
 def _join(path: str, name: str) -> str:

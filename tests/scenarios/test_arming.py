@@ -7,9 +7,9 @@ import pytest
 from flightstack.core.enums import Mode
 from flightstack.mavlink.dialect import mavlink
 from flightstack.process.assembly import transfer_state
-from flightstack.testing import World
 from tests.support.failsafe_faults import cut_ground_station
 from tests.support.refusals import refused
+from tests.support.truth import World
 
 DENIED = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 CENTRE = 500

@@ -11,9 +11,10 @@ from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import LocalFrame
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.config import DEFAULT_HOME
-from flightstack.testing import RefusedError, World
+from flightstack.testing import RefusedError
 from tests.support.plan_items import item, rally_point
 from tests.support.refusals import refused
+from tests.support.truth import World
 
 REJECTED, DENIED = 1, 2
 GLOBAL, RELATIVE = mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT

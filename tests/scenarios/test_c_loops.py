@@ -9,18 +9,18 @@ import pytest
 
 from flightstack.core.contract import LoopFlags, LoopRow, LoopStatus
 from flightstack.core.errors import ConfigError, TargetError
-from flightstack.firmware.build import host_library
 from flightstack.firmware.c_loops import CLoops, HostLoops
+from flightstack.firmware.toolchain.build import host_library
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.config import StackConfig
 from flightstack.process.assembly import build
-from flightstack.testing import World
 from gcs_cli.report.analysis import read_flight
 from tests.firmware.app_support import Target
 from tests.parity.recorded_loops import record
 from tests.support.lossy_line import LineFaults, LossyLine
 from tests.support.plan_items import item
 from tests.support.plugin_site import example_module
+from tests.support.truth import World
 
 SPEEDS = np.zeros(8, np.float32)
 
@@ -163,7 +163,7 @@ def test_other_loops_are_refused_in_one_sentence(word: str, sentence: str) -> No
 
 def test_user_controller_flies_in_generated_c(monkeypatch) -> None:
     controller = example_module().CONTROLLER
-    monkeypatch.setattr("flightstack.process.assembly.load_controller", lambda _: controller)
+    monkeypatch.setattr("flightstack.process.config_check.load_controller", lambda _: controller)
     in_c, in_python = (flown(loops=loops, controller="lqr") for loops in ("c", "python"))
     assert in_c.reached == in_python.reached == [0, 1, 2, 3, 4, 5]
     assert in_c.state.position_ned_m == pytest.approx(in_python.state.position_ned_m, abs=1e-4)  # 1e-6 seen
@@ -174,7 +174,7 @@ def test_user_controller_flies_in_generated_c(monkeypatch) -> None:
 
 
 def test_without_a_compiler_one_sentence_says_what_to_do(monkeypatch) -> None:
-    from flightstack.firmware import build as building  # noqa: PLC0415
+    from flightstack.firmware.toolchain import build as building  # noqa: PLC0415
 
     building.host_compiler.cache_clear()
     monkeypatch.delenv("CC", raising=False)
@@ -213,7 +213,7 @@ def on_a_bad_line(monkeypatch) -> Iterator[list[LossyLine]]:
         return lines[-1]
 
     monkeypatch.setattr("flightstack.firmware.targets.open_link", open_bad_line)
-    monkeypatch.setattr("flightstack.firmware.target_loops.source_hash", lambda: bytes(range(1, 9)))
+    monkeypatch.setattr("flightstack.firmware.pil.target_loops.source_hash", lambda: bytes(range(1, 9)))
     yield lines
     device.close()
 

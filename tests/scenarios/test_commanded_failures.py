@@ -7,9 +7,9 @@ import math
 import pytest
 
 from flightstack.mavlink.dialect import mavlink
-from flightstack.services.commands.failure_commands import LONGEST_WAIT_S
-from flightstack.testing import World
+from flightstack.services.commands.system import LONGEST_WAIT_S
 from tests.support.refusals import refused
+from tests.support.truth import World
 
 REJECTED, DENIED, UNSUPPORTED, FAILED = range(1, 5)
 MOTOR, BATTERY, GPS = 101, 100, 4

@@ -8,11 +8,12 @@ from dataclasses import replace
 import pytest
 
 from flightstack.mavlink.dialect import mavlink
-from flightstack.testing import RefusedError, State, World
+from flightstack.testing import RefusedError, State
 from sim_bridge.plant.disturbance import Disturbance
 from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.simulator import Simulator
 from tests.support.plan_items import item
+from tests.support.truth import World
 
 OFF_GROUND_M = 0.15
 """Height at which the land detector says that the vehicle is in the air."""
@@ -164,7 +165,7 @@ def test_a_mission_that_waits_for_ever_does_not_start() -> None:
     loop = replace(item(177, p1=0.0), param2=-1.0)
     world.upload([item(93, p1=5.0), loop, item(22, z=3.0)])
     world.arm()
-    with pytest.raises(RefusedError, match="begins with a landing or a return"):
+    with pytest.raises(RefusedError, match="continues with a landing or a return"):
         world.start_mission()
     world.run_until("not armed", 31.0)
 

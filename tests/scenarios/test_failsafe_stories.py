@@ -13,12 +13,12 @@ from pyulog import ULog
 from flightstack.commander.failsafe import Action, Failsafe
 from flightstack.core.enums import Mode
 from flightstack.mavlink.dialect import mavlink
-from flightstack.testing import World
 from tests.support.failsafe_faults import blow_away, breach_fence, cut_ground_station
 from tests.support.failsafe_phases import QUICK, hold, landing, mission
 from tests.support.plan_items import item
 from tests.support.refusals import refused
 from tests.support.streams import sticks
+from tests.support.truth import World
 
 REJECTED = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 

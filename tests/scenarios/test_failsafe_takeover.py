@@ -8,7 +8,7 @@ import pytest
 from flightstack.commander.failsafe import Action, Failsafe
 from flightstack.core.enums import Mode
 from flightstack.plan import MissionType
-from flightstack.testing import RefusedError, World
+from flightstack.testing import RefusedError
 from tests.support.failsafe_faults import blow_away, cut_ground_station, inject, tip_over
 from tests.support.fence_breaches import (
     BRAKING,
@@ -24,6 +24,7 @@ from tests.support.fence_breaches import (
 from tests.support.plan_items import circle, item
 from tests.support.refusals import refused
 from tests.support.streams import go_to
+from tests.support.truth import World
 
 REJECTED = 1
 

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from flightstack.commander.failsafe import Failsafe, Phase
-from flightstack.testing import World
 from tests.support import refusals
 from tests.support.failsafe_faults import (
     begin_setpoints,
@@ -27,6 +26,7 @@ from tests.support.failsafe_faults import (
     tip_over,
 )
 from tests.support.failsafe_phases import ENTER, MODE_IN, QUICK
+from tests.support.truth import World
 
 F, P = Failsafe, Phase
 REJECTED = 1

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flightstack.testing import World
 from sim_bridge.plant.dimensions import propeller_radius_m
+from tests.support.truth import World
 
 BOTH_PLANTS = pytest.mark.parametrize("plant", ["rigid", "multibody"])
 

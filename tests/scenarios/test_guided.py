@@ -11,10 +11,10 @@ from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import LocalFrame
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.config import DEFAULT_HOME
-from flightstack.testing import World
 from tests.support.plan_items import circle
 from tests.support.refusals import refused
 from tests.support.streams import go_to, sticks, stream
+from tests.support.truth import World
 
 REJECTED, DENIED, UNSUPPORTED_FRAME = 1, 2, 9
 NAN = math.nan

@@ -11,7 +11,7 @@ from flightstack.core.geodesy import LocalFrame
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.params.config import DEFAULT_HOME
-from flightstack.testing import World
+from tests.support.truth import World
 
 ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, DENIED = 0, 1, 2, 3, 14
 ABSOLUTE, RELATIVE, RELATIVE_INT, TERRAIN = 0, 3, 6, 10

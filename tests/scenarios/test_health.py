@@ -8,7 +8,7 @@ from flightstack.commander.transitions import Event
 from flightstack.core.contract import Vector3
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
-from flightstack.testing import World
+from tests.support.truth import World
 
 SYS_STATUS, GPS_RAW_INT, ESTIMATOR_STATUS, FENCE_STATUS, BATTERY_STATUS = (
     mavlink.MAVLINK_MSG_ID_SYS_STATUS,

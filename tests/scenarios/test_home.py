@@ -13,10 +13,11 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.params.config import DEFAULT_HOME
 from flightstack.plan import MissionItem
 from flightstack.process.assembly import transfer_state
-from flightstack.testing import RefusedError, World
+from flightstack.testing import RefusedError
 from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.summary import item_ned_m
 from tests.support.plan_items import item, polygon
+from tests.support.truth import World
 
 FRAME = LocalFrame(DEFAULT_HOME)
 

@@ -12,10 +12,10 @@ from flightstack.core.geodesy import LocalFrame
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.config import DEFAULT_HOME
 from flightstack.plan import MissionItem, MissionType
-from flightstack.testing import World
 from tests.support.plan_items import item, polygon, rally_point, square
 from tests.support.refusals import refused
 from tests.support.streams import sticks
+from tests.support.truth import World
 
 DENIED, UNSUPPORTED_FRAME = 2, 9
 FRAME = LocalFrame(DEFAULT_HOME)

@@ -12,10 +12,10 @@ from flightstack.mavlink.files import FileTree
 from flightstack.services.files.ftp_server import FtpServer
 from flightstack.services.logs.log_server import LogServer
 from flightstack.services.logs.log_store import FlatLogs
-from flightstack.testing import World
 from gcs_cli.clients.ftp_client import FtpClient, FtpDone
 from gcs_cli.clients.log_client import LogClient, LogDone
 from tests.protocol.file_harness import GCS, LOSSY, VEHICLE, Ether, MemoryLogs, Station
+from tests.support.truth import World
 
 
 @pytest.fixture(scope="module")

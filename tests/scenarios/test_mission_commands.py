@@ -7,9 +7,9 @@ import math
 import pytest
 
 from flightstack.mavlink.dialect import mavlink
-from flightstack.testing import World
 from tests.support.plan_items import item
 from tests.support.refusals import refused
+from tests.support.truth import World
 
 REJECTED, DENIED = 1, 2
 START, SET_CURRENT = mavlink.MAV_CMD_MISSION_START, mavlink.MAV_CMD_DO_SET_MISSION_CURRENT
@@ -70,11 +70,11 @@ def test_a_start_at_no_item_leaves_mode_and_item() -> None:
 def test_a_start_at_an_item_that_stays_on_the_ground_is_refused() -> None:
     world = World()
     world.upload([item(22, z=3.0), item(16, north=5.0, z=3.0), item(21)])
-    with refused(REJECTED, "the mission begins with a landing or a return"):
+    with refused(REJECTED, "the mission continues with a landing or a return"):
         world.command(START, 2)
     assert (world.state.mode, world.state.armed, current(world)) == ("HOLD", False, 0)
     world.arm()
-    with refused(REJECTED, "the mission begins with a landing or a return"):
+    with refused(REJECTED, "the mission continues with a landing or a return"):
         world.command(START, 2)
     assert (world.state.mode, current(world)) == ("HOLD", 0)
     world.command(START, 1)
@@ -85,7 +85,7 @@ def test_a_current_item_that_stays_on_the_ground_keeps_it_from_arming() -> None:
     world.upload([item(22, z=3.0), item(16, north=5.0, z=3.0), item(21)])
     world.command(SET_CURRENT, 2)
     world.set_mode("MISSION")
-    with refused(REJECTED, "the mission begins with a landing or a return"):
+    with refused(REJECTED, "the mission continues with a landing or a return"):
         world.arm()
     world.command(SET_CURRENT, 0)
     world.arm()

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from flightstack.core.contract import Vector3
-from flightstack.testing import World
 from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.summary import RunInfo, summarise
 from tests.support.plan_items import item
+from tests.support.truth import World
 
 SQUARE = [(10.0, 0.0, -3.0), (10.0, 10.0, -5.0), (0.0, 10.0, -4.0), (0.0, 0.0, -3.0)]
 

@@ -9,9 +9,10 @@ import pytest
 
 from flightstack.commander.transitions import Event
 from flightstack.mavlink.dialect import mavlink
-from flightstack.testing import RefusedError, World
+from flightstack.testing import RefusedError
 from tests.support.plan_items import item
 from tests.support.refusals import refused
+from tests.support.truth import World
 
 REJECTED, DENIED, UNSUPPORTED = 1, 2, 3
 
@@ -143,7 +144,7 @@ def test_a_second_takeoff_in_the_air_is_refused(hovering: World) -> None:
 def test_a_mission_that_begins_with_a_landing_does_not_start_on_the_ground() -> None:
     world = World()
     world.upload([item(21, z=0.0), item(16, north=5.0, z=3.0)])
-    with refused(REJECTED, "begins with a landing"):
+    with refused(REJECTED, "continues with a landing"):
         world.command(mavlink.MAV_CMD_MISSION_START)
 
 

@@ -8,9 +8,9 @@ import pytest
 
 from flightstack.core.enums import CUSTOM_MODE, Mode
 from flightstack.mavlink.dialect import mavlink
-from flightstack.testing import World
 from tests.support.plan_items import item
 from tests.support.refusals import refused
+from tests.support.truth import World
 
 SELECTABLE = [mode for mode in Mode if mode is not Mode.TERMINATION]
 REJECTED = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
@@ -98,7 +98,7 @@ def test_a_mission_that_lands_first_does_not_arm() -> None:
     world = World()
     world.upload([item(21), item(16, north=5.0, z=3.0)])
     world.set_mode("MISSION")
-    with refused(REJECTED, "begins with a landing"):
+    with refused(REJECTED, "continues with a landing"):
         world.arm()
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from flightstack.testing import World
+from tests.support.truth import World
 
 pytestmark = pytest.mark.long
 

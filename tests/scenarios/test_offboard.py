@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from flightstack.mavlink.dialect import mavlink
-from flightstack.testing import World
 from tests.support.refusals import refused
 from tests.support.streams import attitude, body_rates, hover_thrust, level, local_point, stream
+from tests.support.truth import World
 
 REJECTED = 1
 CORNERS = ((6.0, 0.0), (6.0, 6.0), (0.0, 6.0), (0.0, 0.0))

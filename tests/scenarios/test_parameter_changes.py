@@ -12,8 +12,8 @@ from pyulog import ULog
 
 from flightstack.core.contract import LoopRow
 from flightstack.mavlink.dialect import mavlink
-from flightstack.testing import World
 from tests.support.plan_items import item
+from tests.support.truth import World
 
 LONG_WAY = [item(22, z=3.0), item(16, north=200.0, z=3.0), item(16, north=400.0, z=3.0), item(20)]
 

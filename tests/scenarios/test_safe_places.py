@@ -7,9 +7,9 @@ import math
 import pytest
 
 from flightstack.plan import MissionType
-from flightstack.testing import World
 from tests.support.plan_items import circle, polygon, rally_point, square
 from tests.support.refusals import refused
+from tests.support.truth import World
 
 
 def test_a_mission_that_leaves_the_fence_is_refused_with_its_item_and_a_lesser_one_is_flown() -> None:

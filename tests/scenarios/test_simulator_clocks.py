@@ -10,10 +10,10 @@ import pytest
 from flightstack.core.geodesy import LocalFrame
 from flightstack.mavlink.link import Link
 from flightstack.simulator_link.hot_frames import PlantStateFrame
-from flightstack.testing import World
 from flightstack.testing.engine import Engine
 from sim_bridge.server.hil import HilControls, hil_state
 from tests.support.refusals import refused
+from tests.support.truth import World
 
 UNIX_US = 1_790_000_000_000_000
 ALL_ITEMS = [0, 1, 2, 3, 4, 5]
@@ -161,7 +161,7 @@ class SentTwice(OtherClock):
         super().take_answer(answer)
         link = self.stack.simulator
         assert link.receive(memoryview(bytes(self._state.frame)))
-        again = bytes(link.answer(self._lockstep.tick(0), self.stack.now.status.armed))
+        again = bytes(link.answer(self.lockstep.tick(0), self.stack.now.status.armed))
         assert again[10:-2] == first[10:-2]  # but for the sequence number and the checksum
 
 

@@ -7,6 +7,7 @@ fence whose title is a file name is a file that the reader writes.
 
 from __future__ import annotations
 
+import math
 import re
 import shlex
 from collections.abc import Iterator
@@ -14,6 +15,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 _FENCE = re.compile(r'^```(\w+)(?: title="([^"]*)")?\n(.*?)^```$', re.MULTILINE | re.DOTALL)
+_FIGURE = re.compile(r"(?<![\w.])(-?\d+\.\d+)(?![\w.])")
+_FIGURE_GROUP = r"(-?\d+\.\d+)"
 _FILE_NAME = re.compile(r"[\w.-]+\.\w+")
 
 
@@ -56,6 +59,23 @@ def _commands(text: str, runs_beside: bool) -> Iterator[Command]:
 
 
 def shows(output: str, line: str) -> bool:
-    """Return True if a line of the output contains the parts of ``line`` between its ``…``, in order."""
-    pattern = re.compile(".*".join(map(re.escape, line.strip().split("…"))))
-    return any(pattern.search(each) for each in output.splitlines())
+    """Return True if a line of the output contains the parts of ``line`` between its ``…``, in order.
+
+    A number with a decimal point is a measured figure: it may differ by a quarter or by 0.2, because a change of any
+    part that flies moves it a little.
+    """
+    *texts, last = _FIGURE.split(line.strip())
+    pattern = re.compile(_FIGURE_GROUP.join(_with_gaps(text) for text in [*texts[::2], last]))
+    figures = [float(figure) for figure in texts[1::2]]
+    return any(
+        all(
+            math.isclose(float(seen), shown, rel_tol=0.25, abs_tol=0.2)
+            for seen, shown in zip(groups, figures, strict=True)
+        )
+        for each in output.splitlines()
+        for groups in (found.groups() for found in pattern.finditer(each))
+    )
+
+
+def _with_gaps(text: str) -> str:
+    return ".*".join(map(re.escape, text.split("…")))

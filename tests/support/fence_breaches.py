@@ -7,10 +7,11 @@ from collections.abc import Callable
 
 from flightstack.core.enums import Mode
 from flightstack.plan import MissionType
-from flightstack.testing import State, World
+from flightstack.testing import State
 from tests.support.failsafe_phases import HEIGHT, QUICK
 from tests.support.plan_items import circle, item
 from tests.support.streams import go_to, local_point, sticks
+from tests.support.truth import World
 
 RADIUS = 20.0
 SPEED = 4.0

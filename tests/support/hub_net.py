@@ -7,7 +7,7 @@ import math
 from flightstack.core.port_numbers import GROUND
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
-from flightstack.params.config import StackConfig
+from flightstack.params.config import TRUTH, StackConfig
 from flightstack.process.assembly import build
 from flightstack.services.routing.peer import PeerAddress
 
@@ -54,7 +54,7 @@ class Net:
     """A hub without a process, with its own clock; by default vehicle time advances with it."""
 
     def __init__(self) -> None:
-        stack = build(StackConfig(system_id=7), lambda: None)
+        stack = build(StackConfig(system_id=7, state=TRUTH), lambda: None)
         self.stack, self.hub = stack, stack.ground
         stack.now.has_state = True
         self.now_s = 50.0

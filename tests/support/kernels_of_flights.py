@@ -6,8 +6,8 @@ import gc
 
 from numba.core.dispatcher import Dispatcher
 
-from flightstack.testing import World
 from tests.support.streams import attitude, hover_thrust, level, local_point, sticks, stream
+from tests.support.truth import World
 
 
 def kernels() -> set[tuple[str, int]]:

@@ -14,7 +14,7 @@ from flightstack.simulator_link.hot_frames import ARMED_FLAG
 from sim_bridge.multibody.frames import flip_quaternion, flip_vector
 from sim_bridge.multibody.mjcf import model_xml
 from sim_bridge.plant.disturbance import NO_DISTURBANCE, Disturbance
-from sim_bridge.plant.fault_effects import PlantFaults, RotorFault
+from sim_bridge.plant.faults.effects import PlantFaults, RotorFault
 from sim_bridge.plant.plant import AT_REST, InitialState, Plant, PlantOptions
 from sim_bridge.plants import make_plant
 

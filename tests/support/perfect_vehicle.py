@@ -74,7 +74,7 @@ class PerfectVehicle:
         on_ground = self.state[2] >= 0.0 and setpoint[2] >= 0.0
         pushes = 0.0 if self.navigator.touches_ground else 0.3 * WEIGHT_N
         thrust = pushes if on_ground else WEIGHT_N
-        self.navigator.step(self.mode, self.state, np.array([1.0, 0.0, 0.0, 0.0, thrust]))
+        self.navigator.step(self.mode, self.state, np.array([1.0, 0.0, 0.0, 0.0, thrust]), thrust)
         before = self.yaw
         self.state[:6] = setpoint[:6]
         if self.state[2] > 0.0:

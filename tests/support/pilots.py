@@ -11,6 +11,8 @@ from textual.app import App
 from textual.events import Key
 from textual.pilot import Pilot
 
+from gcs_cli.tui.app import WatchApp
+
 
 class _SkippingSelector(selectors.DefaultSelector):
     """A selector that skips the time until the next timer instead of waiting for it."""
@@ -57,8 +59,10 @@ def run_story(
 
 
 async def type_ahead(pilot: Pilot[None], *keys: str) -> None:
-    """Press keys without waiting for their effects in between."""
+    """Press keys of ``gcs watch`` without waiting for their effects in between."""
+    assert isinstance(pilot.app, WatchApp)
     for key in keys:
         pilot.app.post_message(Key(key, key if len(key) == 1 else None))
     await pilot.pause()
+    await pilot.app.keys.handled()
     await pilot.pause()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,7 @@ KERNELS = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
 
 def load() -> None:
     """Import all that the runs use, before the fixture ``pytester``, which unloads later imports: Numba cannot."""
+    import_module("flightstack.testing.sitl")
     with tempfile.TemporaryDirectory() as folder, World(vehicle="x_quad") as world:
         flown = Flown(world)
         world.arm()

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import shutil
 import sys
 import tomllib
 from pathlib import Path
 from types import ModuleType
+
+import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLE = ROOT / "examples" / "mission_tests"
@@ -38,4 +41,20 @@ def install(site: Path, project: Path = EXAMPLE) -> Path:
     )
     entries = [f"{name} = {value}" for name, value in declared["entry-points"][GROUP].items()]
     (info / "entry_points.txt").write_text(f"[{GROUP}]\n" + "\n".join(entries) + "\n")
+    return site
+
+
+def new_site(folder: Path, patch: pytest.MonkeyPatch) -> Path:
+    """Make a directory of installed packages that this process sees until ``patch`` is undone."""
+    folder.mkdir()
+    patch.syspath_prepend(str(folder))
+    for name in ("lqr_controller", "broken"):
+        patch.delitem(sys.modules, name, raising=False)
+    return folder
+
+
+def installed_site(folder: Path, patch: pytest.MonkeyPatch) -> Path:
+    """Make such a directory with the example's controller."""
+    site = install(new_site(folder, patch))
+    importlib.invalidate_caches()
     return site

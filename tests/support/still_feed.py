@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -32,7 +31,7 @@ class StillFeed(Feed):
         self.commands_all = False
         self.others: list[VehicleView] = []
         self.error = None
-        self._stopping = threading.Event()
+        self._is_stopping = False
         self.rates_hz = {}
         self.shown = view
         self.time_s = now_s

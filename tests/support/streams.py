@@ -10,7 +10,7 @@ from flightstack.core.geodesy import LocalFrame
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.params.config import DEFAULT_HOME
-from flightstack.testing import World
+from tests.support.truth import World
 
 IGNORE_ALL = 0b1101_1111_1111
 """Type mask that ignores all fields."""

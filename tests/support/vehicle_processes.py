@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from flightstack.mavlink.dialect import mavlink
+from flightstack.params.config import TRUTH
 from flightstack.testing.instances import free_instance
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
@@ -16,6 +17,9 @@ from tests.support.programs import Program
 
 LONG_S = 60.0
 """Hang guard [s]."""
+
+INNER_HZ = 250
+"""Rate of the inner loop. The default rate costs twice the CPU time, which tests of links and commands do not need."""
 
 IN_AIR = mavlink.MAV_LANDED_STATE_IN_AIR
 
@@ -63,7 +67,10 @@ def vehicle(
     with_simulator: bool = True,
     instance: int | None = None,
 ) -> Iterator[VehicleProcesses]:
-    """Run both and end them at exit; ``arguments`` are those of the flight stack. Without ``instance``, a free one."""
+    """Run both and end them at exit; ``arguments`` are those of the flight stack. Without ``instance``, a free one.
+
+    The vehicle flies on the true state: links and commands are tested, and sensors would cost a third of a core.
+    """
     instance = free_instance() if instance is None else instance
     with contextlib.ExitStack() as ends:
 
@@ -74,6 +81,6 @@ def vehicle(
             return process
 
         simulator = run("sim_bridge", "--speed", speed) if with_simulator else None
-        stack = run("flightstack", *arguments)
+        stack = run("flightstack", "--state", TRUTH, "--inner-hz", INNER_HZ, *arguments)
         assert stack.stdout.readline(), "flightstack ended at its start"
         yield VehicleProcesses(instance, simulator, stack, folder)

@@ -9,7 +9,6 @@ import pytest
 from flightstack.core.errors import ConfigError
 from flightstack.mavlink.dialect import mavlink
 from flightstack.plan import Command, MissionItem, Plan
-from flightstack.testing import World
 from flightstack.testing.expectations import Check
 from flightstack.testing.expression import Expression
 from flightstack.testing.log import Log
@@ -17,6 +16,7 @@ from flightstack.testing.orders import check_command, order
 from flightstack.testing.properties import parse_window
 from flightstack.testing.scenario import load_scenario
 from flightstack.testing.scenario_run import run_scenario
+from tests.support.truth import World
 
 DRAINED = 'plan = "hop.plan"\nbattery_percent = 10.0\n[expect]\n'
 

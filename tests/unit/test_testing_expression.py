@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from flightstack.core.enums import Mode
 from flightstack.core.errors import ConfigError
-from flightstack.testing import World
 from flightstack.testing.expression import SIGNALS, SMALLEST, Expression
+from tests.support.truth import World
 
 INF = math.inf
 

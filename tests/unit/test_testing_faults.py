@@ -12,9 +12,10 @@ import pytest
 from flightstack.core.errors import ConfigError
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.vehicle import GRAVITY_M_S2, load_vehicle
-from flightstack.testing import Setup, World, load_scenario, run_scenario
+from flightstack.testing import Setup, load_scenario, run_scenario
 from flightstack.testing.link import PERFECT
 from flightstack.testing.properties import Signals, Window, always
+from tests.support.truth import World
 
 
 def test_overlapping_faults_of_a_link_end_each_at_its_own_time() -> None:
@@ -69,6 +70,22 @@ def test_setup_and_conditions_are_not_mixed() -> None:
         World(Setup(), seed=7)
 
 
+def test_unknown_condition_names_the_nearest_one() -> None:
+    with pytest.raises(TypeError, match=r"wnd is no condition of a flight: did you mean wind\?"):
+        World(wnd=(5.0, 0.0))
+
+
+def test_unknown_parameter_names_the_keyword_of_the_world() -> None:
+    with pytest.raises(ConfigError, match=r"^params: MPC_XY_CRUSE: the vehicle has no such parameter"):
+        World(params={"MPC_XY_CRUSE": 1.0})
+
+
+def test_missing_plan_names_the_examples_without_another_error() -> None:
+    with pytest.raises(ConfigError, match=r"the example plans are .*square") as caught:
+        Setup().load_plan("sqare")
+    assert caught.value.__context__ is None
+
+
 @pytest.mark.parametrize("plan", ["nowhere/square.plan", "square.waypoints", "/nowhere/hop.plan"])
 def test_missing_plan_is_not_replaced_by_an_example(plan: str) -> None:
     with pytest.raises(ConfigError, match="cannot be read"):
@@ -85,7 +102,7 @@ def test_event_outside_the_flight_is_no_window() -> None:
 def test_lost_piece_of_a_text_is_no_error() -> None:
     with World() as world:
         for sequence in (1, 0, 1, 1):
-            world.gcs._take(mavlink.MAVLink_statustext_message(6, b"x" * 50, 7, sequence))
+            world.gcs.session.observe(mavlink.MAVLink_statustext_message(6, b"x" * 50, 7, sequence))
         assert [len(text) for text in world.gcs.texts] == [100]
 
 

@@ -10,16 +10,18 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
+import flightstack.testing
 from flightstack.core.errors import ConfigError
 from flightstack.testing import (
     Flight,
     PropertyViolationError,
     Setup,
-    World,
+    State,
 )
 from flightstack.testing.log import unit_of
 from gcs_cli.report.analysis import flight_of
 from gcs_cli.report.summary import RunInfo, summarise
+from tests.support.truth import World
 
 
 @pytest.fixture
@@ -92,6 +94,21 @@ def test_error_is_that_of_the_flight(world: World) -> None:
     assert max(errors_m) == pytest.approx(flight.max_error_m, abs=0.01)
     assert flight.signals.values["error_m"][-1] == errors_m[-1] == 0.0
     flight.always("error_m < 0.1")
+
+
+def test_signals_of_a_vehicle_on_its_sensors_are_true() -> None:
+    """The estimate follows GNSS and the setpoint follows the estimate: only the truth shows how far off both are."""
+    states: list[State] = []
+    with flightstack.testing.World() as sensed:
+        sensed.watch(lambda: states.append(sensed.state))
+        flight = sensed.fly("hop")
+    flown = [state for state in states if state.time_s >= flight.signals.time_s[0]]
+    for name in ("north_m", "east_m", "altitude_m"):
+        found = np.interp([s.time_s for s in flown], flight.signals.time_s, flight.signals.values[name])
+        assert np.abs(found - [getattr(state, name) for state in flown]).max() < 0.05
+    assert max(state.error_m for state in flown) == pytest.approx(flight.max_error_m, abs=0.02)
+    known = flight.data.tracking_error().values.max()
+    assert known < 0.2 < flight.max_error_m - known  # 0.07 m of 0.7 m
 
 
 def test_failsafe_ends_with_disarming(world: World) -> None:

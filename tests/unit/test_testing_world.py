@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import flightstack.testing
 from flightstack.core.enums import Mode
 from flightstack.core.errors import ConfigError
 from flightstack.plan import MissionType
@@ -15,9 +16,9 @@ from flightstack.testing import (
     ConditionTimeoutError,
     Flight,
     RefusedError,
-    World,
 )
 from gcs_cli.link import calls
+from tests.support.truth import World
 
 
 @pytest.fixture
@@ -80,6 +81,18 @@ def test_missing_plan_is_an_error(world: World, tmp_path: Path) -> None:
 
 
 # ---------------------------------------------------------------------- time
+
+
+def test_arming_waits_until_a_vehicle_on_its_sensors_is_ready() -> None:
+    with flightstack.testing.World() as sensed:
+        assert sensed.setup.state == "estimated"
+        assert not sensed.engine.stack.is_ready
+        sensed.arm()
+        assert 0.4 < sensed.time_s < 3.0  # alignment and first fix: 1.1 s
+        sensed.disarm()
+        before_s = sensed.time_s
+        sensed.arm()
+        assert sensed.time_s == before_s
 
 
 def test_request_over_a_perfect_link_takes_no_time(world: World) -> None:

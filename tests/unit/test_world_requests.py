@@ -11,7 +11,8 @@ from flightstack.core.port_numbers import GROUND
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 from flightstack.services.routing.peer import PeerAddress
-from flightstack.testing import RefusedError, World
+from flightstack.testing import RefusedError
+from tests.support.truth import World
 
 
 def test_refused_command_has_its_mav_result_and_reason() -> None:
