@@ -1,0 +1,93 @@
+"""Fly planned flights in worker processes, and write each row to the journal as soon as its flight is over."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Sequence
+
+from flightstack.testing.scenario import check_scenario
+from gcs_cli.campaign.definition import Campaign
+from gcs_cli.campaign.display import Display
+from gcs_cli.campaign.journal import Journal
+from gcs_cli.campaign.options import CampaignOptions, only_command
+from gcs_cli.campaign.plan import PlannedFlight
+from gcs_cli.campaign.rows import row_of
+from gcs_cli.errors import CliError
+from gcs_cli.scenarios.pool import Finished, Notice, Pool, Started
+from gcs_cli.scenarios.result import Wanted
+from gcs_cli.scenarios.selection import Case
+
+_WANTED = Wanted(metrics=True)
+
+
+class LostWorkerError(CliError):
+    """A process ended that flew a flight."""
+
+
+class Flyer:
+    """Flies what the journal does not have yet."""
+
+    def __init__(
+        self, pool: Pool, campaign: Campaign, journal: Journal, display: Display, options: CampaignOptions
+    ) -> None:
+        self._pool, self._campaign, self._journal = pool, campaign, journal
+        self._display, self._options = display, options
+        self._has_noted = False
+
+    def fly(self, flights: Sequence[PlannedFlight]) -> None:
+        """Fly all of ``flights`` that are not over; raise LostWorkerError after the others, ConfigError, OSError."""
+        missing = [flight for flight in flights if flight.number not in self._journal.rows]
+        cases = [case_of(self._campaign, flight, self._options) for flight in missing]
+        lost: list[tuple[int, str]] = []
+        with contextlib.closing(self._pool.fly(cases, _WANTED)) as messages:
+            for message in messages:
+                if isinstance(message, Started):
+                    self._display.begin(missing[message.case].number)
+                elif isinstance(message, Finished) and message.result is None:
+                    lost.append((missing[message.case].number, message.reason))
+                elif isinstance(message, Finished):
+                    self._add(missing[message.case], message)
+                elif isinstance(message, Notice):
+                    self._note(message.line)
+                else:
+                    self._display.tick()
+        for number, reason in lost:
+            raise LostWorkerError(f"flight {number}: {reason}; the same command flies it again")
+
+    def _add(self, flight: PlannedFlight, finished: Finished) -> None:
+        assert finished.result is not None
+        row = row_of(flight, finished.result)
+        self._journal.add(row)
+        if self._options.as_json:
+            print(json.dumps({"event": "flight", **row}, allow_nan=False), flush=True)
+        self._display.add(row)
+
+    def _note(self, line: str) -> None:
+        """Show the first line about compilation: each worker has the same."""
+        if not self._has_noted:
+            self._has_noted = True
+            self._display.note(line)
+
+
+def case_of(campaign: Campaign, flight: PlannedFlight, options: CampaignOptions) -> Case:
+    """Return what a worker flies; raise ConfigError for inputs out of their range."""
+    scenario = campaign.scenario(flight.inputs)
+    return Case(scenario, flight.seed, f"flight-{flight.number}", only_command(options, flight.number))
+
+
+def check_flights(campaign: Campaign, flights: Sequence[PlannedFlight]) -> None:
+    """Check types and ranges of all flights, and all else of those with the extremes of each input or with each choice.
+
+    Raise ConfigError: a wrong file ends before anything flies.
+    """
+    checked = {flights[0].number}
+    for name, distribution in campaign.vary.items():
+        if distribution.is_choice:
+            checked |= set({each.inputs[name]: each.number for each in flights}.values())
+        else:
+            checked |= {select(flights, key=lambda each: each.inputs[name]).number for select in (min, max)}
+    for flight in flights:
+        scenario = campaign.scenario(flight.inputs)
+        if flight.number in checked:
+            check_scenario(scenario)

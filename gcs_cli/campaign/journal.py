@@ -1,0 +1,166 @@
+"""The directory of a campaign: what is flown, and each row as soon as its flight is over.
+
+``flights.jsonl`` is appended to, a line for each flight in a single write, so that SIGKILL loses no flight that is
+over; a last line without its end is removed at the next start. ``campaign.json`` has the digests of all that the
+flights depend on.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from flightstack import __version__
+from flightstack.core.atomic_file import write_text_atomically
+from flightstack.core.errors import ConfigError
+from gcs_cli.campaign.plan import PlannedFlight
+from gcs_cli.campaign.rows import Row
+from gcs_cli.errors import USAGE, CliError
+
+JOURNAL, RECORD = "flights.jsonl", "campaign.json"
+PARQUET, CSV, REPORT = "flights.parquet", "flights.csv", "report.html"
+_FORM = 1
+"""Version of the directory's form."""
+
+
+def record_of(kind: str, files: Mapping[str, bytes], flights: Sequence[PlannedFlight]) -> dict[str, Any]:
+    """Return the record of a campaign: equal records fly equal flights. ``kind``: ``plan`` or ``seek``."""
+    inputs = json.dumps([[flight.number, flight.seed, dict(flight.inputs)] for flight in flights])
+    return {
+        "form": _FORM,
+        "kind": kind,
+        "version": __version__,
+        "flights": hashlib.sha256(inputs.encode()).hexdigest(),
+        "files": {name: hashlib.sha256(content).hexdigest() for name, content in sorted(files.items())},
+    }
+
+
+class Journal:
+    """The rows of a campaign, on disk. Only one process at a time has it open."""
+
+    def __init__(self, folder: Path, record: Mapping[str, Any], overwrite: bool = False) -> None:
+        """Open the journal in ``folder``, which exists; raise CliError if it belongs to another campaign, OSError.
+
+        ``overwrite``: begin anew, whatever is there.
+        """
+        self._descriptor = os.open(
+            folder / JOURNAL, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666
+        )
+        try:
+            self._lock(folder)
+            if overwrite:
+                self._clear(folder)
+            _check_record(folder, record)
+            self.rows = self._read()
+        except BaseException:
+            self.close()
+            raise
+        """The row of each flight that is over, by its number."""
+
+    def _lock(self, folder: Path) -> None:
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise CliError(
+                f"{folder}: another gcs campaign writes to it: give another --out", USAGE
+            ) from None
+
+    def _clear(self, folder: Path) -> None:
+        for name in (RECORD, PARQUET, CSV, REPORT):
+            (folder / name).unlink(missing_ok=True)
+        os.ftruncate(self._descriptor, 0)
+
+    def _read(self) -> dict[int, Row]:
+        """Return the whole rows, and cut off what follows them."""
+        with os.fdopen(os.dup(self._descriptor), "rb") as file:
+            file.seek(0)
+            content = file.read()
+        rows, end = _whole_rows(content)
+        if end < len(content):
+            os.ftruncate(self._descriptor, end)
+        return rows
+
+    def add(self, row: Row) -> None:
+        """Append a row; raise OSError."""
+        line = json.dumps(row, allow_nan=False).encode() + b"\n"
+        written = os.write(self._descriptor, line)
+        if written < len(line):  # a full disk; the next start removes the part
+            raise OSError(f"{JOURNAL}: {written} of {len(line)} bytes were written")
+        self.rows[int(row["flight"])] = row
+
+    def close(self) -> None:
+        """Release the journal."""
+        os.close(self._descriptor)
+
+
+@contextlib.contextmanager
+def open_journal(folder: Path, record: Mapping[str, Any], overwrite: bool = False) -> Iterator[Journal]:
+    """Yield the journal of a campaign, as ``Journal`` opens it."""
+    journal = Journal(folder, record, overwrite)
+    try:
+        yield journal
+    finally:
+        journal.close()
+
+
+def flown_before(folder: Path, number: int) -> PlannedFlight:
+    """Return a flight of the journal in ``folder``; raise CliError (usage) if it is not there."""
+    try:
+        rows, _ = _whole_rows((folder / JOURNAL).read_bytes())
+    except FileNotFoundError:
+        raise CliError(f"{folder}: there is no search: --only repeats one of its flights", USAGE) from None
+    if number not in rows:
+        raise CliError(f"--only {number}: the search in {folder} has {len(rows)} flights", USAGE)
+    return PlannedFlight(number, rows[number]["seed"], rows[number]["inputs"])
+
+
+def _whole_rows(content: bytes) -> tuple[dict[int, Row], int]:
+    """Return the rows up to the last line's end, and the number of their bytes; raise CliError for a damaged one."""
+    end = content.rfind(b"\n") + 1
+    rows: dict[int, Row] = {}
+    for number, line in enumerate(content[:end].splitlines(), start=1):
+        try:
+            row = json.loads(line)
+            rows[int(row["flight"])] = row
+        except (ValueError, TypeError, KeyError):
+            remedy = "mend the line, or --overwrite to fly all again"
+            raise CliError(f"{JOURNAL}: line {number} is damaged: {remedy}", USAGE) from None
+    return rows, end
+
+
+def _check_record(folder: Path, record: Mapping[str, Any]) -> None:
+    """Write the record, or raise CliError if the directory has another one."""
+    path = folder / RECORD
+    if not path.exists():
+        if (folder / JOURNAL).stat().st_size:
+            raise ConfigError(path, "", f"is missing beside {JOURNAL}: give another --out, or --overwrite")
+        write_text_atomically(path, json.dumps(record, indent=2) + "\n")
+        return
+    try:
+        before = json.loads(path.read_text(encoding="utf-8"))
+        difference = _difference(before, record)
+    except (ValueError, TypeError, AttributeError):
+        raise ConfigError(path, "", "is damaged: give another --out, or --overwrite") from None
+    if difference:
+        remedy = "give another --out, or --overwrite to fly all of them again"
+        raise CliError(f"{folder}: {difference} since its flights: {remedy}", USAGE)
+
+
+def _difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
+    """Return what differs between two records, as the beginning of a sentence; empty if nothing does."""
+    for name in sorted({*before["files"], *now["files"]}):
+        if before["files"].get(name) != now["files"].get(name):
+            return f"{name} has changed"
+    words = {
+        "kind": "the kind of the campaign has changed",
+        "version": f"flightstack has changed from {before['version']} to {now['version']}",
+        "form": "the form of the directory has changed",
+        "flights": "the plan of the flights has changed",
+    }
+    return next((text for name, text in words.items() if before[name] != now[name]), "")

@@ -1,0 +1,76 @@
+"""The options of ``gcs campaign``.
+
+A module of its own: the help imports no scenario.
+"""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from flightstack.process.command_line import IN_OUTPUT, Overwrite
+from gcs_cli.settings import JsonOption, OpenOption
+
+SEEKS = ("worst",)
+File = Annotated[
+    Path,
+    typer.Argument(metavar="FILE", help="A scenario file with [campaign] and [vary].", show_default=False),
+]
+Workers = Annotated[
+    int | None,
+    typer.Option(
+        "--workers", "-j", min=1, max=256, help="Flights at once.  [default: one for each processor]"
+    ),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", "-o", metavar="DIR", help="Directory of the results, where a campaign also continues.  "
+                 "[default: runs/campaign-<file>]", **IN_OUTPUT),
+]  # fmt: skip
+Csv = Annotated[bool, typer.Option("--csv", help="Write the table as CSV too.", **IN_OUTPUT)]
+Only = Annotated[
+    int | None,
+    typer.Option(min=1, metavar="N", help="Fly this flight alone, and keep its log and report."),
+]
+Seek = Annotated[
+    str | None,
+    typer.Option(
+        metavar="worst",
+        help="Search for the least margin and for the smallest disturbance that violates an expectation.",
+    ),
+]
+Flights = Annotated[
+    int | None, typer.Option(min=20, max=100_000, help="Flights of a search, about.  [default: 200]")
+]
+
+
+@dataclass(frozen=True)
+class CampaignOptions:
+    """The options of ``gcs campaign``, as given."""
+
+    file: File
+    workers: Workers = None
+    out: Out = None
+    csv: Csv = False
+    only: Only = None
+    seek: Seek = None
+    flights: Flights = None
+    overwrite: Overwrite = False
+    open_report: OpenOption = False
+    as_json: JsonOption = False
+
+    @property
+    def folder(self) -> Path:
+        """The directory of the results."""
+        return self.out or Path("runs") / f"campaign-{self.file.stem}"
+
+
+def only_command(options: CampaignOptions, number: int) -> str:
+    """Return the command that flies one flight alone."""
+    out = f" --out {shlex.quote(str(options.out))}" if options.out is not None else ""
+    seek = "" if options.seek is None else f" --seek {options.seek}"
+    return f"gcs campaign {shlex.quote(str(options.file))}{seek}{out} --only {number}"

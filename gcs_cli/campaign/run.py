@@ -1,0 +1,130 @@
+"""A campaign from its file to table and report; or one of its flights alone."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from rich.console import Console
+
+from flightstack.core.atomic_file import write_bytes_atomically, write_text_atomically
+from gcs_cli.campaign.definition import Campaign, load_campaign
+from gcs_cli.campaign.display import inputs_text, make_display
+from gcs_cli.campaign.flyer import Flyer, case_of, check_flights
+from gcs_cli.campaign.journal import (
+    CSV,
+    PARQUET,
+    REPORT,
+    Journal,
+    flown_before,
+    open_journal,
+    record_of,
+)
+from gcs_cli.campaign.options import CampaignOptions
+from gcs_cli.campaign.page import render_campaign
+from gcs_cli.campaign.plan import PlannedFlight, plan_flights
+from gcs_cli.campaign.rows import Row, row_of
+from gcs_cli.campaign.seek import run_search
+from gcs_cli.campaign.statistics import pass_probability
+from gcs_cli.campaign.table import write_tables
+from gcs_cli.errors import DONE, FAILED, INTERRUPTED, USAGE, CliError
+from gcs_cli.logs.export_tables import library
+from gcs_cli.run_directory import LOG_NAME, REPORT_NAME, results_directory
+from gcs_cli.scenarios.pool import Finished, Pool
+from gcs_cli.scenarios.result import Wanted
+
+
+def run_campaign(pool: Pool, options: CampaignOptions, console: Console) -> int:
+    """Fly what is not flown yet, write the table and the report; return the exit code. Raise ConfigError, CliError."""
+    library("pyarrow")  # missing: say so before the flights
+    campaign = load_campaign(options.file)
+    if options.seek is not None and options.only is not None:
+        return fly_only(pool, campaign, flown_before(options.folder, options.only), options, console)
+    if options.seek is not None:
+        return run_search(pool, campaign, options, console)
+    flights = plan_flights(campaign)
+    if options.only is not None:
+        return fly_only(pool, campaign, _numbered(campaign, flights, options.only), options, console)
+    check_flights(campaign, flights)
+    record = record_of("plan", campaign.files([flight.inputs for flight in flights]), flights)
+    began_s = time.monotonic()
+    with (
+        results_directory(options.folder),
+        open_journal(options.folder, record, options.overwrite) as journal,
+    ):
+        display = make_display(console, len(flights), journal.rows.values())
+        try:
+            Flyer(pool, campaign, journal, display, options).fly(flights)
+        except KeyboardInterrupt:
+            over = f"{len(journal.rows)} of {len(flights)} flights are over"
+            raise CliError(f"interrupted: {over}; the same command continues", INTERRUPTED) from None
+        finally:
+            display.close()
+        rows = ordered(journal)
+        write_tables(options.folder, rows, options.csv)
+        write_text_atomically(options.folder / REPORT, render_campaign(campaign, rows, options))
+    _print_summary(rows, options, console, time.monotonic() - began_s)
+    return DONE if all(row["passed"] for row in rows) else FAILED
+
+
+def ordered(journal: Journal) -> list[Row]:
+    """Return the rows of a journal in the order of their flights."""
+    return [journal.rows[number] for number in sorted(journal.rows)]
+
+
+def _numbered(campaign: Campaign, flights: Sequence[PlannedFlight], number: int) -> PlannedFlight:
+    if number > len(flights):
+        raise CliError(f"--only {number}: {campaign.path} has {len(flights)} flights", USAGE)
+    return flights[number - 1]
+
+
+def fly_only(
+    pool: Pool, campaign: Campaign, flight: PlannedFlight, options: CampaignOptions, console: Console
+) -> int:
+    """Fly one flight alone, keep its log and report, and print its row; return the exit code."""
+    case = case_of(campaign, flight, options)
+    wanted = Wanted(every_file=True, metrics=True)
+    result = None
+    for message in pool.fly([case], wanted):
+        if isinstance(message, Finished):
+            if message.result is None:
+                raise CliError(f"flight {flight.number}: {message.reason}")
+            result = message.result
+    assert result is not None
+    row, folder = row_of(flight, result), options.folder / case.label
+    if result.log:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_bytes_atomically(folder / LOG_NAME, result.log, survives_power_loss=False)
+        write_text_atomically(folder / REPORT_NAME, result.report)
+    if options.as_json:
+        kept = str(folder) if result.log else None
+        print(json.dumps({"event": "flight", **row, "kept": kept}, allow_nan=False), flush=True)
+        return DONE if row["passed"] else FAILED
+    _say(console, f"flight {flight.number}, seed {flight.seed}: {inputs_text(row)}")
+    for check in result.checks:
+        _say(console, f"{'PASS' if check.passed else 'FAIL'}  {check}")
+    if result.log:
+        _say(console, f"log and report: {folder}")
+    return DONE if row["passed"] else FAILED
+
+
+def _print_summary(rows: Sequence[Row], options: CampaignOptions, console: Console, wall_s: float) -> None:
+    passed = sum(row["passed"] for row in rows)
+    chance = pass_probability(passed, len(rows))
+    files = [options.folder / name for name in (PARQUET, *((CSV,) if options.csv else ()), REPORT)]
+    if options.as_json:
+        facts: dict[str, Any] = {
+            "flights": len(rows), "passed": passed, "failed": len(rows) - passed,
+            "pass_probability": chance.share, "low": chance.low, "high": chance.high,
+            "files": [str(file) for file in files],
+        }  # fmt: skip
+        print(json.dumps({"event": "campaign", **facts}, allow_nan=False), flush=True)
+        return
+    _say(console, f"{passed} of {len(rows)} flights passed in {wall_s:.1f} s: pass probability {chance}")
+    _say(console, f"results: {', '.join(map(str, files))}")
+
+
+def _say(console: Console, line: str) -> None:
+    console.print(line, markup=False, highlight=False, soft_wrap=True)

@@ -1,0 +1,55 @@
+"""``gcs campaign``: many flights of one scenario with varied inputs.
+
+A module of its own, as each command: it is imported when it is used.
+"""
+
+from __future__ import annotations
+
+import webbrowser
+
+import typer
+
+from flightstack.process.command_line import expand_options, make_app
+from gcs_cli.campaign.options import SEEKS, CampaignOptions
+from gcs_cli.errors import INTERRUPTED, USAGE, CliError
+from gcs_cli.settings import settings_of
+
+app = make_app(add_completion=False)
+
+
+@app.command("campaign")
+@expand_options
+def fly_campaign(context: typer.Context, options: CampaignOptions) -> None:
+    """Fly a scenario many times with varied inputs.
+
+    Writes a table (Parquet) with a row for each flight, and a report. After Ctrl-C or a crash the same command
+    continues. Exits with 0 if all flights passed, 1 if one failed, 2 for a bad file, 130 after Ctrl-C.
+    """
+    from gcs_cli.scenarios.pool import Pool, default_jobs
+
+    _check(context, options)
+    try:
+        with Pool(
+            options.workers or default_jobs()
+        ) as pool:  # its first worker imports while this process does
+            from gcs_cli.campaign.run import run_campaign
+            from gcs_cli.fly.fly_display import FlyConsole
+
+            code = run_campaign(pool, options, FlyConsole(stderr=options.as_json, highlight=False))
+    except KeyboardInterrupt:  # not in flight
+        raise CliError("interrupted", INTERRUPTED) from None
+    if options.open_report and options.only is None:
+        from gcs_cli.campaign.journal import REPORT
+
+        webbrowser.open((options.folder / REPORT).resolve().as_uri())
+    raise typer.Exit(code)
+
+
+def _check(context: typer.Context, options: CampaignOptions) -> None:
+    """Raise CliError (usage) for options that exclude each other."""
+    if settings_of(context).link.connect is not None:
+        raise CliError("campaign flies vehicles of its own: leave --connect out", USAGE)
+    if options.seek not in (None, *SEEKS):
+        raise CliError(f"--seek {options.seek}: is not one of {', '.join(SEEKS)}", USAGE)
+    if options.flights is not None and options.seek is None:
+        raise CliError("--flights is for --seek: a campaign's number of flights is in its file", USAGE)

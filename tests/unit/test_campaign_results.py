@@ -1,0 +1,195 @@
+"""The rows of a campaign: journal, table and statistics."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flightstack.testing.expectations import Check
+from gcs_cli.campaign.journal import JOURNAL, RECORD, Journal, open_journal, record_of
+from gcs_cli.campaign.plan import PlannedFlight
+from gcs_cli.campaign.rows import columns, row_of
+from gcs_cli.campaign.statistics import pass_probability, quantiles, sensitivities, worst
+from gcs_cli.campaign.table import write_csv, write_parquet
+from gcs_cli.errors import CliError
+from gcs_cli.scenarios.result import Result, not_flown
+
+FLIGHTS = tuple(
+    PlannedFlight(number, 100 + number, {"wind": 0.5 * number, "law": "pid"}) for number in range(1, 6)
+)
+RECORD_1 = record_of("plan", {"c.toml": b"one", "hop.plan": b"plan"}, FLIGHTS)
+
+
+def row(flight: PlannedFlight) -> Any:
+    margin = 0.6 - 0.2 * flight.number
+    checks = (
+        Check("outcome completed", True, "completed"),
+        Check("max_error_m ≤ 0.6", margin >= 0.0, "…", margin, 0.6),
+        Check("always landed", True, "holds", float("inf"), None),
+    )
+    return row_of(
+        flight, Result(checks, None, "completed", "done", 4.0, metrics={"max_error_m": 0.2 * flight.number})
+    )
+
+
+ROWS = [row(flight) for flight in FLIGHTS]
+
+
+def test_row_has_margins_failures_and_robustness() -> None:
+    last = ROWS[-1]
+    assert (last["flight"], last["seed"], last["inputs"]) == (5, 105, {"wind": 2.5, "law": "pid"})
+    assert (last["passed"], last["failed"]) == (False, ["max_error_m ≤ 0.6"])
+    assert last["margins"] == {"max_error_m ≤ 0.6": pytest.approx(-0.4)}
+    assert last["robustness"] == pytest.approx(-0.4 / 0.6)
+    assert last["metrics"]["max_error_m"] == 1.0
+    assert last["metrics"]["landing_error_m"] is None
+
+
+def test_a_flight_that_ends_by_an_error_is_the_least_robust() -> None:
+    ended = row_of(FLIGHTS[0], not_flown("no memory"))
+    assert (ended["outcome"], ended["passed"], ended["robustness"], ended["closest"]) == (
+        "error",
+        False,
+        -1.0,
+        None,
+    )
+
+
+def test_journal_cut_at_any_byte_keeps_every_whole_row(tmp_path: Path) -> None:
+    with open_journal(tmp_path, RECORD_1) as journal:
+        for each in ROWS[:2]:
+            journal.add(each)
+    content = (tmp_path / JOURNAL).read_bytes()
+    ends = [index + 1 for index, byte in enumerate(content) if byte == ord("\n")]
+    for cut in range(len(content) + 1):
+        (tmp_path / JOURNAL).write_bytes(content[:cut])
+        whole = sum(end <= cut for end in ends)
+        with open_journal(tmp_path, RECORD_1) as journal:
+            assert [journal.rows[number] for number in sorted(journal.rows)] == ROWS[:whole]
+            for each in ROWS[whole:2]:
+                journal.add(each)
+        assert (tmp_path / JOURNAL).read_bytes() == content
+
+
+@pytest.mark.parametrize("damaged", [b"{", b"3", b"{}", b'{"flight": "x"}'])
+def test_damaged_line_is_named_and_the_file_stays(tmp_path: Path, damaged: bytes) -> None:
+    with open_journal(tmp_path, RECORD_1) as journal:
+        for each in ROWS[:3]:
+            journal.add(each)
+    lines = (tmp_path / JOURNAL).read_bytes().splitlines()
+    lines[1] = damaged
+    content = b"\n".join(lines) + b"\n"
+    (tmp_path / JOURNAL).write_bytes(content)
+    with pytest.raises(CliError, match="line 2 is damaged"):
+        Journal(tmp_path, RECORD_1)
+    assert (tmp_path / JOURNAL).read_bytes() == content
+
+
+def test_journal_is_written_before_add_returns(tmp_path: Path) -> None:
+    with open_journal(tmp_path, RECORD_1) as journal:
+        journal.add(ROWS[0])
+        assert json.loads((tmp_path / JOURNAL).read_text()) == ROWS[0]
+
+
+@pytest.mark.parametrize(
+    ("record", "difference"),
+    [
+        (record_of("plan", {"c.toml": b"two", "hop.plan": b"plan"}, FLIGHTS), "c.toml has changed"),
+        (record_of("plan", {"c.toml": b"one"}, FLIGHTS), "hop.plan has changed"),
+        (
+            record_of("plan", {"c.toml": b"one", "hop.plan": b"plan"}, FLIGHTS[:3]),
+            "the plan of the flights has changed",
+        ),
+        (
+            record_of("seek", {"c.toml": b"one", "hop.plan": b"plan"}, FLIGHTS),
+            "the kind of the campaign has changed",
+        ),
+        ({**RECORD_1, "version": "9.9"}, f"flightstack has changed from {RECORD_1['version']} to 9.9"),
+    ],
+)
+def test_a_changed_campaign_is_refused_and_its_rows_stay(
+    tmp_path: Path, record: Any, difference: str
+) -> None:
+    with open_journal(tmp_path, RECORD_1) as journal:
+        journal.add(ROWS[0])
+    remedy = "give another --out, or --overwrite to fly all of them again"
+    with pytest.raises(CliError, match=rf"^{tmp_path}: {difference} since its flights: {remedy}$"):
+        Journal(tmp_path, record)
+    with open_journal(tmp_path, RECORD_1) as journal:
+        assert list(journal.rows) == [1]
+    with open_journal(tmp_path, record, overwrite=True) as journal:
+        assert journal.rows == {}
+
+
+def test_two_campaigns_do_not_write_to_one_directory(tmp_path: Path) -> None:
+    with open_journal(tmp_path, RECORD_1):
+        with pytest.raises(CliError, match="another gcs campaign writes to it"):
+            Journal(tmp_path, RECORD_1)
+        with pytest.raises(CliError, match="another gcs campaign writes to it"):
+            Journal(tmp_path, RECORD_1, overwrite=True)
+    with open_journal(tmp_path, RECORD_1):
+        pass
+
+
+def test_a_journal_without_its_record_is_refused(tmp_path: Path) -> None:
+    with open_journal(tmp_path, RECORD_1) as journal:
+        journal.add(ROWS[0])
+    os.unlink(tmp_path / RECORD)
+    with pytest.raises(Exception, match=f"is missing beside {JOURNAL}"):
+        Journal(tmp_path, RECORD_1)
+
+
+def test_table_does_not_depend_on_the_order_of_the_rows(tmp_path: Path) -> None:
+    names = []
+    for name, rows in (("a", ROWS), ("b", [*ROWS[3:], *reversed(ROWS[:3])])):
+        write_parquet(tmp_path / f"{name}.parquet", rows)
+        write_csv(tmp_path / f"{name}.csv", rows)
+        names.append((tmp_path / f"{name}.parquet", tmp_path / f"{name}.csv"))
+    assert [path.read_bytes() for path in names[0]] == [path.read_bytes() for path in names[1]]
+
+
+def test_tables_hold_the_rows(tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    write_parquet(tmp_path / "t.parquet", ROWS)
+    table = parquet.read_table(tmp_path / "t.parquet")
+    assert table.to_pydict() == columns(ROWS)
+    types = {field.name: str(field.type) for field in table.schema}
+    assert types["flight"] == "int64"
+    assert (
+        types["input: wind"]
+        == types["margin: max_error_m ≤ 0.6"]
+        == types["metric: landing_error_m"]
+        == "double"
+    )
+    assert types["input: law"] == types["failed"] == "string"
+    write_csv(tmp_path / "t.csv", ROWS)
+    with (tmp_path / "t.csv").open(newline="", encoding="utf-8") as file:
+        lines = list(csv.DictReader(file))
+    assert [float(line["input: wind"]) for line in lines] == [0.5, 1.0, 1.5, 2.0, 2.5]
+    assert lines[-1]["failed"] == "max_error_m ≤ 0.6"
+
+
+def test_pass_probability_is_that_of_clopper_and_pearson() -> None:
+    found = pass_probability(8, 10)
+    # Clopper, Pearson: 0.4439 to 0.9748 for 8 of 10
+    assert (found.low, found.share, found.high) == pytest.approx((0.4439, 0.8, 0.9748), abs=5e-5)
+
+
+def test_sensitivity_is_a_rank_correlation() -> None:
+    (only,) = sensitivities(ROWS)
+    assert (only.name, only.correlation) == ("wind", pytest.approx(-1.0))
+    assert sensitivities(ROWS[:2]) == []
+
+
+def test_worst_flights_come_first() -> None:
+    assert [each["flight"] for each in worst(ROWS, 2)] == [5, 4]
+
+
+def test_quantiles_leave_out_missing_numbers() -> None:
+    assert quantiles([None, 1.0, 2.0, 3.0]) == pytest.approx((1.0, 1.1, 2.0, 2.9, 3.0))
+    assert quantiles([None]) is None
