@@ -11,24 +11,45 @@ from typing import Any, ClassVar, Literal
 from textual import work
 from textual.app import App, SystemCommand
 from textual.binding import Binding
+from textual.driver import Driver
 from textual.events import Event, InputEvent, Paste, Resize
 from textual.screen import Screen
+from textual.theme import Theme
 
 from flightstack.core.enums import Severity
 from gcs_cli.actions.action import Action
 from gcs_cli.tui.feed import Feed
-from gcs_cli.tui.key_queue import KeyQueue
+from gcs_cli.tui.input import KeyQueue, TerminalDriver
 from gcs_cli.tui.mission.plan_fetcher import PlanFetcher
-from gcs_cli.tui.orders.confirm import Confirm
-from gcs_cli.tui.orders.form import OrderForm
+from gcs_cli.tui.orders.form import Confirm, OrderForm
 from gcs_cli.tui.orders.orders import ORDERS, action_of, order_named, question_for
 from gcs_cli.tui.orders.vehicle_list import ALL, VehicleList
-from gcs_cli.tui.palette import Palette, monochrome, palette_of
+from gcs_cli.tui.palette import DARK, LIGHT, Palette, monochrome, palette_of
 from gcs_cli.tui.plot.fields import PlotFields
 from gcs_cli.tui.screens import SCREENS
-from gcs_cli.tui.themes import THEMES
 from gcs_cli.tui.watch_screen import WatchScreen
 from gcs_cli.vehicle.view_types import VehicleView
+
+
+def _theme(name: str, colours: Palette, dark: bool) -> Theme:
+    return Theme(
+        name=name,
+        primary=colours.accent,
+        secondary=colours.target,
+        accent=colours.accent,
+        success=colours.good,
+        warning=colours.warning,
+        error=colours.bad,
+        foreground=colours.text,
+        background=colours.background,
+        surface=colours.surface,
+        panel=colours.surface,
+        dark=dark,
+    )
+
+
+THEMES = (_theme("gcs-dark", DARK, dark=True), _theme("gcs-light", LIGHT, dark=False))
+
 
 REDRAWS_HZ = 8.0
 _ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -67,7 +88,7 @@ class WatchApp(App[None]):
         self.plans = PlanFetcher(feed)
         """The plans of the selected vehicle, for all screens."""
         self.unsaved: dict[str, str] = {}
-        """What would be lost at the end, by screen, each a sentence."""
+        """Unsaved changes, by screen, each a sentence."""
         self._first_mode = mode
         self.redraws = 0
         for theme in THEMES:
@@ -75,7 +96,12 @@ class WatchApp(App[None]):
         self.theme = THEMES[0].name
         self._palette: tuple[str, Palette] | None = None
         self._state: tuple[object, ...] = ()
-        self._keys = KeyQueue(self, super().on_event)
+        self.keys = KeyQueue(self, super().on_event)
+
+    def get_driver_class(self) -> type[Driver]:
+        """Return the driver; that for a terminal is our own."""
+        chosen = super().get_driver_class()
+        return TerminalDriver if issubclass(TerminalDriver, chosen) else chosen
 
     @property
     def palette(self) -> Palette:
@@ -92,7 +118,7 @@ class WatchApp(App[None]):
         for number in _ENDING_SIGNALS:
             asyncio.get_running_loop().add_signal_handler(number, self.exit)
         self.app_resume_signal.subscribe(self, lambda _app: self.refresh())  # after Ctrl-Z and fg
-        self.run_worker(self._keys.run(), group="keys")
+        self.run_worker(self.keys.run(), group="keys")
         self.feed.start()
         self.switch_mode(self._first_mode)
         self.set_interval(1 / REDRAWS_HZ, self.redraw)
@@ -100,7 +126,7 @@ class WatchApp(App[None]):
     async def on_event(self, event: Event) -> None:
         """Handle an event; an input of the user waits for the effect of the one before."""
         if isinstance(event, InputEvent | Paste) and not event.is_forwarded:
-            self._keys.put(event)
+            self.keys.put(event)
         else:
             await super().on_event(event)
 

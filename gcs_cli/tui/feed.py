@@ -25,9 +25,9 @@ from gcs_cli.vehicle.view_types import VehicleView
 
 Value = TypeVar("Value")
 
-GATHER_S = 0.05
-"""Messages are received in batches of this time: a wake-up costs several messages. Not during a job, nor while the
-answer that measures the round trip is awaited."""
+GATHER_S = 0.1
+"""Messages are received in batches of this time: a wake-up costs several messages. A job or an action of the
+user ends the wait; no batches while the answer that measures the round trip is awaited."""
 _STEP_S = 0.05
 
 
@@ -74,7 +74,9 @@ class Feed:
         """Short calls that run between two steps of the link, during a job too."""
         self._running: dict[int, _Running] = {}
         self.rates_hz: dict[int, float] = dict(ROTORS_AND_TIMING)
-        self._stopping = threading.Event()
+        self._is_stopping = False
+        self._wake = threading.Event()
+        """Ends the wait for a batch."""
         self._thread: threading.Thread | None = None
 
     @property
@@ -115,14 +117,15 @@ class Feed:
 
     def stop(self) -> None:
         """End the thread: the current job fails at its next step, unless it ends in order; others are cancelled."""
-        self._stopping.set()
+        self._is_stopping = True
+        self._wake.set()
         if self._thread is not None:
             self._thread.join()
 
     @property
     def is_stopping(self) -> bool:
         """True if the current job has to end."""
-        return self._stopping.is_set()
+        return self._is_stopping
 
     def submit(
         self, job: Callable[[Connection], Value], system_id: int | None = None, *, ends_in_order: bool = False
@@ -135,6 +138,7 @@ class Feed:
         """
         future: Future[Value] = Future()
         self._jobs.append(_Job(partial(_run_on, system_id, job), future, ends_in_order))
+        self._wake.set()
         return future
 
     def select(self, system_id: int | None) -> None:
@@ -150,6 +154,7 @@ class Feed:
         for the effect of the former one.
         """
         self._calls.append(partial(self._begin, action, system_id))
+        self._wake.set()
 
     def tell(self, text: str, severity: Severity = Severity.NOTICE) -> None:
         """Show a line for a moment, and keep it among the messages."""
@@ -180,7 +185,9 @@ class Feed:
 
     def _run(self) -> None:
         try:
-            while not self._stopping.wait(self._pause_s()):
+            while not self.is_stopping:
+                self._wake.wait(self._pause_s())
+                self._wake.clear()
                 while self._jobs and not self.is_stopping:
                     self._execute(self._jobs.popleft())
                 self.connection.step(self.now_s + _STEP_S)

@@ -8,10 +8,9 @@ from typing import NamedTuple
 from rich.text import Text
 from textual.events import Click
 from textual.screen import Screen
-from textual.widget import Widget
 
 from gcs_cli.tui.palette import Palette
-from gcs_cli.tui.widgets.drawing import watch_app
+from gcs_cli.tui.widgets.drawing import KeepsLines, watch_app
 
 _MORE = " …"
 
@@ -42,7 +41,7 @@ def fitting(keys: Sequence[ShownKey], width: int) -> list[ShownKey]:
     return own + common
 
 
-class KeyBar(Widget):
+class KeyBar(KeepsLines):
     """One line: Textual's footer makes a widget of each key anew whenever another key works."""
 
     DEFAULT_CSS = "KeyBar { dock: bottom; height: 1; width: 100%; background: $surface; }"

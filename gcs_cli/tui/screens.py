@@ -1,4 +1,7 @@
-"""The screens of ``gcs watch``: a new one is a module and a row here."""
+"""The screens of ``gcs watch``: a new one is a module and a row here.
+
+A module of its own: it imports no screen before it is shown.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The terminal view in a browser: textual-serve, with a page that loads nothing from the network."""
+"""The terminal view in a browser: textual-serve, with a page that loads nothing from the network.
+
+A module of its own: only ``--serve`` imports its libraries.
+"""
 
 from __future__ import annotations
 

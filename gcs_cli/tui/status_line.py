@@ -6,7 +6,7 @@ from rich.text import Text
 
 from gcs_cli.tui.fly.panels import clock_text
 from gcs_cli.tui.palette import Palette
-from gcs_cli.vehicle.numbers import number
+from gcs_cli.vehicle.field_units import number
 from gcs_cli.vehicle.view_types import VehicleView
 
 _LANDED = {1: "on ground", 2: "in air", 3: "taking off", 4: "landing"}

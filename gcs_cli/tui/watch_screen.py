@@ -1,23 +1,24 @@
-"""What all screens share: status line, tabs, body and the footer with the keys that work now."""
+"""Common parts of all screens: status line, tabs, body and the footer with the keys that work now."""
 
 from __future__ import annotations
+
+from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Container
 from textual.events import Click
 from textual.screen import Screen
-from textual.widget import Widget
 
 from gcs_cli.tui.key_bar import KeyBar
 from gcs_cli.tui.palette import Palette
 from gcs_cli.tui.screens import SCREENS
 from gcs_cli.tui.status_line import status_line
-from gcs_cli.tui.widgets.drawing import Drawing, watch_app
+from gcs_cli.tui.widgets.drawing import Drawing, KeepsLines, watch_app
 from gcs_cli.vehicle.view_types import VehicleView
 
 
-class Tabs(Widget):
+class Tabs(KeepsLines):
     """The titles of the screens with their keys; a click opens one."""
 
     def _labels(self) -> list[str]:
@@ -52,8 +53,11 @@ class Tabs(Widget):
 class WatchScreen(Screen[None]):
     """A screen of the application. A subclass yields its widgets in ``compose_body``.
 
-    ``show`` is called at most 8 times a second, while the screen is visible.
+    ``show`` is called at most 8 times a second, while the screen is visible and composed.
     """
+
+    DRAWN: ClassVar = "#body > *"
+    """Selector of a widget that exists once the screen is composed."""
 
     HORIZONTAL_BREAKPOINTS = [  # noqa: RUF012  # an instance variable of the base
         (0, "-narrow"),
@@ -109,7 +113,7 @@ class WatchScreen(Screen[None]):
     @property
     def is_composed(self) -> bool:
         """True if the widgets of the body exist; a screen is resumed and redrawn before."""
-        self._is_composed = self._is_composed or bool(self.query("#body > *"))
+        self._is_composed = self._is_composed or bool(self.query(self.DRAWN))
         return self._is_composed
 
     def on_screen_resume(self) -> None:

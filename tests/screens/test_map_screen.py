@@ -13,7 +13,7 @@ from gcs_cli.errors import FAILED, CliError
 from gcs_cli.tui.app import WatchApp
 from gcs_cli.tui.map.scene import Place, place_of
 from gcs_cli.tui.map.screen import MapScreen
-from gcs_cli.tui.orders.confirm import Confirm
+from gcs_cli.tui.orders.form import Confirm
 from tests.support.map_views import FRAME, VIEW, item
 from tests.support.pictures import check_picture
 from tests.support.pilots import run_story

@@ -25,7 +25,7 @@ from gcs_cli.tui.mission.rows import (
     summary,
     to_go,
 )
-from gcs_cli.tui.orders.confirm import Confirm
+from gcs_cli.tui.orders.form import Confirm
 from gcs_cli.tui.palette import DARK
 from gcs_cli.tui.widgets.entry_form import EntryForm
 from gcs_cli.vehicle.view_types import Identity

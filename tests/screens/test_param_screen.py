@@ -13,7 +13,7 @@ from flightstack.mavlink.param_values import Parameter
 from gcs_cli.errors import FAILED, CliError
 from gcs_cli.transfers.param_calls import Changes
 from gcs_cli.tui.app import WatchApp
-from gcs_cli.tui.orders.confirm import Confirm
+from gcs_cli.tui.orders.form import Confirm
 from gcs_cli.tui.palette import DARK
 from gcs_cli.tui.params.model import (
     ParamList,
@@ -149,6 +149,20 @@ def test_parameter_table_and_details_at_three_sizes(size):
     drive(story, size)
 
 
+def test_parameters_are_compared_only_when_they_change(monkeypatch: pytest.MonkeyPatch):
+    compared: list[ParamList] = []
+
+    async def story(pilot, app, _screen):
+        assert "1 not at the default" in "\n".join(shown(app))
+        monkeypatch.setattr(ParamList, "changed", lambda params: compared.append(params) or [])
+        app.redraw()
+        await pilot.pause()
+        assert not compared
+        assert "1 not at the default" in "\n".join(shown(app))
+
+    drive(story)
+
+
 def test_search_and_changed_only_filter_the_table():
     async def story(pilot, _app, screen):
         await pilot.press("slash", "r", "t", "l")
@@ -216,7 +230,9 @@ def test_saved_parameters_load_after_a_question_with_the_differences(tmp_path: P
         await pilot.pause()
         said = [entry.text for entry in app.feed.messages.since(0)]
         assert said[-2:] == ["X refused: unknown", "1 of 3 parameters of a.params changed"]
-        assert screen._params.parameters["MPC_XY_CRUISE"].value == 8.0
+        await pilot.press("escape")
+        await pilot.pause()
+        assert any("MPC_XY_CRUISE" in line and " 8 " in line for line in shown(app))
 
     drive(story)
 
@@ -253,17 +269,22 @@ def test_quit_asks_while_a_download_runs_and_ends_it():
     drive(story)
 
 
-def test_row_list_draws_only_the_visible_rows_of_1400():
+def test_row_list_draws_only_the_visible_rows_of_1400(monkeypatch):
     values = {f"P{number:04d}": (float(number), False) for number in range(1400)}
+    drawn = []
+
+    def counted_row(parameter, *style):
+        drawn.append(parameter.name)
+        return param_row(parameter, *style)
+
+    monkeypatch.setattr("gcs_cli.tui.params.screen.param_row", counted_row)
 
     async def story(pilot, app, screen):
-        drawn = []
-        draw = screen._draw
-        screen.rows.show_rows(1400, lambda index, width: drawn.append(index) or draw(index, width))
+        drawn.clear()
         await pilot.press("end")
         await pilot.pause()
         assert screen.selected.name == "P1399"
         assert any(line.startswith(" P1399") for line in shown(app))
-        assert len(set(drawn)) <= 2 * screen.rows.size.height
+        assert 0 < len(set(drawn)) <= 2 * screen.rows.size.height
 
     drive(story, values=values, infos={})

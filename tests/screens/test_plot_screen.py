@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from textual.events import MouseScrollDown
 from textual.pilot import Pilot
-from textual.widgets import Input, OptionList
+from textual.widgets import Input
 
 from flightstack.mavlink.dialect import mavlink
 from gcs_cli.tui.app import WatchApp
 from gcs_cli.tui.fly.history import History
 from gcs_cli.tui.plot.field_picker import FieldPicker
 from gcs_cli.tui.plot.screen import PlotScreen
+from gcs_cli.tui.widgets.row_list import RowList
 from tests.support.map_views import VIEW
 from tests.support.pictures import check_picture
 from tests.support.pilots import run_story
@@ -119,7 +120,7 @@ def test_field_is_found_added_and_removed():
         assert isinstance(app.screen, FieldPicker)
         await pilot.press(*"yawsp")
         await pilot.pause()
-        assert app.screen.query_one(OptionList).option_count == 1
+        assert app.screen.shown == ["ATTITUDE.yawspeed"]
         await pilot.press("enter")
         assert "ATTITUDE.yawspeed" in app.plot_fields.names
         await pilot.press("enter")
@@ -131,10 +132,42 @@ def test_field_is_found_added_and_removed():
     drive(story)
 
 
+def test_field_list_reads_the_values_of_the_visible_names_only(monkeypatch):
+    read = []
+
+    async def story(pilot, app, _screen):
+        for number in range(200):
+            named = mavlink.MAVLink_named_value_float_message(0, f"v{number}".encode(), 0.0)
+            app.feed.history.record(received(named), END_S)
+        await pilot.press("enter")
+        await pilot.pause()
+        names = len(app.screen.shown)
+        monkeypatch.setattr("gcs_cli.tui.plot.fields.value_note", lambda *_: read.append(1) or "")
+        await pilot.press(*"va", "backspace", "pagedown")
+        await pilot.pause()
+        assert names > 10 * 15
+        assert 0 < len(read) <= 4 * 24
+
+    drive(story)
+
+
+def test_click_on_a_name_adds_it():
+    async def story(pilot, app, _screen):
+        await pilot.press("enter")
+        await pilot.pause()
+        await pilot.press(*"yawsp")
+        await pilot.pause()
+        await pilot.click(RowList)
+        await pilot.pause()
+        assert "ATTITUDE.yawspeed" in app.plot_fields.names
+
+    drive(story)
+
+
 def test_more_fields_than_colours_are_refused():
     async def story(pilot, app, screen):
         names = ["ATTITUDE.yaw", "ATTITUDE.rollspeed", "ATTITUDE.pitchspeed", "ATTITUDE.yawspeed"]
-        assert [screen._toggle(name) for name in names] == [None] * 4
+        assert [screen.toggle(name) for name in names] == [None] * 4
         await pilot.press("enter")
         await pilot.pause()
         app.screen.query_one(Input).value = "throttle"

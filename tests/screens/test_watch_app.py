@@ -7,14 +7,12 @@ import time
 
 import pytest
 import textual._time
-from textual.color import Color
 from textual.pilot import Pilot
 
 from flightstack.core.enums import Severity
 from gcs_cli.tui.app import REDRAWS_HZ, WatchApp
 from gcs_cli.tui.feed import Notice
 from gcs_cli.tui.orders.orders import ORDERS
-from gcs_cli.tui.palette import DARK, LIGHT
 from gcs_cli.tui.screens import SCREENS, ScreenEntry
 from gcs_cli.vehicle.view_types import Identity, VehicleView
 from tests.support.pictures import check_picture
@@ -267,53 +265,6 @@ def test_keys_of_orders_and_screens_are_unique() -> None:
     keys = [order.key for order in ORDERS] + [entry.key for entry in SCREENS]
     assert len(keys) == len(set(keys))
     assert all(order.key.isupper() for order in ORDERS)
-
-
-def test_a_theme_changes_the_colours_of_drawings() -> None:
-    async def story(app: WatchApp, pilot: Pilot) -> None:
-        dark = app.palette
-        app.theme = "gcs-light"
-        await pilot.pause()
-        assert app.palette.background != dark.background
-        app.theme = "nord"
-        await pilot.pause()
-        assert app.palette.text.startswith("#")
-
-    play(story)
-
-
-def test_background_of_a_drawing_follows_the_theme() -> None:
-    async def story(app: WatchApp, pilot: Pilot) -> None:
-        backgrounds = []
-        for theme in ("gcs-dark", "gcs-light"):
-            app.theme = theme
-            await pilot.pause()
-            app.redraws = 0
-            app.redraw()
-            await pilot.pause()
-            [segment, *_] = app.screen.query_one("#position").render_line(0)
-            backgrounds.append(segment.style.bgcolor.name)
-        assert backgrounds == [palette.background for palette in (DARK, LIGHT)]
-
-    play(story)
-
-
-@pytest.mark.parametrize("theme", ["gcs-dark", "gcs-light"])
-def test_without_colour_warnings_and_the_horizon_differ_by_brightness(
-    theme: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("NO_COLOR", "1")
-
-    async def story(app: WatchApp, pilot: Pilot) -> None:
-        app.theme = theme
-        await pilot.pause()
-        colours = app.palette
-        grey = {name: Color.parse(colour).monochrome.r for name, colour in colours._asdict().items()}
-        contrast = {name: abs(value - grey["background"]) for name, value in grey.items()}
-        assert contrast["bad"] == contrast["warning"] >= contrast["text"] > contrast["muted"]
-        assert grey["sky"] - grey["ground"] > 30  # measured: 36 and more
-
-    play(story)
 
 
 def test_vehicles_are_listed_selected_and_commanded_together() -> None:

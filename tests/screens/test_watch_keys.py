@@ -10,8 +10,7 @@ from textual.pilot import Pilot
 from textual.widgets import Input
 
 from gcs_cli.tui.app import WatchApp
-from gcs_cli.tui.orders.confirm import Confirm
-from gcs_cli.tui.orders.form import OrderForm
+from gcs_cli.tui.orders.form import Confirm, OrderForm
 from tests.support.pilots import type_ahead
 from tests.support.screens import shown
 from tests.support.watch_plays import GROUNDED, asked, play

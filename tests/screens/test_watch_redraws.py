@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import pytest
 from rich.text import Text
+from textual.geometry import Region
 from textual.pilot import Pilot
 from textual.screen import Screen
+from textual.strip import Strip
+from textual.widget import Widget
 
 from gcs_cli.tui.app import REDRAWS_HZ, WatchApp
+from gcs_cli.tui.key_bar import KeyBar
 from gcs_cli.tui.screens import SCREENS, ScreenEntry
+from gcs_cli.tui.widgets.drawing import KeepsLines
 from gcs_cli.tui.widgets.line_list import LineList
 from gcs_cli.vehicle.view_types import Vector
 from tests.support.watch_plays import play
@@ -59,3 +64,28 @@ def test_list_draws_only_changed_lines_again(monkeypatch: pytest.MonkeyPatch) ->
         assert drawn == [4]
 
     play(story, size=(80, 24))
+
+
+@pytest.mark.parametrize("entry", SCREENS, ids=lambda entry: entry.mode)
+def test_redraw_renders_only_widgets_that_changed(
+    entry: ScreenEntry, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Textual asks all widgets between the first and the last changed line of the screen."""
+    rendered: list[Widget] = []
+    render_lines = Widget.render_lines
+
+    def count(widget: Widget, crop: Region) -> list[Strip]:
+        rendered.append(widget)
+        return render_lines(widget, crop)
+
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await pilot.press(entry.key)
+        await pilot.pause(4 / REDRAWS_HZ)
+        monkeypatch.setattr(Widget, "render_lines", count)
+        top, bottom = app.screen.query_one("#status"), app.screen.query_one(KeyBar)
+        top.refresh()
+        bottom.refresh()
+        await pilot.pause()
+        assert {widget for widget in rendered if isinstance(widget, KeepsLines)} == {top, bottom}
+
+    play(story, size=(120, 35))

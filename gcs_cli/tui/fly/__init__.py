@@ -1,1 +1,1 @@
-"""The screen Fly: the state of the vehicle at one look."""
+"""The screen Fly: the state of the vehicle on one page."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from gcs_cli.charts.runs import Run, Runs
+from gcs_cli.charts.canvas import Run, Runs
 from gcs_cli.tui.fly.horizon import heading_tape, horizon
 from gcs_cli.tui.fly.panels import ground_speed, height_m
 from gcs_cli.tui.palette import Palette
-from gcs_cli.vehicle.numbers import UNKNOWN
+from gcs_cli.vehicle.field_units import UNKNOWN
 from gcs_cli.vehicle.view_types import Euler, VehicleView
 
 _TAPE = 8

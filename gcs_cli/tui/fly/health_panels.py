@@ -9,7 +9,7 @@ from rich.text import Text
 from flightstack.core.enums import Severity
 from gcs_cli.tui.fly.panels import row_of
 from gcs_cli.tui.palette import Palette
-from gcs_cli.vehicle.numbers import UNKNOWN, number
+from gcs_cli.vehicle.field_units import UNKNOWN, number
 from gcs_cli.vehicle.view_types import VehicleView
 
 _DOUBTFUL_RATIO = 0.5

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from rich.style import Style
 
-from gcs_cli.charts.runs import Run, Runs
+from gcs_cli.charts.canvas import Run, Runs
 from gcs_cli.tui.palette import DARK, Palette
 from gcs_cli.vehicle.view_types import Euler
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from rich.text import Text
 
 from gcs_cli.tui.palette import DARK, Palette
-from gcs_cli.vehicle.numbers import UNKNOWN, number
+from gcs_cli.vehicle.field_units import UNKNOWN, number
 from gcs_cli.vehicle.view_types import Setpoint, StatusText, Vector, VehicleView
 
 SEVERITIES = ("EMERG", "ALERT", "CRIT", "ERROR", "WARN", "NOTE", "INFO", "DEBUG")

@@ -1,4 +1,7 @@
-"""The screen Fly: attitude, position, power, health, mission, loop timing and the newest messages."""
+"""The screen Fly: attitude, position, power, health, mission, loop timing and the newest messages.
+
+A module of its own, as each screen.
+"""
 
 from __future__ import annotations
 

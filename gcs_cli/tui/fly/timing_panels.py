@@ -6,7 +6,7 @@ from rich.text import Text
 
 from gcs_cli.tui.fly.panels import bar
 from gcs_cli.tui.palette import Palette
-from gcs_cli.vehicle.numbers import UNKNOWN, number
+from gcs_cli.vehicle.field_units import UNKNOWN, number
 from gcs_cli.vehicle.view_types import LoopTiming, VehicleView
 
 

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from gcs_cli.tui.fly.history import Series
 from gcs_cli.tui.palette import Palette
-from gcs_cli.vehicle.numbers import number
+from gcs_cli.vehicle.field_units import number
 
 WINDOW_S = 120.0
 _BLOCKS = " ▁▂▃▄▅▆▇█"

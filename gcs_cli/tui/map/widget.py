@@ -9,8 +9,7 @@ from gcs_cli.charts.canvas import DOTS_X, DOTS_Y
 from gcs_cli.tui.map.drawing import draw_map
 from gcs_cli.tui.map.scene import MapScene
 from gcs_cli.tui.map.viewport import Viewport
-from gcs_cli.tui.widgets.canvas_widget import CanvasWidget
-from gcs_cli.tui.widgets.drawing import watch_app
+from gcs_cli.tui.widgets.drawing import CanvasWidget, watch_app
 
 _PAN_SHARE = 0.1
 _ZOOM_STEP = 2.0**0.5

@@ -25,8 +25,7 @@ from gcs_cli.tui.orders.orders import Field, Order
 from gcs_cli.tui.plot.fields import MOST_FIELDS
 from gcs_cli.tui.watch_screen import WatchScreen
 from gcs_cli.tui.widgets.drawing import LineWidget, watch_app
-from gcs_cli.tui.widgets.line_list import LineList
-from gcs_cli.tui.widgets.search_field import SearchField
+from gcs_cli.tui.widgets.line_list import LineList, SearchField
 from gcs_cli.vehicle.view_types import VehicleView
 
 _EVERY = 2

@@ -16,7 +16,7 @@ from gcs_cli.tui.messages.message_log import ENTRIES_KEPT, Entry, selected
 from gcs_cli.tui.palette import Palette
 from gcs_cli.tui.watch_screen import WatchScreen
 from gcs_cli.tui.widgets.drawing import LineWidget, watch_app
-from gcs_cli.tui.widgets.search_field import SearchField
+from gcs_cli.tui.widgets.line_list import SearchField
 from gcs_cli.vehicle.view_types import VehicleView
 
 LEVELS = (

@@ -24,7 +24,7 @@ _WIDEST = 130
 
 
 class Progress(NamedTuple):
-    """Where the vehicle is in the mission; None if unknown or not in flight."""
+    """Current item of the vehicle's mission; None if unknown or not in flight."""
 
     current: int | None = None
     reached: int | None = None

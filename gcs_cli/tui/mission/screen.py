@@ -55,6 +55,7 @@ class Comparison(NamedTuple):
 class MissionScreen(JobScreen):
     """The list follows the vehicle's mission until it is edited; then it stays until it is uploaded or dropped."""
 
+    DRAWN: ClassVar = "RowList"
     BINDINGS: ClassVar = [
         Binding("enter,e", "edit", "Edit", key_display="⏎"),
         Binding("a", "add", "Add"),
@@ -104,8 +105,6 @@ class MissionScreen(JobScreen):
     def show(self, view: VehicleView, now_s: float) -> None:
         """Download the plans if they changed on the vehicle; draw the list and the progress."""
         super().show(view, now_s)
-        if not self.query(RowList):  # resumed before it was composed
-            return
         app = watch_app(self)
         system_id = None if view.identity is None else view.identity.system_id
         streams = app.feed.history.streams(system_id)

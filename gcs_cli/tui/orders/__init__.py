@@ -1,1 +1,1 @@
-"""What the user orders the vehicle to do: values, question, and the choice of the vehicle."""
+"""Commands of the user in the terminal view: values, confirmation, and the choice of the vehicle."""

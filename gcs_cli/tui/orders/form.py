@@ -1,4 +1,4 @@
-"""A form over a screen: the values of an order."""
+"""Questions and forms over a screen: a confirmation, and the values of an order."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import Any, ClassVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Vertical
+from textual.containers import Horizontal, Vertical
 from textual.screen import ModalScreen
 from textual.suggester import SuggestFromList
-from textual.widgets import Input, Label
+from textual.widgets import Button, Input, Label
 
 from gcs_cli.tui.orders.orders import Field, FieldError, Order
 from gcs_cli.vehicle.view_types import VehicleView
@@ -54,7 +54,7 @@ class OrderForm(ModalScreen[list[Any] | None]):
         self.set_focus(self.query(Input).first())
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
-        """Go to the next field; after the last one end with the values, or show what is wrong."""
+        """Go to the next field; after the last one end with the values, or show the error."""
         inputs = list(self.query(Input))
         if event.input is not inputs[-1]:
             self.focus_next()
@@ -83,3 +83,45 @@ def _title(field: Field, view: VehicleView) -> str:
     if field.is_optional(view):
         parts.append(f"(empty: {field.omitted})" if field.omitted else "(optional)")
     return " ".join(parts)
+
+
+class Confirm(ModalScreen[bool]):
+    """Asks ``question``; the result is True if the user agrees. Without an answer nothing is sent."""
+
+    DEFAULT_CSS = """
+    Confirm { align: center middle; }
+    Confirm > Vertical { width: auto; max-width: 90%; height: auto; border: round $warning; padding: 1 2;
+                         background: $surface; }
+    Confirm Label { width: auto; max-width: 100%; margin-bottom: 1; }
+    Confirm Horizontal { width: auto; height: auto; }
+    Confirm Button { margin-right: 2; }
+    """
+    BINDINGS: ClassVar = [
+        Binding("y", "answer(True)", "Yes"),
+        Binding("n,escape", "answer(False)", "No"),
+        Binding("left,right", "app.focus_next", show=False),
+    ]
+
+    def __init__(self, question: str, yes: str) -> None:
+        super().__init__()
+        self._question, self._yes = question, yes
+
+    def compose(self) -> ComposeResult:
+        """Yield the question and the buttons."""
+        with Vertical():
+            yield Label(self._question, markup=False)
+            with Horizontal():
+                yield Button(f"{self._yes} (y)", variant="warning", id="yes")
+                yield Button("Cancel (n)", id="no")
+
+    def on_mount(self) -> None:
+        """Select the harmless answer."""
+        self.set_focus(self.query_one("#no"))
+
+    def on_button_pressed(self, event: Button.Pressed) -> None:
+        """End with the answer."""
+        self.dismiss(event.button.id == "yes")
+
+    def action_answer(self, yes: bool) -> None:
+        """End with the answer."""
+        self.dismiss(yes)

@@ -1,4 +1,4 @@
-"""What a user can ask of a vehicle in the terminal view: key, title, values, question, action. Pure."""
+"""Commands to a vehicle in the terminal view: key, title, values, confirmation, action. Pure."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Field(NamedTuple):
     is_optional: Callable[[VehicleView], bool] = lambda _view: False
     """True if this vehicle does not need the value."""
     omitted: str = ""
-    """What the vehicle uses instead of an omitted value."""
+    """Value that the vehicle uses if this one is omitted."""
     choices: Callable[[VehicleView], Sequence[str]] | None = None
     """The valid words; None: a number."""
 

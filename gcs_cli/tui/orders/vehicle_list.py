@@ -11,7 +11,7 @@ from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
 from gcs_cli.tui.fly.panels import height_m
-from gcs_cli.vehicle.numbers import UNKNOWN, number
+from gcs_cli.vehicle.field_units import UNKNOWN, number
 from gcs_cli.vehicle.view_types import VehicleView
 
 ALL = 0

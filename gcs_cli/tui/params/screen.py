@@ -31,8 +31,8 @@ from gcs_cli.tui.params.model import (
 from gcs_cli.tui.widgets.drawing import LineWidget, watch_app
 from gcs_cli.tui.widgets.entry_form import Entry, EntryForm
 from gcs_cli.tui.widgets.job_screen import JobScreen, some_of
+from gcs_cli.tui.widgets.line_list import SearchField
 from gcs_cli.tui.widgets.row_list import RowList, title_text
-from gcs_cli.tui.widgets.search_field import SearchField
 from gcs_cli.vehicle.param_info import (
     UNKNOWN,
     ParamInfo,
@@ -47,6 +47,7 @@ from gcs_cli.vehicle.view_types import VehicleView
 class ParamScreen(JobScreen):
     """The parameters are downloaded when the screen is first shown, and again with ``u``."""
 
+    DRAWN: ClassVar = "RowList"
     BINDINGS: ClassVar = [
         Binding("slash", "search", "Search"),
         Binding("c", "changed_only", "Changed only"),
@@ -63,6 +64,8 @@ class ParamScreen(JobScreen):
         super().__init__(mode)
         self._params = ParamList()
         self._references: Mapping[str, ParamInfo] = {}
+        self._changes = 0
+        """Number of parameters that differ from their reference."""
         self.names_shown: list[str] = []
         self._changed_only = False
         self._system_id: int | None = None
@@ -96,8 +99,6 @@ class ParamScreen(JobScreen):
     def show(self, view: VehicleView, now_s: float) -> None:
         """Download the parameters of a new vehicle; show the progress."""
         super().show(view, now_s)
-        if not self.query(RowList):  # resumed before it was composed
-            return
         system_id = None if view.identity is None else view.identity.system_id
         if system_id is not None and system_id != self._system_id and not self.is_working:
             self._system_id = system_id
@@ -125,15 +126,14 @@ class ParamScreen(JobScreen):
             left.append(", changed only" if self._changed_only else "", colours.warning)
         what = "in the file" if params.file is None else f"other than in {params.file_name}"
         what = "not at the default" if params.file is None else what
-        count = len(params.changed()) if params.parameters else 0
-        right = Text(f"{count} {what}" if count else "", colours.warning)
+        right = Text(f"{self._changes} {what}" if self._changes else "", colours.warning)
         self.show_line("param-state", left, right)
 
     # -- the table
 
     def _take(self, params: ParamList) -> None:
         """Show new parameters; the cursor stays at its parameter."""
-        self._params, self._references = params, params.references
+        self._params, self._references, self._changes = params, params.references, len(params.changed())
         self._filter()
         self.refresh_bindings()
 

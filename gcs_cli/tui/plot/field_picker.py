@@ -2,28 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import ClassVar, NamedTuple
 
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
+from textual.events import Click
 from textual.screen import ModalScreen
-from textual.widgets import Input, Label, OptionList
-from textual.widgets.option_list import Option
+from textual.widgets import Input, Label
 
 from gcs_cli.tui.widgets.fuzzy import Match, search
-
-_MOST_SHOWN = 200
+from gcs_cli.tui.widgets.row_list import RowList
 
 
 class Choice(NamedTuple):
-    """A name that can be chosen, what is said beside it, and the colour of its mark if it is chosen."""
+    """A name that can be chosen, the text beside it, and the colour of its mark if it is chosen.
+
+    ``note`` is called for the visible names only: a link has more than a thousand fields.
+    """
 
     name: str
-    note: str = ""
+    note: Callable[[], str]
     colour: str | None = None
+
+
+class _Names(RowList, can_focus=False):
+    """The found names; the keys go to the input, so the cursor is drawn as if the list had the focus."""
+
+    @property
+    def is_lit(self) -> bool:
+        """Always true."""
+        return True
+
+    def on_click(self, event: Click) -> None:
+        """Choose the name under the mouse."""
+        index = self.scroll_offset.y + event.y
+        event.prevent_default()
+        if index < self.count:
+            self.select(index)
+            self.post_message(self.Chosen())
 
 
 class FieldPicker(ModalScreen[None]):
@@ -35,7 +54,7 @@ class FieldPicker(ModalScreen[None]):
     DEFAULT_CSS = """
     FieldPicker { align: center middle; }
     FieldPicker > Vertical { width: 80%; max-width: 90; height: 80%; border: round $accent; background: $surface; }
-    FieldPicker OptionList { height: 1fr; border: none; background: $surface; }
+    FieldPicker RowList { background: $surface; }
     FieldPicker Label { color: $foreground 60%; }
     """
     BINDINGS: ClassVar = [
@@ -51,58 +70,76 @@ class FieldPicker(ModalScreen[None]):
     ) -> None:
         super().__init__()
         self._title, self._choices, self._toggle = title, choices, toggle
-        self._shown: list[str] = []
+        self._known: dict[str, Choice] = {}
+        self._query = ""
+        self._found: list[Match] = []
 
     def compose(self) -> ComposeResult:
         """Yield the input, the list and a line of help."""
         with Vertical() as box:
             box.border_title = self._title
             yield Input(placeholder="letters of the name, in order")
-            yield OptionList(markup=False)
+            yield _Names()
             yield Label("Enter adds or removes, Escape closes", markup=False)
 
     def on_mount(self) -> None:
         """Show all names."""
-        self.query_one(OptionList).can_focus = False
         self.set_focus(self.query_one(Input))
-        self._search("")
+        self._load()
+
+    @property
+    def shown(self) -> list[str]:
+        """The names that match, best first."""
+        return [match.name for match in self._found]
 
     def on_input_changed(self, event: Input.Changed) -> None:
         """Show the names that match."""
-        self._search(event.value)
+        before, self._query = self._query, event.value
+        among = self.shown if self._query.startswith(before) else self._known
+        self._search(among)
+        self.query_one(_Names).select(0)
 
     def on_input_submitted(self) -> None:
         """Toggle the selected name."""
-        index = self.query_one(OptionList).highlighted
-        if index is not None:
-            self._choose(index)
+        self._choose()
 
-    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+    def on_row_list_chosen(self) -> None:
         """Toggle the name that was clicked."""
-        self._choose(event.option_index)
+        self._choose()
+
+    def on_resize(self) -> None:
+        """Draw the rows in the new width."""
+        self.call_after_refresh(self._draw)
 
     def action_move(self, steps: int) -> None:
         """Move the selection."""
-        options = self.query_one(OptionList)
-        if self._shown:
-            options.highlighted = max(0, min(len(self._shown) - 1, (options.highlighted or 0) + steps))
+        if self._found:
+            self.query_one(_Names).action_move(steps)
 
-    def _choose(self, index: int) -> None:
-        reason = self._toggle(self._shown[index])
+    def _choose(self) -> None:
+        if not self._found:
+            return
+        reason = self._toggle(self._found[self.query_one(_Names).cursor].name)
         if reason:
             self.notify(reason, severity="warning")
-        self._search(self.query_one(Input).value, index)
+        self._load()
 
-    def _search(self, query: str, highlighted: int = 0) -> None:
-        choices = {choice.name: choice for choice in self._choices()}
-        matches = search(query, choices)[:_MOST_SHOWN]
-        self._shown = [match.name for match in matches]
-        options = self.query_one(OptionList)
-        options.clear_options()
-        width = max(map(len, self._shown), default=0)
-        options.add_options([Option(_line(match, choices[match.name], width)) for match in matches])
-        if matches:
-            options.highlighted = min(highlighted, len(matches) - 1)
+    def _load(self) -> None:
+        self._known = {choice.name: choice for choice in self._choices()}
+        self._search(self._known)
+
+    def _search(self, among: Iterable[str]) -> None:
+        self._found = search(self._query, among)
+        self._draw()
+
+    def _draw(self) -> None:
+        names = max((len(match.name) for match in self._found), default=0)
+
+        def row(index: int, _width: int) -> Text:
+            match = self._found[index]
+            return _line(match, self._known[match.name], names)
+
+        self.query_one(_Names).show_rows(len(self._found), row)
 
 
 def _line(match: Match, choice: Choice, width: int) -> Text:
@@ -112,4 +149,4 @@ def _line(match: Match, choice: Choice, width: int) -> Text:
         name.stylize("bold underline", position, position + 1)
     line.append_text(name)
     line.append(" " * (width - len(match.name) + 2))
-    return line.append(choice.note, "dim")
+    return line.append(choice.note(), "dim")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from flightstack.mavlink.link import Message
@@ -74,16 +76,22 @@ def value_note(message: Message, field: str) -> str:
     return f"{value_text(float(shown))} {shown_unit(unit)[1]}"
 
 
+def _last_note(stream: Stream, field: str) -> str:
+    return value_note(stream.last, field)
+
+
 def field_choices(history: History, system_id: int | None, fields: PlotFields) -> list[Choice]:
-    """Return all fields that were received, the plotted ones first, with their last values."""
+    """Return all fields that were received, with their last values, then the plotted ones that were not."""
     choices = []
     for stream in history.streams(system_id):
         for field in stream.fields:
             name = f"{stream.name}.{field}"
-            note = value_note(stream.last, field)
+            note = partial(_last_note, stream, field)
             choices.append(Choice(name, note, fields.colour(name)))
     received = {choice.name for choice in choices}
     choices += [
-        Choice(name, "not received", fields.colour(name)) for name in fields.names if name not in received
+        Choice(name, lambda: "not received", fields.colour(name))
+        for name in fields.names
+        if name not in received
     ]
     return choices

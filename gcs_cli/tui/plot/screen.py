@@ -14,8 +14,7 @@ from gcs_cli.tui.plot.drawing import Curve, Span, cell_time, draw_plot, gutter_o
 from gcs_cli.tui.plot.field_picker import Choice, FieldPicker
 from gcs_cli.tui.plot.fields import MOST_FIELDS, PlotFields, field_choices
 from gcs_cli.tui.watch_screen import WatchScreen
-from gcs_cli.tui.widgets.canvas_widget import CanvasWidget
-from gcs_cli.tui.widgets.drawing import watch_app
+from gcs_cli.tui.widgets.drawing import CanvasWidget, watch_app
 from gcs_cli.vehicle.view_types import VehicleView
 
 _SPANS_S = (5.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0)
@@ -176,14 +175,15 @@ class PlotScreen(WatchScreen):
 
     def action_pick(self) -> None:
         """Open the list of fields."""
-        self.app.push_screen(FieldPicker("Plot", self._choices, self._toggle))
+        self.app.push_screen(FieldPicker("Plot", self._choices, self.toggle))
 
     def _choices(self) -> list[Choice]:
         feed = watch_app(self).feed
         identity = feed.view.identity
         return field_choices(feed.history, None if identity is None else identity.system_id, self.fields)
 
-    def _toggle(self, name: str) -> str | None:
+    def toggle(self, name: str) -> str | None:
+        """Plot a field, or remove it from the plot; return why it cannot be added, or None."""
         reason = None
         if self.fields.colour(name):
             self.fields.remove(name)

@@ -16,18 +16,46 @@ from textual.geometry import Region
 from textual.strip import Strip
 from textual.widget import Widget
 
-from gcs_cli.charts.runs import Runs
+from gcs_cli.charts.canvas import Runs
 from gcs_cli.tui.palette import Palette
 from gcs_cli.vehicle.view_types import VehicleView
 
 if TYPE_CHECKING:
     from gcs_cli.tui.app import WatchApp
 
+
+from gcs_cli.charts.canvas import Canvas
+
 Draw: TypeAlias = Callable[[VehicleView, float, int, int, Palette], Sequence[Text | Runs]]
 """Draws a vehicle's state as of a time [s] in a number of columns and rows."""
 
 
-class LinesWidget(Widget):
+class KeepsLines(Widget):
+    """Renders its lines again only after a change of itself.
+
+    Textual asks every widget between the first and the last changed line of the screen for all of its lines. What it
+    computes for them, such as the background, takes longer than most drawings.
+    """
+
+    _kept: tuple[Region, list[Strip]] | None = None
+
+    def render_lines(self, crop: Region) -> list[Strip]:
+        """Return the lines in ``crop``."""
+        if self._kept is None or self._kept[0] != crop:
+            self._kept = (crop, super().render_lines(crop))
+        return self._kept[1]
+
+    def notify_style_update(self) -> None:
+        """Render in the new style."""
+        self._kept = None
+        super().notify_style_update()
+
+    def _set_dirty(self, *regions: Region) -> None:
+        self._kept = None
+        super()._set_dirty(*regions)
+
+
+class LinesWidget(KeepsLines):
     """Shows lines in the colours of the palette; a line is sent to the terminal only if it changed."""
 
     ALLOW_SELECT = False
@@ -147,3 +175,13 @@ def _combined(base: Style, *styles: str | Style) -> Style:
 def watch_app(node: Widget) -> WatchApp:
     """Return the application of a widget."""
     return cast("WatchApp", node.app)
+
+
+class CanvasWidget(LinesWidget):
+    """Shows the canvas given to ``draw``; only rows that changed are drawn again."""
+
+    DEFAULT_CSS = "CanvasWidget { width: 1fr; height: 1fr; }"
+
+    def draw(self, canvas: Canvas) -> None:
+        """Show ``canvas``."""
+        self.show_lines(canvas.rows())

@@ -26,6 +26,7 @@ def search(query: str, names: Iterable[str]) -> list[Match]:
     return sorted(matches, key=lambda match: (-match.score, match.name))
 
 
+@lru_cache(maxsize=8192)
 def _match(words: tuple[str, ...], name: str) -> Match | None:
     lower, score, positions = name.lower(), 0.0, set[int]()
     for word in words:

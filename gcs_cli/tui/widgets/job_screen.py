@@ -13,7 +13,7 @@ from flightstack.core.enums import Severity
 from flightstack.core.errors import ConfigError
 from gcs_cli.errors import CliError
 from gcs_cli.link.connection import Connection
-from gcs_cli.tui.orders.confirm import Confirm
+from gcs_cli.tui.orders.form import Confirm
 from gcs_cli.tui.watch_screen import WatchScreen
 from gcs_cli.tui.widgets.drawing import LineWidget, watch_app
 from gcs_cli.tui.widgets.entry_form import Entry, EntryForm, PathSuggester

@@ -1,4 +1,4 @@
-"""A list of lines with a cursor, of which only the visible part is drawn."""
+"""A list of lines, and the field at the foot of a screen that searches it."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from textual.geometry import Size
 from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
+from textual.widgets import Input
 
 from gcs_cli.tui.widgets.drawing import palette_filters, strip_of, watch_app
 
@@ -84,3 +85,23 @@ class LineList(ScrollView):
             cursor = Style(color=colours.background, bgcolor=colours.accent)
             return Strip([Segment(self._texts[index].plain, cursor)]).adjust_cell_length(width, cursor)
         return strip_of(self._texts[index], style).adjust_cell_length(width, style)
+
+
+class SearchField(Input):
+    """An input that its screen opens and closes."""
+
+    DEFAULT_CSS = "SearchField { dock: bottom; height: 1; }"
+
+    def __init__(self, placeholder: str, *, id: str) -> None:
+        super().__init__(placeholder=placeholder, id=id, compact=True)
+        self.display = False
+
+    def open(self) -> None:
+        """Show the field, and type into it."""
+        self.display = True
+        self.screen.set_focus(self)
+
+    def close(self) -> None:
+        """Clear and hide the field."""
+        self.value = ""
+        self.display = False

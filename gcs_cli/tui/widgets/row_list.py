@@ -95,6 +95,11 @@ class RowList(ScrollView, can_focus=True):
         self._texts: dict[int, Text] = {}
         """The rows that were drawn, by index."""
 
+    @property
+    def is_lit(self) -> bool:
+        """True if the cursor is drawn in the accent's colour."""
+        return self.has_focus
+
     def show_rows(self, count: int, draw: DrawRow) -> None:
         """Show the rows 0 to ``count`` - 1; the cursor keeps its row."""
         self._draw = draw
@@ -146,7 +151,7 @@ class RowList(ScrollView, can_focus=True):
             row = self._texts[index] = self._draw(index, width)
         if index == self.cursor:
             colours = watch_app(self).palette
-            if self.has_focus:
+            if self.is_lit:
                 chosen = f"bold {colours.background} on {colours.accent}"
                 return strip_of(Text(row.plain.ljust(width), chosen), base).crop(0, width)
             row = row.copy()

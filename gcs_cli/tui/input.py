@@ -1,4 +1,4 @@
-"""Keys, pasted texts and mouse events of the user, handled one after the other."""
+"""Input of the user: the driver of the terminal, and the queue that handles one event after the other."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from typing import Any, TypeAlias
 
 from textual.app import App
 from textual.dom import DOMNode
+from textual.drivers.linux_driver import LinuxDriver
 from textual.events import InputEvent, Key, MouseUp, Paste
 
-from gcs_cli.tui.orders.confirm import Confirm
+from gcs_cli.tui.orders.form import Confirm
 
 _ROUNDS = 2
 """A key is handled in the first round; a message of the widget, such as the end of an input, in the second."""
@@ -46,14 +47,21 @@ class KeyQueue:
     async def run(self) -> None:
         """Handle events until cancelled."""
         while True:
-            event, seen = await self._events.get()
-            screen = self._app.screen if self._app.screen_stack else None
-            if isinstance(screen, Confirm) and screen is not seen:
-                continue
-            await self._handle(event)
-            if isinstance(event, Key | Paste | MouseUp):
-                for _ in range(_ROUNDS):
-                    await self._settle()
+            await self._take(*await self._events.get())
+            self._events.task_done()
+
+    async def handled(self) -> None:
+        """Wait until each event so far has had its effect."""
+        await self._events.join()
+
+    async def _take(self, event: UserEvent, seen: DOMNode | None) -> None:
+        screen = self._app.screen if self._app.screen_stack else None
+        if isinstance(screen, Confirm) and screen is not seen:
+            return
+        await self._handle(event)
+        if isinstance(event, Key | Paste | MouseUp):
+            for _ in range(_ROUNDS):
+                await self._settle()
 
     async def _settle(self) -> None:
         """Wait until the focused widget, those around it and the application have handled their messages."""
@@ -66,3 +74,17 @@ class KeyQueue:
                         await asyncio.wait_for(handled.wait(), _CHECK_S)
             node = node.parent if isinstance(node.parent, DOMNode) else None
         await asyncio.sleep(0)  # an action that asks begins as a task
+
+
+class TerminalDriver(LinuxDriver):
+    """Leaves the application mode before it enters it again.
+
+    SIGSTOP and a stop by the shell call no handler. Textual starts a second thread that reads the keys when the process
+    continues, and the end of the program waits for the first one until another key is pressed.
+    """
+
+    def _sigcont_application(self, *arguments: object) -> None:
+        if self._auto_restart and not self._must_signal_resume:
+            self.suspend_application_mode()
+            self._must_signal_resume = True
+        super()._sigcont_application(*arguments)
