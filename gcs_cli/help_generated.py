@@ -36,7 +36,8 @@ Commands:
   fly        Fly a mission in simulation and write log, summary and report.
   sim        Simulate one or several vehicles for any MAVLink client.
   paper      Fly every experiment of the paper and report the results.
-  test       Fly scenario files and judge the flights.
+  test       Fly scenario files and check the flights.
+  campaign   Fly a scenario many times with varied inputs.
   arm        Arm the vehicle.
   disarm     Disarm the vehicle.
   takeoff    Take off; arm first if disarmed.

@@ -1,4 +1,4 @@
-"""Lines of a command's result: sentences for people, or JSON objects for programs, one a line."""
+"""Output of a command: sentences or JSON lines of its result, and the sentence and exit code of its end."""
 
 from __future__ import annotations
 
@@ -6,10 +6,15 @@ import json
 import math
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import typer
+
+from flightstack.core.errors import ConfigError
+from flightstack.process.command_line import UsageError, usage_sentence
+from flightstack.process.console import complain, drop, say
+from gcs_cli.errors import DONE, FAILED, USAGE, CliError
 
 
 class Output:
@@ -50,3 +55,40 @@ def can_draw() -> bool:
     return (
         sys.stdout is not None and sys.stdout.isatty() and os.environ.get("TERM") not in ("dumb", "unknown")
     )
+
+
+_TYPER_INTERRUPTED = 130
+"""Exit code of typer for a KeyboardInterrupt; not one of ours."""
+
+
+def run_command(run: Callable[[], int | None], as_json: bool) -> int:
+    """Run a command; return its exit code. With ``as_json``, an error is also a JSON object on stdout."""
+    try:
+        code = run() or DONE
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        if code != _TYPER_INTERRUPTED:
+            return code
+        sentence, code = "interrupted", FAILED
+    except (KeyboardInterrupt, typer.Abort):
+        sentence, code = "interrupted", FAILED
+    except (BrokenPipeError, SystemExit):  # `gcs watch | head`, which typer ends itself
+        drop(sys.stdout)
+        return DONE
+    except OSError as error:
+        drop(sys.stdout)  # which may be what failed
+        where = "" if error.filename is None else f"{error.filename}: "
+        sentence, code = f"{where}{error.strerror or error}", FAILED
+    except UsageError as error:
+        if type(error).__name__ == "NoArgsIsHelpError":  # `gcs` and `gcs mission`: its message is the help
+            complain(error.format_message())
+            return USAGE
+        sentence, code = usage_sentence(error), USAGE
+    except CliError as error:
+        sentence, code = str(error), error.exit_code
+    except ConfigError as error:
+        sentence, code = str(error), USAGE
+    complain(f"gcs: {sentence}")
+    if as_json:
+        say(error_line(sentence, code))
+    return code

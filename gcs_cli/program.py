@@ -9,7 +9,7 @@ import typer
 from flightstack.process.command_line import Version, expand_options, make_app
 from flightstack.process.console import replace_unencodable
 from gcs_cli.commands.registry import GcsGroup, add_groups
-from gcs_cli.ending import run_command
+from gcs_cli.output import run_command
 from gcs_cli.settings import LinkOptions, Settings, SigningKeyOption, given_options, settings_of
 
 app = make_app(

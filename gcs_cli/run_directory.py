@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from flightstack.firmware.pil_record import LINK_FILE, STEPS_FILE
+from flightstack.firmware.pil.record import LINK_FILE, STEPS_FILE
 from gcs_cli.errors import USAGE, CliError
 
 RUNS = Path("runs")

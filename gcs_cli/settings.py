@@ -131,7 +131,7 @@ class LinkOptions:
 
     @property
     def timeout_s(self) -> float:
-        """How long to wait for the vehicle [s]."""
+        """Timeout of the wait for the vehicle [s]."""
         return DEFAULT_TIMEOUT_S if self.timeout is None else self.timeout
 
 

@@ -1,14 +1,17 @@
-"""Open the link to the vehicle with the options of a command."""
+"""Open the link to the vehicle with the options of a command, and follow what it sends."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Annotated
 
 import typer
 
 from flightstack.core.port_numbers import api_client_port, tcp_port
 from flightstack.mavlink.signing import LinkSigning
+from flightstack.process.command_line import IN_OUTPUT
 from flightstack.process.console import complain
 from flightstack.process.signing_file import open_shared_signing
 from gcs_cli.errors import USAGE, CliError, PortInUseError
@@ -42,6 +45,22 @@ ArduPilot's simulation listens on TCP.
 
 SHARED_KINDS = (UDP_IN, TCP, TCP_IN, SERIAL)
 """Kinds of links that one process at a time can open."""
+
+LONGEST_S = 1e7
+_STEP_S = 0.1
+
+DurationOption = Annotated[
+    float | None,
+    typer.Option(
+        "--duration",
+        metavar="SECONDS",
+        min=0.0,
+        max=LONGEST_S,
+        help="End after this time.  [default: at Ctrl-C]",
+        show_default=False,
+        **IN_OUTPUT,
+    ),
+]
 
 
 def open_signing(key: Path | None) -> LinkSigning | None:
@@ -125,3 +144,17 @@ def connect_vehicle(
             raise CliError(f"{command_name(context)}: {error}", error.exit_code) from None
         raise
     return connection
+
+
+def follow(connection: Connection, duration_s: float | None, has_ended: Callable[[], bool]) -> None:
+    """Exchange messages until ``has_ended``, for ``duration_s``, to the end of a recording, or until Ctrl-C.
+
+    ``has_ended`` is called after each step.
+    """
+    end_s = math.inf if duration_s is None else connection.now_s + duration_s
+    try:
+        while not has_ended() and connection.now_s < end_s and not connection.ended:
+            connection.step(min(end_s, connection.now_s + _STEP_S))
+        has_ended()
+    except KeyboardInterrupt:
+        return

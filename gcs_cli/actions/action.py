@@ -35,12 +35,16 @@ class Step(NamedTuple):
     """True if a disarm before the effect ends the action."""
     instead: Callable[[int, int], Message] | None = None
     """Message to system and component of the same effect, which has no answer, if the command is not supported."""
+    refusal: str = ""
+    """Reason of a refusal that the vehicle does not explain; empty: its answer is the reason."""
+    advice: str = ""
+    """Follows the reason of a refusal: what else may be the cause, and what to do."""
     restarts: bool = False
     """True if the vehicle restarts: silence does not end the action, and the command is sent once."""
 
 
 class Action(NamedTuple):
-    """What a user asks of a vehicle."""
+    """A user's request to a vehicle."""
 
     name: str
     plan: Callable[[VehicleView], tuple[Step, ...]]
@@ -54,7 +58,7 @@ class Action(NamedTuple):
     needs: Condition | None = None
     """State that ``plan`` needs, for example a position."""
     needs_text: str = ""
-    """Says what is missing if that state does not come."""
+    """Text of the error if that state is not reached."""
     unseen: str = ""
     """Says why an accepted action ends without its effect: "the vehicle does not report its speed limit"."""
 

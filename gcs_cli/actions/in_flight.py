@@ -179,6 +179,15 @@ def _stands(view: VehicleView) -> bool:
     return velocity is not None and math.hypot(*velocity) < STANDING_M_S
 
 
+def _stands_at(view: VehicleView, target: GeoPosition, is_relative: bool) -> bool:
+    """Return True if the vehicle stands at ``target``; a target whose altitude is NaN has any altitude."""
+    if view.geo is None or horizontal_m(view.geo, target) > POSITION_TOLERANCE_M:
+        return False
+    height_m = view.geo.relative_altitude_m if is_relative else view.geo.altitude_m
+    is_off = abs(height_m - target.altitude_m) > ALTITUDE_TOLERANCE_M  # False for NaN
+    return not is_off and _stands(view)
+
+
 def goto(latitude_deg: float, longitude_deg: float, altitude_m: float | None = None) -> Action:
     """Fly to a position and hold there; the altitude is above home, None keeps it."""
 
@@ -195,18 +204,11 @@ def goto(latitude_deg: float, longitude_deg: float, altitude_m: float | None = N
             wanted_m = geo.relative_altitude_m
         target = GeoPosition(latitude_deg, longitude_deg, wanted_m, wanted_m)
 
-        def is_there(view: VehicleView) -> bool:
-            if view.geo is None or horizontal_m(view.geo, target) > POSITION_TOLERANCE_M:
-                return False
-            height_m = view.geo.relative_altitude_m if is_relative else view.geo.altitude_m
-            is_off = abs(height_m - wanted_m) > ALTITUDE_TOLERANCE_M  # False for NaN
-            return not is_off and _stands(view)
-
         return (
             Step(
                 "goto",
                 common_commands.reposition(autopilot.goto_frame, latitude_deg, longitude_deg, wanted_m),
-                is_there,
+                lambda view: _stands_at(view, target, is_relative),
                 "is not at that position",
                 TRAVEL_STILL_S,
                 is_flight=True,
@@ -264,7 +266,10 @@ def speed(speed_m_s: float | None) -> Action:
         wanted = view.autopilot.default_speed if speed_m_s is None else speed_m_s
         if wanted is None:
             raise ActionError(f"{view.autopilot.title} has no command for its default speed: give a speed")
-        return (Step("speed", common_commands.speed(wanted), None),)
+        modes = view.autopilot.speed_modes(view.vehicle_type)
+        is_possible = not modes or view.mode in modes
+        reason = "" if is_possible else f"not possible in mode {view.mode}, only in {', '.join(modes)}"
+        return (Step("speed", common_commands.speed(wanted), None, refusal=reason),)
 
     text = "default speed" if speed_m_s is None else f"speed {speed_m_s:g} m/s"
     facts = {"speed_m_s": speed_m_s}
@@ -284,7 +289,9 @@ def start_mission() -> Action:
             is_active = view.mission.state in (None, MISSION_ACTIVE, MISSION_COMPLETE)
             return view.armed and name in (None, view.mode) and is_active
 
-        end = Step("", common_commands.START_MISSION, runs, "does not fly the mission")
+        end = Step(
+            "", common_commands.START_MISSION, runs, "does not fly the mission", advice=_start_advice(view)
+        )
         return _ending([_phase_step(view, phase, None) for phase in phases], end)
 
     return Action(
@@ -295,3 +302,11 @@ def start_mission() -> Action:
         needs=lambda view: view.mission.current is not None,
         needs_text="the vehicle does not report its mission",
     )
+
+
+def _start_advice(view: VehicleView) -> str:
+    """Return what to do if a vehicle on the ground refuses to start at its current item; empty if that is the first."""
+    mission = view.mission
+    if view.armed or view.can_arm is False or mission.complete or not (mission.current and mission.total):
+        return ""
+    return f"the mission is at {mission.item_text}: `gcs mission jump 0`, then start, flies it from its first item"

@@ -10,6 +10,9 @@ MOVED_M = 1.0
 """Distance from which on the vehicle counts as moving."""
 STALL_S = 30.0
 """Time of the receiver without progress of the vehicle's clock after which that clock counts as stopped."""
+LONGEST_STEP_S = 0.5
+"""Most time between two updates that counts towards a limit: in a longer gap of the telemetry the effect may have
+occurred and its report been lost, so that a limit passes only while the vehicle is heard."""
 _METRES_PER_DEGREE = 111_195.0
 
 
@@ -27,7 +30,10 @@ class EffectTimer:
         self.was_armed = False
         """True once the vehicle was armed during the step."""
         self.disarmed_s = 0.0
-        """Time since it disarmed."""
+        """Time since it disarmed; gaps of the telemetry count for ``LONGEST_STEP_S``."""
+        self.reports_disarmed = 0
+        """Reports of the landed state since it disarmed."""
+        self._waited_s = 0.0
         self._still_s = 0.0
         self._clock_s = view.time_s
         self._clock_moved_s = now_s
@@ -41,11 +47,20 @@ class EffectTimer:
             step_s = self._vehicle_step(view.time_s, step_s, now_s)
         self._clock_s = view.time_s
         self.elapsed_s += step_s
+        step_s = min(step_s, LONGEST_STEP_S)
+        self._waited_s += step_s
         self._still_s += step_s
         self.was_armed |= view.armed
+        if view.armed:
+            self.reports_disarmed = 0
         self.disarmed_s = self.disarmed_s + step_s if self.was_armed and not view.armed else 0.0
         if view.geo is not None and (self._place is None or distance_m(self._place, view.geo) > MOVED_M):
             self._place, self._still_s = view.geo, 0.0
+
+    def take_landed_state(self, view: VehicleView) -> None:
+        """Count a report of the landed state; ``view`` includes it."""
+        if not view.armed:
+            self.reports_disarmed += 1
 
     def _vehicle_step(self, time_s: float, step_s: float, now_s: float) -> float:
         assert self._clock_s is not None
@@ -58,7 +73,7 @@ class EffectTimer:
 
     def is_over(self, limit_s: float, is_flight: bool) -> bool:
         """Return True after ``limit_s``; in a flight, after ``limit_s`` without movement."""
-        return (self._still_s if is_flight else self.elapsed_s) >= limit_s
+        return (self._still_s if is_flight else self._waited_s) >= limit_s
 
 
 def distance_m(one: GeoPosition, other: GeoPosition) -> float:

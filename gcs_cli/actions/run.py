@@ -15,17 +15,19 @@ from gcs_cli.clients.command_client import CommandClient, CommandTiming, Repeate
 from gcs_cli.vehicle.view_types import VehicleView
 
 NEEDS_LIMIT_S = 3.0
-"""How long an action waits for the telemetry that it needs."""
+"""Timeout of the telemetry that an action needs."""
 TEXT_WAIT_S = 0.3
-"""How long to wait for the STATUSTEXT that explains a refusal; it follows the answer."""
+"""Timeout of the STATUSTEXT that explains a refusal; it follows the answer."""
 LANDED_STATE_S = 2.0
-"""How long a disarmed vehicle may report that it is in the air: PX4 sends its landed state once a second."""
+"""Time that a disarmed vehicle may report to be in the air: PX4 sends its landed state once a second."""
+LANDED_STATE_REPORTS = 2
+"""Reports after the disarming that must say so: the last one before it is old, and later ones may be lost."""
 _POLL_S = 0.25
 _MOST_REASONS = 3
 
 
 class Outcome(Enum):
-    """How an action ended."""
+    """Result of an action."""
 
     DONE = "done"
     """The vehicle reports the effect."""
@@ -96,6 +98,8 @@ class ActionRun:
         """Process a message from the vehicle."""
         if self._client is not None:
             self._client.receive(message, now_s)
+        if self._timer is not None and message.get_msgId() == mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE:
+            self._timer.take_landed_state(self._view())
 
     def poll(self, now_s: float) -> list[Message]:
         """Advance the run, and return the messages to send now."""
@@ -211,7 +215,8 @@ class ActionRun:
             self._text_due_s = now_s + TEXT_WAIT_S
         if now_s >= self._text_due_s:
             reason = refusal_reason(view, self._texts_before)
-            self._end(Outcome.REFUSED, f"{self.step.name} refused: {reason or answer}")
+            said = [reason or self.step.refusal or answer, self.step.advice]
+            self._end(Outcome.REFUSED, f"{self.step.name} refused: {'; '.join(filter(None, said))}")
 
     def _await_effect(self, view: VehicleView, now_s: float) -> None:
         step, timer = self.step, self._timer
@@ -223,12 +228,11 @@ class ActionRun:
             self._next_step(view, now_s)
             return
         if step.needs_armed and timer.was_armed and not view.armed:
-            is_in_air = view.on_ground is False
-            if not is_in_air or timer.disarmed_s >= LANDED_STATE_S:
-                where = " in the air" if is_in_air else ""
-                self._end(Outcome.ENDED, f"{self.action.name}: the vehicle disarmed{where}")
-            return
-        if view.mode in step.modes:
+            ended = _disarmed_where(view, timer)
+            if ended is not None:
+                self._end(Outcome.ENDED, f"{self.action.name}: the vehicle {ended}")
+                return
+        elif view.mode in step.modes:
             timer.was_in_mode = True
         elif timer.was_in_mode:
             self._end(Outcome.ENDED, f"{self.action.name}: the vehicle changed to mode {view.mode}")
@@ -252,6 +256,14 @@ class ActionRun:
     def _end(self, outcome: Outcome, sentence: str) -> None:
         self._client = None
         self.result = Result(outcome, sentence, self._whole.elapsed_s)
+
+
+def _disarmed_where(view: VehicleView, timer: EffectTimer) -> str | None:
+    """Return in words where the vehicle disarmed, or None while its landed state may be older than the disarming."""
+    if view.on_ground is not False:
+        return "disarmed"
+    is_known = timer.disarmed_s >= LANDED_STATE_S and timer.reports_disarmed >= LANDED_STATE_REPORTS
+    return "disarmed in the air" if is_known else None
 
 
 def refusal_reason(view: VehicleView, texts_before: int) -> str:

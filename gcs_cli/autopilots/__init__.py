@@ -1,1 +1,1 @@
-"""What each autopilot does in its own way: modes, altitudes, arming, streams, parameters. One module per autopilot."""
+"""Differences between autopilots: modes, altitudes, arming, streams, parameters. One module per autopilot."""

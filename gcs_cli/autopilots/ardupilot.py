@@ -42,6 +42,11 @@ def _select_mode(custom_mode: int) -> VehicleCommand:
     return common_commands.custom_mode(float(custom_mode))
 
 
+def _speed_modes(vehicle_type: int) -> tuple[str, ...]:
+    """Return the modes of ArduCopter with a ``set_speed_xy_cms`` of their own."""
+    return () if vehicle_type in _ENUM_OF_TYPE else ("AUTO", "GUIDED", "RTL")
+
+
 def _yaw(heading_deg: float) -> VehicleCommand:
     """CONDITION_YAW to an absolute heading, at the default rate, the shorter way round."""
     return VehicleCommand(mavlink.MAV_CMD_CONDITION_YAW, (heading_deg % 360.0, 0.0, 0.0, 0.0))
@@ -70,6 +75,7 @@ ARDUPILOT = Autopilot(
     yaw=_yaw,
     yaw_phases=(Phase.GUIDED,),
     default_speed=None,
+    speed_modes=_speed_modes,
     start_phases=(Phase.GUIDED, Phase.ARM, Phase.START),
     stream_groups_hz={
         mavlink.MAV_DATA_STREAM_RAW_SENSORS: 2,
@@ -100,5 +106,6 @@ ARDUPILOT = Autopilot(
     replaces_plans_at_once=False,
     stores_items_exactly=False,
     is_silent_without_logs=False,
+    sends_logs_armed=False,  # AP_Logger::handle_log_message
     log_suffix=".bin",
 )

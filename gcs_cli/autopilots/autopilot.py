@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from typing import NamedTuple
 
@@ -73,6 +73,8 @@ class Autopilot(NamedTuple):
     """Steps before that command."""
     default_speed: float | None
     """Speed in DO_CHANGE_SPEED that restores the default; None: there is no such value."""
+    speed_modes: Callable[[int], Sequence[str]]
+    """Modes in which the speed can be set, for a MAV_TYPE; empty: any, or unknown."""
     start_phases: tuple[Phase, ...]
     """Steps of the start of a mission on the ground, disarmed."""
     stream_groups_hz: Mapping[int, int]
@@ -97,6 +99,8 @@ class Autopilot(NamedTuple):
     """True if a downloaded item equals the uploaded one; False if frames and unused fields may differ."""
     is_silent_without_logs: bool
     """True if LOG_REQUEST_LIST has no answer while the vehicle has no logs."""
+    sends_logs_armed: bool
+    """True if the vehicle answers requests for logs while it is armed."""
     log_suffix: str = ".ulg"
     """End of the name of a downloaded log."""
 

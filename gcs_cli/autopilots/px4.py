@@ -94,6 +94,7 @@ PX4 = Autopilot(
     yaw=_yaw,
     yaw_phases=(),
     default_speed=-2.0,
+    speed_modes=lambda _vehicle_type: (),
     start_phases=(Phase.START,),
     stream_groups_hz={},
     stream_messages_hz={},
@@ -114,4 +115,5 @@ PX4 = Autopilot(
     replaces_plans_at_once=True,
     stores_items_exactly=True,
     is_silent_without_logs=True,
+    sends_logs_armed=True,
 )

@@ -17,7 +17,20 @@ from rich.style import Style
 from rich.text import Text
 
 from flightstack.core.contract import FloatArray
-from gcs_cli.charts.runs import Run, Runs
+
+Run: TypeAlias = tuple[str, str | Style]
+
+
+class Runs(tuple[Run, ...]):
+    """The runs of a line, from left to right."""
+
+    __slots__ = ()
+
+    @property
+    def plain(self) -> str:
+        """The characters."""
+        return "".join(text for text, _ in self)
+
 
 DOTS_X, DOTS_Y = 2, 4
 """Dots in a cell."""

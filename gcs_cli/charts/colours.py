@@ -1,4 +1,7 @@
-"""Colours of pages and prints by name: the only place that has them."""
+"""Colours of pages and prints by name: the only place that has them.
+
+A module of its own: pages and prints take their colours from here.
+"""
 
 from __future__ import annotations
 

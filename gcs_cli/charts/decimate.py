@@ -1,4 +1,4 @@
-"""Fewer samples that look the same: no peak is lost. Pure."""
+"""Decimation of samples for charts, which keeps every peak. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The description of a figure, without a word about who draws it. Pure data."""
+"""The description of a figure, independent of the library that draws it. Pure data."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias
 from flightstack.core.contract import FloatArray
 
 Dash: TypeAlias = Literal["solid", "dash", "dot", "dashdot", "longdash", "none"]
-"""How a curve is drawn; ``none``: markers only."""
+"""Line style of a curve; ``none``: markers only."""
 Shape: TypeAlias = Literal["", "circle", "x", "cross", "diamond", "square", "triangle-up", "circle-open"]
 """Marker at each sample; empty: none."""
 
@@ -88,7 +88,7 @@ class Band:
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes and what is drawn in it."""
+    """One pair of axes and its curves."""
 
     y: Axis
     series: Sequence[Series] = ()
@@ -115,7 +115,7 @@ class Figure:
     title: str
     panels: Sequence[Panel]
     caption: str = ""
-    """One plain sentence: what is drawn, with unit and limits where they matter."""
+    """One plain sentence: the content, with unit and limits where they matter."""
     columns: int = 1
     linked: bool = False
     height: int = 210

@@ -1,15 +1,18 @@
-"""What charts in the plane and in space have in common as JSON of plotly.js. Pure."""
+"""Common parts of charts in the plane and in space, as JSON of plotly.js. Pure."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from typing import Any, TypeAlias
+
+import numpy as np
 
 from gcs_cli.charts.figure import Dash, Series, SpacePath
 
 Json: TypeAlias = dict[str, Any]
 
+_LARGEST_EXACT_POWER = 22.0
+"""10 to this power is a float64 without rounding: a quotient by it is the float64 nearest to the decimal number."""
 MARGIN = {"l": 64, "r": 18, "t": 44, "b": 44}
 
 
@@ -25,7 +28,16 @@ def plain(text: str) -> str:
 
 def numbers(values: Iterable[float], digits: int = 6) -> list[float | None]:
     """Return values rounded to significant digits; None for one that is not finite."""
-    return [float(f"{value:.{digits}g}") + 0.0 if math.isfinite(value) else None for value in values]
+    given = np.asarray(values if isinstance(values, np.ndarray) else list(values), np.float64)
+    finite = np.isfinite(given)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        places = digits - 1 - np.floor(np.log10(np.abs(given)))
+    places = np.clip(np.where(finite, places, 0.0), -_LARGEST_EXACT_POWER, _LARGEST_EXACT_POWER)
+    up, down = 10.0 ** np.maximum(places, 0.0), 10.0 ** np.maximum(-places, 0.0)
+    rounded: list[float | None] = (np.rint(given * up / down) / up * down + 0.0).tolist()
+    if finite.all():
+        return rounded
+    return [value if is_finite else None for value, is_finite in zip(rounded, finite.tolist(), strict=True)]
 
 
 def base_layout() -> Json:

@@ -12,10 +12,9 @@ from collections.abc import Sequence
 from flightstack.core.geodesy import GeoPoint
 from flightstack.mavlink.link import Address, Message, is_for, is_from
 from flightstack.mavlink.mission_messages import DEFAULT_TIMING, ItemTimeout, Timing
+from flightstack.plan.commands import MissionResult, MissionType
 from flightstack.plan.item import MissionItem
-from flightstack.plan.vocabulary import MissionResult, MissionType
-from gcs_cli.clients.mission_operations import Clear, Done, Failed, Operation, SetCurrent
-from gcs_cli.clients.mission_transfers import Download, Upload
+from gcs_cli.clients.mission_operations import Clear, Done, Download, Failed, Operation, SetCurrent, Upload
 from gcs_cli.plans.home_item import with_home_item, without_home_item
 from gcs_cli.plans.itinerary import home_of_items
 

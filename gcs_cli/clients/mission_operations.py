@@ -1,19 +1,19 @@
 """The operations of a mission client: the messages that each one sends and processes.
 
-This file has their interface and the short ones; upload and download are in ``mission_transfers``.
 ``MissionClient`` adds time: it repeats ``request`` until an answer comes. An operation sets ``moved`` after
 progress, which restarts the timeout, and ``result`` at its end.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Message
-from flightstack.mavlink.mission_messages import Timing, ack_message
+from flightstack.mavlink.mission_messages import Timing, ack_message, item_from_message, message_from_item
+from flightstack.plan.commands import MissionResult, MissionType, result_name
 from flightstack.plan.item import MissionItem
-from flightstack.plan.vocabulary import MissionResult, MissionType, result_name
 
 _MEANINGS = {
     MissionResult.ERROR: "it gives no reason",
@@ -158,3 +158,147 @@ class SetCurrent(Operation):
         if message.get_type() == "MISSION_CURRENT" and message.seq == self._seq:
             self.result = self.result or Done()
         return []
+
+
+class Upload(Operation):
+    """Sends the count, then each item that the vehicle requests, in any order and any number of times."""
+
+    def __init__(self, vehicle: Address, mission_type: int, items: Sequence[MissionItem]) -> None:
+        announced = min(len(items), 0xFFFF)  # the largest count of the field; a vehicle refuses so many
+        count = mavlink.MAVLink_mission_count_message(*vehicle, announced, mission_type)
+        super().__init__(vehicle, mission_type, count)
+        self._items = tuple(items)
+        self._count_message = count
+        self._is_serving = False
+        self._last_sent_seq = -1
+        self._is_out_of_order = False
+        self.may_be_open = True
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Transferred items and their total."""
+        return self._last_sent_seq + 1, len(self._items)
+
+    def missing_answer(self) -> str:
+        """Return a description of the missing answer."""
+        done, count = self.progress
+        if not self._is_serving:
+            return "did not answer the announcement of the upload"
+        missing = (
+            f"did not ask for item {done} (last {count - 1})"
+            if done < count
+            else "did not confirm the upload"
+        )
+        return missing + (" after an item out of order" if self._is_out_of_order else "")
+
+    def receive(self, message: Message) -> list[Message]:
+        """Process a message from the vehicle, and return the answers."""
+        kind = message.get_type()
+        if kind in ("MISSION_REQUEST", "MISSION_REQUEST_INT"):
+            return self._on_request(message.seq)
+        if kind == "MISSION_ACK" and self.result is None:
+            self._on_ack(message.type, message.opaque_id)
+        return []
+
+    def _on_request(self, seq: int) -> list[Message]:
+        # After success too: if the acceptance was a late copy, the upload still completes.
+        if isinstance(self.result, Failed):
+            return [self.ack(MissionResult.OPERATION_CANCELLED)]
+        if not self._is_serving and (seq != 0 or not self._items):
+            # A request of a previous upload: an item now would mix two missions.
+            return [self._count_message]
+        if seq >= len(self._items):
+            if self.result is None:
+                reason = f"the vehicle asked for item {seq} (last {len(self._items) - 1})"
+                self.result = Failed(reason, MissionResult.INVALID_SEQUENCE, seq)
+            return [self.ack(MissionResult.INVALID_SEQUENCE)]
+        self._is_serving = True
+        self._last_sent_seq = max(self._last_sent_seq, seq)
+        self.may_be_open = self._last_sent_seq < 1
+        # MISSION_ITEM_INT also for the deprecated MISSION_REQUEST, as specified. The item is also
+        # repeated without an answer: a vehicle answers a repeated last item with the lost MISSION_ACK.
+        self.request = message_from_item(
+            self._items[seq], seq, self.vehicle, self.mission_type, is_current=seq == 0
+        )
+        self.moved = True
+        return [self.request]
+
+    def _on_ack(self, result: int, plan_id: int) -> None:
+        is_whole = self._last_sent_seq == len(self._items) - 1
+        if result == MissionResult.INVALID_SEQUENCE and self._is_serving:
+            # ArduPilot answers a copy of an item so, and continues; a vehicle that has ended the upload falls silent
+            self._is_out_of_order = True
+        elif result != MissionResult.ACCEPTED:
+            seq = self._last_sent_seq if self._is_serving else None
+            self.refused(result, seq, is_whole=is_whole and seq is not None)
+        elif is_whole:
+            self.plan_id = plan_id
+            self.result = Done(self._items)
+        elif self._is_serving:
+            # The end of a previous upload: begin again.
+            self._is_serving, self._last_sent_seq = False, -1
+            self.request = self._count_message
+
+
+class Download(Operation):
+    """Requests the count, then each item in turn."""
+
+    only_reads = True
+
+    def __init__(self, vehicle: Address, mission_type: int) -> None:
+        request = mavlink.MAVLink_mission_request_list_message(*vehicle, mission_type)
+        super().__init__(vehicle, mission_type, request)
+        self._items: list[MissionItem] = []
+        self._count = 0
+        self._asked_early = False
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Transferred items and their total."""
+        return len(self._items), self._count
+
+    def missing_answer(self) -> str:
+        """Return a description of the missing answer."""
+        if not self.waits_for_item:
+            return "did not answer the request for its mission"
+        return f"did not send item {len(self._items)} (last {self._count - 1})"
+
+    def receive(self, message: Message) -> list[Message]:
+        """Process a message from the vehicle, and return the answers."""
+        kind = message.get_type()
+        if self.result is not None:
+            return []
+        if kind == "MISSION_COUNT" and self._is_new_count(message):
+            self._items, self._count = [], message.count
+            self.plan_id = message.opaque_id
+            self.waits_for_item = True
+            return self._ask_next_item()
+        if kind in ("MISSION_ITEM", "MISSION_ITEM_INT") and self.waits_for_item:
+            return self._on_item(message)
+        if kind == "MISSION_ACK" and message.type != MissionResult.ACCEPTED:
+            self.refused(message.type, len(self._items) if self.waits_for_item else None)
+        return []
+
+    def _is_new_count(self, message: Message) -> bool:
+        """Return False for a late copy of the count; the count of another plan restarts the download."""
+        known = (self._count, self.plan_id)
+        return not self.waits_for_item or (message.count, message.opaque_id) != known
+
+    def _on_item(self, message: Message) -> list[Message]:
+        if message.seq == len(self._items):
+            self._items.append(item_from_message(message))
+            return self._ask_next_item()
+        if message.seq > len(self._items) and not self._asked_early:
+            self._asked_early = True  # only once, else duplicates would multiply
+            return [self.request]
+        return []  # a copy of a received item
+
+    def _ask_next_item(self) -> list[Message]:
+        seq = len(self._items)
+        self.moved = True
+        self._asked_early = False
+        if seq == self._count:
+            self.result = Done(tuple(self._items))
+            return [self.ack(MissionResult.ACCEPTED)]
+        self.request = mavlink.MAVLink_mission_request_int_message(*self.vehicle, seq, self.mission_type)
+        return [self.request]

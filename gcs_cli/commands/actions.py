@@ -10,7 +10,7 @@ import typer
 from flightstack.process.command_line import IN_OUTPUT, expand_options, make_app
 from gcs_cli.actions import in_flight, on_vehicle
 from gcs_cli.actions.action import Action
-from gcs_cli.commands.asking import YesOption, confirm
+from gcs_cli.commands.confirmation import YesOption, confirm
 from gcs_cli.completion import mode_names
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.link.connection import Connection
@@ -266,9 +266,9 @@ def inject(
     context: typer.Context,
     link: LinkOptions,
     options: ActionOptions,
-    unit: Annotated[str, typer.Argument(help="What fails: motor, gps, gyro, battery …")],
+    unit: Annotated[str, typer.Argument(help="Unit that fails: motor, gps, gyro, battery …")],
     failure: Annotated[
-        str, typer.Argument(help="How: off, stuck, garbage, wrong, slow, delayed; ok repairs.")
+        str, typer.Argument(help="Kind of failure: off, stuck, garbage, wrong, slow, delayed; ok repairs.")
     ],
     number: Annotated[int, typer.Option("--number", "-n", min=0, help="Which one; 0: all.")] = 0,
 ) -> None:

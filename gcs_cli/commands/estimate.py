@@ -23,29 +23,29 @@ from gcs_cli.settings import JsonOption, OpenOption, OverwriteOption, output_of
 
 app = make_app(add_completion=False)
 
+_Log = Annotated[
+    Path, typer.Argument(metavar="LOG", help="A ULog, also compressed (.ulg.xz).", show_default=False)
+]
+_Page = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", "-o", metavar="FILE", help="Write the report page to this file.", show_default=False
+    ),
+]
+_Params = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--param", metavar="NAME=VALUE", help="Set a parameter of the filter (EKF2_…).", show_default=False
+    ),
+]
+
 
 @app.command()
 def estimate(
     context: typer.Context,
-    log: Annotated[
-        Path,
-        typer.Argument(metavar="LOG", help="A ULog, also compressed (.ulg.xz).", show_default=False),
-    ],
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", "-o", metavar="FILE", help="Write the report page to this file.", show_default=False
-        ),
-    ] = None,
-    param: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--param",
-            metavar="NAME=VALUE",
-            help="Set a parameter of the filter (EKF2_…).",
-            show_default=False,
-        ),
-    ] = None,
+    log: _Log,
+    out: _Page = None,
+    param: _Params = None,
     overwrite: OverwriteOption = False,
     open_page: OpenOption = False,
     as_json: JsonOption = False,

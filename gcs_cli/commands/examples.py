@@ -1,4 +1,7 @@
-"""Examples at the end of each command's help, by the words of the command; ``fence`` and ``rally`` have the same."""
+"""Examples at the end of each command's help, by the words of the command; ``fence`` and ``rally`` have the same.
+
+A module of its own: a page of texts.
+"""
 
 from __future__ import annotations
 
@@ -22,6 +25,11 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "gcs test missions",
         "gcs test -k wind --repeat 20 --seed 1",
         "gcs test -j 4 --junit results.xml --report results.html",
+    ),
+    "campaign": (
+        "gcs campaign gusts.toml --workers 4 --out results --csv",
+        "gcs campaign gusts.toml --only 17",
+        "gcs campaign gusts.toml --seek worst",
     ),
     "arm": ("gcs arm", "gcs arm --system 2"),
     "disarm": ("gcs disarm", "gcs disarm --force --yes"),
@@ -99,8 +107,8 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "log list": ("gcs log list", "gcs log list --json"),
     "log download": (
         "gcs log download latest",
-        "gcs log download 3 --output flight.ulg",
-        "gcs log download --all --output logs",
+        "gcs log download 3 --out flight.ulg",
+        "gcs log download --all --out logs",
     ),
     "log erase": ("gcs log erase --yes",),
     "estimate": (

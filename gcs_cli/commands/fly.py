@@ -1,4 +1,7 @@
-"""``gcs fly``: simulator, flight stack and ground station in one command, from plan to report."""
+"""``gcs fly``: simulator, flight stack and ground station in one command, from plan to report.
+
+A module of its own, as each command: it is imported when it is used.
+"""
 
 from __future__ import annotations
 
@@ -31,6 +34,6 @@ def fly(
     ] = None,
 ) -> None:
     """Fly a mission in simulation and write log, summary and report."""
-    from gcs_cli.fly.fly_command import run_fly
+    from gcs_cli.fly.fly_run import run_fly
 
     run_fly(complete_options(context, "fly", options, run), run, out)

@@ -10,14 +10,13 @@ import typer
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.process.command_line import expand_options, make_app
-from gcs_cli.commands.following import DurationOption, follow
 from gcs_cli.completion import message_names
 from gcs_cli.errors import NO_ANSWER, USAGE, CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.output import Output
 from gcs_cli.settings import LinkOptions, link_options, output_of
 from gcs_cli.vehicle.message_fields import FieldError, check_fields, message_class, shown, values_of
-from gcs_cli.vehicle_link import connect_vehicle
+from gcs_cli.vehicle_link import DurationOption, connect_vehicle, follow
 
 app = make_app(add_completion=False)
 
@@ -44,7 +43,7 @@ CountOption = Annotated[
 
 
 class _Wanted(NamedTuple):
-    """What to print: a kind of message, some of its fields, at a requested rate, this many."""
+    """Messages to print: their kind, fields, requested rate and number."""
 
     kind: type
     fields: tuple[str, ...]

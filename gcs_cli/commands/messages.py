@@ -10,14 +10,13 @@ import typer
 from flightstack.core.enums import Severity
 from flightstack.mavlink.text_file import PastText
 from flightstack.process.command_line import expand_options, make_app
-from gcs_cli.commands.following import DurationOption, follow
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.output import Output
 from gcs_cli.settings import LinkOptions, output_of
 from gcs_cli.transfers.past_texts import fetch_past_texts, texts_before
 from gcs_cli.vehicle.view_types import StatusText
-from gcs_cli.vehicle_link import connect_vehicle
+from gcs_cli.vehicle_link import DurationOption, connect_vehicle, follow
 
 app = make_app(add_completion=False)
 

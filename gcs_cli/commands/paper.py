@@ -1,4 +1,7 @@
-"""``gcs paper``: the paper, reproduced."""
+"""``gcs paper``: the paper, reproduced.
+
+A module of its own, as each command: it is imported when it is used.
+"""
 
 from __future__ import annotations
 
@@ -16,29 +19,32 @@ from gcs_cli.settings import JsonOption, OpenOption, settings_of
 
 app = make_app(add_completion=False)
 
+_Out = Annotated[
+    Path, typer.Option("--out", "-o", help="Directory of the results; replaces those of a previous run.")
+]
+_NoPil = Annotated[bool, typer.Option("--no-pil", help="Leave out the loops on a target.")]
+_NoMultibody = Annotated[bool, typer.Option("--no-multibody", help="Leave out the multibody plant.")]
+_Port = Annotated[
+    str | None,
+    typer.Option(
+        metavar="TARGET",
+        help="Run the loops on a board: serial:DEVICE[:BAUD].  [default: an emulated Cortex-M4F]",
+        show_default=False,
+    ),
+]
+_Jobs = Annotated[
+    int | None, typer.Option(min=1, max=64, help="Flights at once.  [default: one for each processor]")
+]
+
 
 @app.command()
 def paper(
     context: typer.Context,
-    out: Annotated[
-        Path,
-        typer.Option("--out", "-o", help="Directory of the results; replaces those of a previous run."),
-    ] = Path("runs/paper"),
-    no_pil: Annotated[bool, typer.Option("--no-pil", help="Leave out the loops on a target.")] = False,
-    no_multibody: Annotated[
-        bool, typer.Option("--no-multibody", help="Leave out the multibody plant.")
-    ] = False,
-    port: Annotated[
-        str | None,
-        typer.Option(
-            metavar="TARGET",
-            help="Run the loops on a board: serial:DEVICE[:BAUD].  [default: an emulated Cortex-M4F]",
-            show_default=False,
-        ),
-    ] = None,
-    jobs: Annotated[
-        int | None, typer.Option(min=1, max=64, help="Flights at once.  [default: one for each processor]")
-    ] = None,
+    out: _Out = Path("runs/paper"),
+    no_pil: _NoPil = False,
+    no_multibody: _NoMultibody = False,
+    port: _Port = None,
+    jobs: _Jobs = None,
     open_report: OpenOption = False,
     as_json: JsonOption = False,
 ) -> None:

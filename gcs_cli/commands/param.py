@@ -13,7 +13,7 @@ from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.mavlink.param_values import Parameter
 from flightstack.params.param_file import is_parameter_name
 from flightstack.process.command_line import expand_options, make_app
-from gcs_cli.commands.asking import YesOption, confirm_if_armed
+from gcs_cli.commands.confirmation import YesOption, confirm_if_armed
 from gcs_cli.completion import parameter_names
 from gcs_cli.errors import FAILED, USAGE, CliError, VehicleLostError
 from gcs_cli.link import calls

@@ -14,7 +14,7 @@ from gcs_cli.link.connection import Connection
 from gcs_cli.link.subscription import LOOP_TIMING
 from gcs_cli.settings import JsonOption, LinkOptions, link_options
 from gcs_cli.tables import new_table, table_console
-from gcs_cli.vehicle.numbers import number
+from gcs_cli.vehicle.field_units import number
 from gcs_cli.vehicle.view_types import LoopTiming
 from gcs_cli.vehicle_link import connect_vehicle
 

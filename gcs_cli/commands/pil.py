@@ -17,7 +17,7 @@ from flightstack.process.command_line import (
     make_app,
 )
 from flightstack.process.options import Controller, Gains, InnerHz, OuterHz
-from gcs_cli.fly.fly_flags import FlyOptions, RunOptions, complete_options
+from gcs_cli.fly.fly_flags import PilOptions, RunOptions, complete_options
 from gcs_cli.pil.pil_flags import JudgeOptions
 from gcs_cli.settings import JsonOption, OverwriteOption
 
@@ -28,7 +28,7 @@ app = make_app(add_completion=False)
 @partial(expand_options, without=("loops", "speed"))
 def fly(
     context: typer.Context,
-    options: FlyOptions,
+    options: PilOptions,
     run: RunOptions,
     judge: JudgeOptions,
     target: Annotated[
@@ -48,7 +48,7 @@ def fly(
 @partial(expand_options, without=("loops", "speed"))
 def free_run(
     context: typer.Context,
-    options: FlyOptions,
+    options: PilOptions,
     run: RunOptions,
     target: Annotated[
         str, typer.Option(metavar="TARGET", help="host, or serial:DEVICE[:BAUD].", **IN_LOOPS)

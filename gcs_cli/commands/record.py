@@ -11,11 +11,10 @@ import typer
 
 from flightstack.core.atomic_file import check_new
 from flightstack.process.command_line import expand_options, make_app
-from gcs_cli.commands.following import DurationOption, follow
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.link.tlog import TlogFile
 from gcs_cli.settings import LinkOptions, OverwriteOption, output_of
-from gcs_cli.vehicle_link import connect_vehicle
+from gcs_cli.vehicle_link import DurationOption, connect_vehicle, follow
 
 app = make_app(add_completion=False)
 

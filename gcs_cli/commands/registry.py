@@ -11,11 +11,11 @@ from gcs_cli.commands.lazy_group import LazyCommand, LazyGroup
 from gcs_cli.output import can_draw
 
 _ACTIONS = "gcs_cli.commands.actions"
-_MISSION = "gcs_cli.commands.mission"
-_PLANS = "gcs_cli.commands.mission_files"
+_MISSION = "gcs_cli.commands.mission.on_vehicle"
+_PLANS = "gcs_cli.commands.mission.files"
 _PARAM = "gcs_cli.commands.param"
-_LOG = "gcs_cli.commands.log"
-_LOG_FILE = "gcs_cli.commands.log_file"
+_LOG = "gcs_cli.commands.log.on_vehicle"
+_LOG_FILE = "gcs_cli.commands.log.file"
 _PIL = "gcs_cli.commands.pil"
 _PIL_FLY = "fly"
 
@@ -33,7 +33,8 @@ class GcsGroup(LazyGroup):
         "paper": LazyCommand(
             "gcs_cli.commands.paper", "Fly every experiment of the paper and report the results."
         ),
-        "test": LazyCommand("gcs_cli.commands.test", "Fly scenario files and judge the flights."),
+        "test": LazyCommand("gcs_cli.commands.test", "Fly scenario files and check the flights."),
+        "campaign": LazyCommand("gcs_cli.commands.campaign", "Fly a scenario many times with varied inputs."),
         "arm": LazyCommand(_ACTIONS, "Arm the vehicle."),
         "disarm": LazyCommand(_ACTIONS, "Disarm the vehicle."),
         "takeoff": LazyCommand(_ACTIONS, "Take off; arm first if disarmed."),
@@ -82,7 +83,7 @@ class MissionGroup(LazyGroup):
     """``gcs mission``."""
 
     lazy = {  # noqa: RUF012
-        "new": LazyCommand("gcs_cli.commands.mission_new", "Write a mission of a pattern."),
+        "new": LazyCommand("gcs_cli.commands.mission.new", "Write a mission of a pattern."),
         "check": LazyCommand(
             _PLANS,
             "Check a file as the vehicle does.",
@@ -109,7 +110,7 @@ def _part_commands(app: str, name: str) -> dict[str, LazyCommand]:
         "clear": f"Remove the vehicle's {name}.",
     }
     return {
-        command: LazyCommand("gcs_cli.commands.plan_commands", summary, app=app)
+        command: LazyCommand("gcs_cli.commands.mission.plan_parts", summary, app=app)
         for command, summary in summaries.items()
     }
 
@@ -152,9 +153,9 @@ class LogGroup(LazyGroup):
         "download": LazyCommand(_LOG, "Download a log, or all of them."),
         "erase": LazyCommand(_LOG, "Erase all logs but the one that is being written."),
         "info": LazyCommand(_LOG_FILE, "Show what a log holds."),
-        "plot": LazyCommand("gcs_cli.commands.log_plot", "Plot fields of a log."),
+        "plot": LazyCommand("gcs_cli.commands.log.plot", "Plot fields of a log."),
         "export": LazyCommand(_LOG_FILE, "Export a log as CSV, Parquet, MCAP or Rerun."),
-        "draw": LazyCommand("gcs_cli.commands.log_draw", "Draw a flight: pictures, a film, or a window."),
+        "draw": LazyCommand("gcs_cli.commands.log.draw", "Draw a flight: pictures, a film, or a window."),
     }
 
 

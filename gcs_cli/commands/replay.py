@@ -1,4 +1,7 @@
-"""``gcs replay``: a log as a vehicle that any client can watch."""
+"""``gcs replay``: a log as a vehicle that any client can watch.
+
+A module of its own, as each command: it is imported when it is used.
+"""
 
 from __future__ import annotations
 

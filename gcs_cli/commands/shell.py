@@ -15,10 +15,10 @@ import typer
 
 from flightstack.process.command_line import UsageError, expand_options, make_app
 from flightstack.process.console import complain
-from gcs_cli.commands.asking import kept_alive
-from gcs_cli.ending import run_command
+from gcs_cli.commands.confirmation import kept_alive
 from gcs_cli.errors import DONE, USAGE, CliError
 from gcs_cli.link.connection import Connection
+from gcs_cli.output import run_command
 from gcs_cli.settings import LinkOptions, Settings, link_options, settings_of
 from gcs_cli.vehicle_link import open_link
 

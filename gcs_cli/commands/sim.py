@@ -1,4 +1,7 @@
-"""``gcs sim``: vehicle and simulator together, until Ctrl-C."""
+"""``gcs sim``: vehicle and simulator together, until Ctrl-C.
+
+A module of its own, as each command: it is imported when it is used.
+"""
 
 from __future__ import annotations
 

@@ -10,9 +10,9 @@ import typer
 from flightstack.mavlink.dialect import mavlink
 from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.link.quality import LinkQuality
-from gcs_cli.link.snapshot import Snapshot
+from gcs_cli.link.subscription import Snapshot
 from gcs_cli.settings import LinkOptions, output_of
-from gcs_cli.vehicle.numbers import UNKNOWN, number
+from gcs_cli.vehicle.field_units import UNKNOWN, number
 from gcs_cli.vehicle.view_types import Estimator, Gnss, VehicleView
 from gcs_cli.vehicle_link import connect_vehicle
 
@@ -177,10 +177,10 @@ def _mission_text(view: VehicleView) -> str | None:
         return None
     if not mission.total:
         return "none"
-    reached = "" if mission.reached is None else f", item {mission.reached} reached"
-    return f"item {mission.current} of 0 to {mission.total - 1}{reached}" + (
-        ", complete" if mission.complete else ""
-    )
+    last = mission.total - 1
+    items = "the only item" if not last else f"items 0 to {last}"
+    reached = "" if mission.reached is None else f", last reached {mission.reached}"
+    return f"current item {mission.current} ({items}){reached}" + (", complete" if mission.complete else "")
 
 
 def _link_text(quality: LinkQuality) -> str | None:

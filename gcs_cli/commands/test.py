@@ -1,4 +1,7 @@
-"""``gcs test``: fly scenario files and judge the flights."""
+"""``gcs test``: fly scenario files and check the flights.
+
+A module of its own, as each command: it is imported when it is used.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ app = make_app(add_completion=False)
 @app.command("test")
 @expand_options
 def fly_scenarios(context: typer.Context, options: TestOptions) -> None:
-    """Fly scenario files and judge the flights.
+    """Fly scenario files and check the flights.
 
     Exits with 0 if all passed, 1 if one failed, 2 for a bad file, 130 after Ctrl-C.
     """

@@ -25,7 +25,7 @@ app = make_app(add_completion=False)
 
 LINE_S = 1.0
 GATHER_S = 2.0
-"""How long ``--once`` waits for the vehicle's messages; most come several times a second."""
+"""Time that ``--once`` waits for the vehicle's messages; most arrive several times a second."""
 DEFAULT_SERVED = "127.0.0.1:8000"
 _MODES = ", ".join(entry.mode for entry in SCREENS)
 

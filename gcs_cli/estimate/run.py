@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from flightstack.core.contract import FloatArray
-from flightstack.core.earth_field import FIELD_YEAR, earth_field_ned_gauss
+from flightstack.core.geodesy import FIELD_YEAR, earth_field_ned_gauss
 from flightstack.estimation.error_state import ERROR_STATES, NOMINAL_SIZE
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.kalman import OBSERVATION_COLUMNS, OBSERVATIONS, symmetric

@@ -15,6 +15,7 @@ from rich.text import Text
 from flightstack.core.enums import Severity
 from flightstack.process.console import drop
 from gcs_cli.fly.flight import Flight, Phase
+from gcs_cli.tui.fly.panels import clock_text
 from gcs_cli.tui.watch_lines import text_line
 from gcs_cli.vehicle.view_types import StatusText
 
@@ -188,9 +189,9 @@ def place_words(flight: Flight) -> str:
 
 
 def speed_words(flight: Flight) -> str:
-    """Return the simulated flight time and the real-time factor."""
+    """Return the vehicle's clock, as status texts have it, and the real-time factor."""
     if flight.phase is not Phase.FLY or flight.flown_s is None:
         return ""
-    words = f"t {flight.flown_s:6.1f} s"
+    words = f"t {clock_text(flight.view.time_s)}"
     factor = flight.real_time_factor
     return words if factor is None else f"{words} ×{factor:5.1f}"

@@ -81,7 +81,7 @@ class FlyOptions:
         typer.Option(metavar="FILE", help="Parameter file to fly with.  [default: none]", **world.IN_VEHICLE),
     ] = None
     loops: stack.Loops = "python"
-    state: stack.State = "truth"
+    state: stack.State = "estimated"
     force: Annotated[str | None, world.FORCE] = None
     torque: Annotated[str | None, world.TORQUE] = None
     physics_hz: Annotated[float | None, world.PHYSICS_HZ] = None
@@ -114,6 +114,13 @@ class FlyOptions:
     def simulator_port(self) -> int:
         """TCP port on which the simulator listens."""
         return simulator_port(self.instance)
+
+
+@dataclass(frozen=True)
+class PilOptions(FlyOptions):
+    """The same of flights that compare loops: on the true state, which is no error of the loops."""
+
+    state: stack.State = "truth"
 
 
 TO_SIMULATOR = (

@@ -14,8 +14,8 @@ from flightstack.params.gains_file import hidden_gains
 from flightstack.params.store import read_assignment
 from flightstack.params.vehicle import Vehicle, load_vehicle
 from flightstack.plan import POSITION_COMMANDS, Command, Plan, load_plan
-from flightstack.process.assembly import check as check_stack
 from flightstack.process.clock import nearest_outer_hz
+from flightstack.process.config_check import check as check_stack
 from flightstack.process.console import complain
 from flightstack.process.signing_file import load_key
 from flightstack.transports.udp import PortBusyError, UdpSocket

@@ -1,29 +1,29 @@
-"""A whole flight of ``gcs fly``: ports, directory, processes, mission, results."""
+"""A whole flight of ``gcs fly``: ports, directory, processes, mission."""
 
 from __future__ import annotations
 
+import importlib
+import json
 import time
+import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from flightstack.core.errors import ConfigError
 from flightstack.core.port_numbers import vehicle_ground_port
-from flightstack.params.vehicle import NO_DRAG_PLANT
 from flightstack.plan import Plan
 from flightstack.process.console import complain
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
-from gcs_cli.fly.flight import Flight
+from gcs_cli.fly.flight import Flight, Phase
 from gcs_cli.fly.flight_watch import STALL_S
-from gcs_cli.fly.fly_display import Display
-from gcs_cli.fly.fly_flags import FlyOptions
+from gcs_cli.fly.fly_display import Display, FlyConsole, make_display
+from gcs_cli.fly.fly_flags import FlyOptions, RunOptions
 from gcs_cli.fly.fly_options import (
     check_ports,
-    flown_vehicle,
+    checked_plan,
     home_of,
     longest_flight_s,
-    outer_rate_hz,
     simulator_arguments,
     stack_arguments,
 )
@@ -31,17 +31,11 @@ from gcs_cli.fly.processes import Child, Children, Interruption
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.endpoint import LOOPBACK, UDP_IN, VehicleEndpoint
 from gcs_cli.link.tlog import TlogFile
-from gcs_cli.report.analysis import read_flight
-from gcs_cli.report.flight_data import Flight as FlightData
-from gcs_cli.report.flight_outcome import Code, Outcome, with_log
-from gcs_cli.report.page import write_report
-from gcs_cli.report.summary import RunInfo, summarise, write_summary
+from gcs_cli.report.flight_outcome import Code, Outcome
 from gcs_cli.run_directory import (
-    LOG_NAME,
     REPORT_NAME,
     SIMULATOR,
     STACK,
-    SUMMARY_NAME,
     TLOG_NAME,
     make_run_directory,
 )
@@ -49,6 +43,7 @@ from gcs_cli.vehicle_link import open_signing
 
 _STEP_S = 0.1
 _END_TIMEOUT_S = 10.0
+_RESULTS = "gcs_cli.fly.fly_results"
 
 
 class Flown(NamedTuple):
@@ -134,6 +129,8 @@ def _run(
         display.update(flight)
         if not flight.is_over:
             connection.step(now_s + _STEP_S)
+        if flight.phase is Phase.FLY:
+            importlib.import_module(_RESULTS)  # 0.2 s, for which the other programs of the flight do not wait
 
 
 def _show_notices(children: Children, display: Display) -> None:
@@ -151,59 +148,23 @@ def _failed_child(flight: Flight, children: Children) -> Child | None:
     return children.culprit(_END_TIMEOUT_S)
 
 
-def _drag_of(options: FlyOptions) -> tuple[float, float, float]:
-    return (0.0, 0.0, 0.0) if options.plant == NO_DRAG_PLANT else flown_vehicle(options).linear_drag_n_s_m
-
-
-def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[str, Any], Outcome]:
-    """Write summary and report; return the summary, and the outcome after reading the log."""
-    log, outcome = flown.folder / LOG_NAME, flown.outcome
+def run_fly(options: FlyOptions, run: RunOptions, out: Path | None) -> None:
+    """Fly the mission, write the results to ``out`` and print a summary; raise CliError, ConfigError."""
+    items = checked_plan(options)
+    console = FlyConsole(stderr=run.as_json, highlight=False)
+    display = make_display(console)
     try:
-        data = read_flight(log)
-    except (ConfigError, OSError) as error:
-        data = FlightData()
-        if outcome.completed:
-            outcome = Outcome(Code.NO_LOG, f"the mission was flown, but its log cannot be read: {error}")
+        flown = fly(options, items, out, display, run.overwrite)
+    finally:
+        display.close()
+    results = importlib.import_module(_RESULTS)  # late: it imports this module
+    summary, outcome = results.write_results(options, items, flown)
+    if run.as_json:
+        print(json.dumps({**summary, "directory": str(flown.folder)}), flush=True)
     else:
-        outcome = with_log(outcome, data, plan.items)
-    summary = summarise(data, plan, _run_info(options, flown, outcome))
-    try:
-        write_summary(flown.folder / SUMMARY_NAME, summary)
-        write_report(flown.folder / REPORT_NAME, data, plan, summary, flown.folder / TLOG_NAME)
-    except OSError as error:
-        raise CliError(f"{flown.folder}: the results cannot be written: {error.strerror}") from None
-    return summary, outcome
-
-
-def _run_info(options: FlyOptions, flown: Flown, outcome: Outcome) -> RunInfo:
-    return RunInfo(
-        outcome=outcome.code.value,
-        outcome_text=outcome.reason,
-        plan=str(options.plan_path),
-        wall_time_s=flown.wall_time_s,
-        vehicle=options.vehicle,
-        controller=options.controller,
-        gains=options.gains,
-        plant=options.plant,
-        loops=options.loops,
-        seed=options.seed,
-        wind=options.wind,
-        gust=options.gust,
-        drag_n_s_m=_drag_of(options),
-        torque_gust=options.torque_gust,
-        force=options.force,
-        torque=options.torque,
-        slope=options.slope,
-        boat=options.boat,
-        battery_start=options.battery_start,
-        battery_capacity=options.battery_capacity,
-        battery_drain=options.battery_drain,
-        faults=tuple(options.faults or ()),
-        ideal_rotors=options.ideal_rotors,
-        params=None if options.params is None else str(options.params),
-        param=tuple(options.param or ()),
-        inner_hz=options.inner_hz,
-        outer_hz=outer_rate_hz(options),
-        overruns=flown.overruns,
-        log_path=flown.folder / LOG_NAME,
-    )
+        results.print_summary(console, summary, flown.folder)
+    report = flown.folder / REPORT_NAME
+    if run.open_report and report.exists():
+        webbrowser.open(report.resolve().as_uri())
+    if not outcome.completed:
+        raise CliError(f"{outcome.reason} (see {flown.folder})", outcome.exit_code)

@@ -19,7 +19,7 @@ from gcs_cli.plans.compare import EXACT, PACKED, Tolerance
 from gcs_cli.plans.names import any_command_name
 
 TEXT_WAIT_S = 0.3
-"""How long to wait for the STATUSTEXT that explains a refusal; it follows the answer."""
+"""Timeout of the STATUSTEXT that explains a refusal; it follows the answer."""
 
 _PREFIXES = (
     "Command refused: ",
@@ -32,7 +32,7 @@ _NAMES_ITEM = re.compile(r"\bitem \d", re.IGNORECASE)
 
 
 class Answer(NamedTuple):
-    """How a request ended."""
+    """Result of a request."""
 
     accepted: bool
     reason: str = ""

@@ -7,7 +7,7 @@ from typing import Any
 from flightstack.mavlink.dialect import mavlink
 from gcs_cli.actions.action import Action
 from gcs_cli.actions.run import ActionRun, Outcome, Result
-from gcs_cli.clients.mode_client import ModeClient
+from gcs_cli.clients.command_client import ModeClient
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.output import Output

@@ -65,7 +65,8 @@ class Session:
         self._only_peer = peer
         self._system_id = system_id
         self._heartbeat_type = heartbeat_type
-        self._service: Service | None = None
+        self.service: Service | None = None
+        """The service that exchanges messages with the vehicle, besides the attached ones."""
         self._subscription = Subscription(lambda: self.view, {})
         self._monitor = LinkMonitor(lambda: self.view.link)
         self._background: list[Service] = [self._monitor] if monitors else []
@@ -117,7 +118,7 @@ class Session:
 
     def use(self, service: Service | None) -> None:
         """Replace the service that exchanges messages with the vehicle."""
-        self._service = service
+        self.service = service
 
     def attach(self, service: Service) -> None:
         """Run a service beside that of ``use`` until ``detach``."""
@@ -129,7 +130,7 @@ class Session:
 
     @property
     def _services(self) -> list[Service]:
-        chosen = [] if self._service is None else [self._service]
+        chosen = [] if self.service is None else [self.service]
         return [*chosen, self._subscription, *self._background]
 
     def is_heard(self, now_s: float) -> bool:

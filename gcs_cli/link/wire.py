@@ -1,4 +1,7 @@
-"""Frames of a link: a decoder and an encoder per peer, signing, and a tap for recordings. Sans-IO."""
+"""Frames of a link: a decoder and an encoder per peer, signing, and a tap for recordings. Sans-IO.
+
+A module of its own: one wire serves the sessions of all vehicles.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a log holds: facts for programs, lines for people. Pure."""
+"""Contents of a log: facts for programs, lines for people. Pure."""
 
 from __future__ import annotations
 

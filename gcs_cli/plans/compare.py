@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 from flightstack.plan import Frame, MissionItem
-from flightstack.plan.vocabulary import RALLY_POINT, FenceCommand
+from flightstack.plan.commands import RALLY_POINT, FenceCommand
 from gcs_cli.plans.names import any_command_name
 
 _EQUIVALENT_FRAMES = {

@@ -29,7 +29,7 @@ class Outline(NamedTuple):
 
 
 class PlanPlaces(NamedTuple):
-    """What is drawn, north and east of home [m]."""
+    """Shapes of the drawing, north and east of home [m]."""
 
     route_m: FloatArray
     """Home and the items in the order of their numbers, shape (n, 2)."""

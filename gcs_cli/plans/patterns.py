@@ -21,7 +21,7 @@ NAN = math.nan
 
 
 class Route(NamedTuple):
-    """How the places of a pattern are flown."""
+    """Speed, height and stops along a pattern."""
 
     altitude_m: float = 5.0
     """Above home."""

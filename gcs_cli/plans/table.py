@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from flightstack.plan import Command, MissionItem
-from flightstack.plan.vocabulary import FenceCommand
+from flightstack.plan.commands import FenceCommand
 from gcs_cli.plans.itinerary import Itinerary, Stop
 from gcs_cli.plans.names import any_command_name
 from gcs_cli.tables import new_table

@@ -1,4 +1,4 @@
-"""What a replay sends: the interface of a log's messages, and the messages of a tlog. Pure."""
+"""Messages of a replay: the interface for all logs, and the messages of a tlog. Pure."""
 
 from __future__ import annotations
 

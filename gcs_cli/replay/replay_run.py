@@ -48,7 +48,7 @@ class ReplayPorts:
         self._ports.register(poller)
 
     def exchange(self, vehicle: ReplayVehicle, now_s: float) -> None:
-        """Receive what has come, and send what is due."""
+        """Receive the datagrams that have arrived, and send those that are due."""
         for channel, peer, data in self._ports.receive(vehicle.heard_s):
             vehicle.receive(data, (channel, peer), now_s)
         for place in self._ports.opened():

@@ -327,7 +327,8 @@ class UlogPlayback:
         nav_state, arming_state = self._at(self._status, at_s, (NAN, NAN))
         if not total:
             state = mavlink.MISSION_STATE_NO_MISSION
-        elif finished:
+        elif finished and (self._log.info.get("sys_name") == "flightstack" or reached >= total - 1):
+            # of PX4 a takeoff, a return and a landing that have ended are finished, too
             state = mavlink.MISSION_STATE_COMPLETE
         elif nav_state == _MISSION and arming_state == _ARMED:
             state = mavlink.MISSION_STATE_ACTIVE

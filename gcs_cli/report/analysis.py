@@ -106,33 +106,42 @@ class _Reader:
             true_velocity=self._truth("vx", "vy", "vz"),
             true_attitude=self._euler("vehicle_attitude_groundtruth", "q"),
             deviations=self._deviations(),
-            statuses=tuple(
-                Status(time_s, int(state), arming == _ARMED, bool(failsafe))
-                for time_s, state, arming, failsafe in self._rows(
-                    "vehicle_status", "nav_state", "arming_state", "failsafe"
-                )
-            ),
+            statuses=self._statuses(),
             landed=tuple(
                 (time_s, bool(landed)) for time_s, landed in self._rows("vehicle_land_detected", "landed")
             ),
-            mission=tuple(
-                MissionProgress(time_s, int(current), int(reached), int(total), bool(finished))
-                for time_s, current, reached, total, finished in self._rows(
-                    "mission_result", "seq_current", "seq_reached", "seq_total", "finished"
-                )
-            ),
+            mission=self._mission(),
             texts=tuple(
                 Text((item.timestamp - self._start_us) * 1e-6, item.log_level - ord("0"), item.message)
                 for item in log.logged_messages
             ),
             overruns=self._overruns(),
-            loop_timing=tuple(
-                loop_timing(time_s, inner_hz, figures, int(clock))
-                for time_s, inner_hz, clock, *figures in self._rows(
-                    "loop_timing", "inner_hz", "clock", *_TIMING_FIELDS
-                )
-                if math.isfinite(figures[0])  # in lockstep the log has only counts
-            ),
+            loop_timing=self._loop_timing(),
+        )
+
+    def _statuses(self) -> tuple[Status, ...]:
+        return tuple(
+            Status(time_s, int(state), arming == _ARMED, bool(failsafe))
+            for time_s, state, arming, failsafe in self._rows(
+                "vehicle_status", "nav_state", "arming_state", "failsafe"
+            )
+        )
+
+    def _mission(self) -> tuple[MissionProgress, ...]:
+        return tuple(
+            MissionProgress(time_s, int(current), int(reached), int(total), bool(finished))
+            for time_s, current, reached, total, finished in self._rows(
+                "mission_result", "seq_current", "seq_reached", "seq_total", "finished"
+            )
+        )
+
+    def _loop_timing(self) -> tuple[LoopTiming, ...]:
+        return tuple(
+            loop_timing(time_s, inner_hz, figures, int(clock))
+            for time_s, inner_hz, clock, *figures in self._rows(
+                "loop_timing", "inner_hz", "clock", *_TIMING_FIELDS
+            )
+            if math.isfinite(figures[0])  # in lockstep the log has only counts
         )
 
     def _time_s(self, data: dict[str, Any]) -> FloatArray:

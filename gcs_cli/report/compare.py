@@ -67,6 +67,7 @@ _CONDITIONS = (
     ("gains", "gains"),
     ("plant", "plant"),
     ("loops", "loops"),
+    ("state", "state"),
     ("inner_hz", "inner loop [Hz]"),
     ("outer_hz", "outer loop [Hz]"),
     ("seed", "seed"),

@@ -1,9 +1,11 @@
-"""What flew and under what, in words, from the content of ``summary.json``; what is not known is left out."""
+"""Vehicle and conditions of a flight in words, from ``summary.json``; unknown values are omitted."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
+
+from flightstack.params.config import FLOWN_ON
 
 
 def flown(summary: Mapping[str, Any]) -> list[str]:
@@ -25,7 +27,7 @@ def flown(summary: Mapping[str, Any]) -> list[str]:
 
 
 def conditions(summary: Mapping[str, Any]) -> list[str]:
-    """Return what the simulator did to the vehicle: wind, gusts, battery, faults, and the seed of it all."""
+    """Return what the simulator did to the vehicle: wind, gusts, battery, faults and seed; and the state it flew on."""
     parts = [
         _vector("wind", summary.get("wind_m_s"), "m/s", ("north", "east", "down")),
         _amount("gusts", summary.get("gust_m_s"), " m/s"),
@@ -45,7 +47,10 @@ def conditions(summary: Mapping[str, Any]) -> list[str]:
     parts.append(_named("parameters of", summary.get("params")))
     parts += summary.get("param") or ()
     told = [part for part in parts if part] or ["no wind, no faults"]
-    return [*told, *([f"seed {summary['seed']}"] if summary.get("seed") is not None else [])]
+    if summary.get("seed") is not None:
+        told.append(f"seed {summary['seed']}")
+    state = summary.get("state")
+    return [*told, *([FLOWN_ON[state]] if state in FLOWN_ON else [])]
 
 
 def _drag(summary: Mapping[str, Any]) -> str:

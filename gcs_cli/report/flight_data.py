@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -29,7 +30,7 @@ class Series(NamedTuple):
 
 
 class Status(NamedTuple):
-    """What ``vehicle_status`` said from ``time_s`` on."""
+    """Content of ``vehicle_status`` from ``time_s`` on."""
 
     time_s: float
     nav_state: int
@@ -38,7 +39,7 @@ class Status(NamedTuple):
 
 
 class MissionProgress(NamedTuple):
-    """What ``mission_result`` said from ``time_s`` on; ``reached`` is −1 before the first item is."""
+    """Content of ``mission_result`` from ``time_s`` on; ``reached`` is −1 before the first item is."""
 
     time_s: float
     current: int
@@ -83,7 +84,7 @@ def empty_series(columns: int) -> Series:
 
 
 def series(time_s: FloatArray, values: FloatArray) -> Series:
-    """Return a series of two arrays that nobody can change any more."""
+    """Return a series of two read-only arrays."""
     time_s.flags.writeable = values.flags.writeable = False
     return Series(time_s, values)
 
@@ -125,15 +126,15 @@ class Flight:
     overruns: int | None = None
     loop_timing: tuple[LoopTiming, ...] = ()
     damaged: bool = False
-    """The log ends within a message, or holds what is none."""
+    """The log ends within a message, or contains invalid data."""
 
     @property
     def origin(self) -> GeoPoint | None:
-        """Where positions count from: home at the start, which may have moved since."""
+        """Origin of positions: home at the start, which may have moved since."""
         return self.local_origin or self.home
 
     def home_ne_m(self) -> tuple[float, float] | None:
-        """Where home is, north and east of the origin [m]; None if it is not known."""
+        """Position of home, north and east of the origin [m]; None if unknown."""
         if self.home is None or self.origin is None:
             return None
         local = LocalFrame(self.origin).to_ned(self.home)
@@ -141,7 +142,7 @@ class Flight:
 
     @property
     def disarmed_in_air(self) -> bool:
-        """Whether the flight ended with the vehicle off the ground and disarmed."""
+        """True if the flight ended with the vehicle off the ground and disarmed."""
         return bool(self.landed and self.statuses) and not (self.landed[-1][1] or self.statuses[-1].armed)
 
     def flying(self, time_s: FloatArray) -> FlagArray:
@@ -170,7 +171,7 @@ class Flight:
 
         It is the first time at the height of its rest after the last that was higher than a bounce.
         """
-        time_s, down = self.position.time_s, self.position.values[:, 2]
+        time_s, down = self.actual_position.time_s, self.actual_position.values[:, 2]
         first, end = np.searchsorted(time_s, (left_s, landed_s), side="right")
         if first >= end:
             return landed_s
@@ -180,9 +181,40 @@ class Flight:
         touching = np.flatnonzero(height[begin:] <= _TOUCH_M)
         return float(time_s[first + begin + touching[0]]) if len(touching) else landed_s
 
+    @cached_property
+    def actual_position(self) -> Series:
+        """True positions at the times of ``position`` where the log has them, else ``position``."""
+        return self._actual(self.position, self.true_position)
+
+    @cached_property
+    def actual_velocity(self) -> Series:
+        """True velocities at the times of ``velocity`` where the log has them, else ``velocity``."""
+        return self._actual(self.velocity, self.true_velocity)
+
+    @property
+    def actual_attitude(self) -> Series:
+        """True attitudes at times of their own where the log has them, else ``attitude``."""
+        return self.true_attitude if len(self.true_attitude.time_s) else self.attitude
+
+    @staticmethod
+    def _actual(known: Series, true: Series) -> Series:
+        if not len(true.time_s):
+            return known
+        return series(known.time_s, _interpolated(true, known.time_s))
+
     def position_error(self) -> Series:
-        """Setpoint minus position NED [m] while flying, shape (n, 3); NaN on an axis that the setpoint leaves free."""
-        time_s, position = self.position
+        """Setpoint minus position NED [m] while flying, shape (n, 3); NaN on an axis that the setpoint leaves free.
+
+        The position is the one that the vehicle knows: an estimate, if it flew on its sensors.
+        """
+        return self._setpoint_minus(self.position)
+
+    def actual_error(self) -> Series:
+        """Distance [m] between actual position and setpoint while flying, shape (n, 1)."""
+        return _distance(self._setpoint_minus(self.actual_position))
+
+    def _setpoint_minus(self, known: Series) -> Series:
+        time_s, position = known
         if not len(time_s) or not len(self.position_setpoint.time_s):
             return empty_series(3)
         setpoint = self.position_setpoint.values
@@ -192,11 +224,8 @@ class Flight:
         return series(time_s[flying], (setpoint - position)[flying])
 
     def tracking_error(self) -> Series:
-        """Distance [m] between position and setpoint while flying, shape (n, 1)."""
-        time_s, error = self.position_error()
-        distance = np.linalg.norm(error, axis=1)
-        kept = np.isfinite(distance)
-        return series(time_s[kept], distance[kept][:, None])
+        """Distance [m] between position, as the vehicle knows it, and setpoint while flying, shape (n, 1)."""
+        return _distance(self.position_error())
 
 
 def _step(changes: Iterable[tuple[float, bool]], time_s: FloatArray) -> FlagArray:
@@ -205,6 +234,12 @@ def _step(changes: Iterable[tuple[float, bool]], time_s: FloatArray) -> FlagArra
     times = np.array([time for time, _ in listed])
     values = np.array([False, *(value for _, value in listed)])
     return values[np.searchsorted(times, time_s, side="right")]
+
+
+def _distance(error: Series) -> Series:
+    distance = np.linalg.norm(error.values, axis=1)
+    kept = np.isfinite(distance)
+    return series(error.time_s[kept], distance[kept][:, None])
 
 
 def _interpolated(series: Series, time_s: FloatArray) -> FloatArray:

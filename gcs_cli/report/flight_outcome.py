@@ -1,4 +1,4 @@
-"""How a flight ended: a code, a sentence and an exit code, from what the ground has heard and what the log holds."""
+"""Outcome of a flight: a code, a sentence and an exit code, from telemetry and flight log."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Code(StrEnum):
 
 
 class Outcome(NamedTuple):
-    """How the flight ended."""
+    """Code, sentence and exit code of a flight."""
 
     code: Code
     reason: str
@@ -46,7 +46,7 @@ class Outcome(NamedTuple):
 
     @property
     def completed(self) -> bool:
-        """Whether the mission was flown to its end."""
+        """True if the mission was flown to its end."""
         return self.code is Code.COMPLETED
 
 
@@ -64,7 +64,7 @@ def ends_in_air(items: Sequence[MissionItem]) -> bool:
 
 
 def judged(view: VehicleView, items: Sequence[MissionItem]) -> Outcome:
-    """Judge a vehicle that has disarmed: did it fly its mission?
+    """Return the outcome for a vehicle that has disarmed: complete if it flew its mission.
 
     Any message may have been lost, so that each of three signs is enough.
     """

@@ -106,7 +106,7 @@ def _facts(flight: Flight, summary: dict[str, Any]) -> list[tuple[str, str]]:
     return [
         *(
             (name, shown(summary[name]))
-            for name in ("plan", "vehicle", "controller", "gains", "plant", "loops", "seed")
+            for name in ("plan", "vehicle", "controller", "gains", "plant", "loops", "state", "seed")
         ),
         ("inner loop", shown(summary["inner_hz"], "g", " Hz")),
         ("outer loop", shown(summary["outer_hz"], "g", " Hz")),

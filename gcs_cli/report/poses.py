@@ -31,7 +31,7 @@ class Run(NamedTuple):
 
     @property
     def film(self) -> Path:
-        """Where its film goes if nobody says so."""
+        """Default path of its film."""
         return self.log.with_name(_FILM if self.log.name == LOG_NAME else f"{self.log.stem}.mp4")
 
 
@@ -44,6 +44,10 @@ def find_run(path: Path) -> Run:
             if len(logs) != 1:
                 raise CliError(_no_single_log(path, logs), USAGE)
             log = logs[0]
+    elif path.suffix == ".tlog" and path.exists():
+        raise CliError(
+            f"{path}: is a tlog; give a ULog (.ulg). `gcs log plot` and `gcs replay` read a tlog", USAGE
+        )
     elif path.exists():
         log = path
     else:

@@ -15,6 +15,7 @@ import numpy as np
 from flightstack.core.atomic_file import write_text_atomically
 from flightstack.core.contract import FloatArray
 from flightstack.core.geodesy import LocalFrame
+from flightstack.params.config import ESTIMATED, TRUTH
 from flightstack.plan import NAV_COMMANDS, Command, MissionItem, Plan
 from gcs_cli.report.estimate_error import estimate_figures
 from gcs_cli.report.flight_data import Flight
@@ -32,10 +33,10 @@ _DIGITS = 6
 
 @dataclass(frozen=True)
 class RunInfo:
-    """What the log of the flight does not know: how it was started and how it ended.
+    """Facts that the flight log does not have: how the flight was started and how it ended.
 
     ``outcome`` is a code of ``flight_outcome``. ``wall_time_s`` runs from the start of the mission to the end of the
-    flight. What is None is taken from the log where it is there.
+    flight. Fields that are None are read from the log if it has them.
     """
 
     outcome: str
@@ -47,6 +48,7 @@ class RunInfo:
     gains: str | None = None
     plant: str | None = None
     loops: str | None = None
+    state: str | None = None
     seed: int | None = None
     wind: str | None = None
     gust: float | None = None
@@ -70,15 +72,27 @@ class RunInfo:
 
 
 def summarise(flight: Flight, plan: Plan, run: RunInfo) -> dict[str, Any]:
-    """Return the content of ``summary.json``: only what JSON can hold; null for what is not known.
+    """Return the content of ``summary.json``: values that JSON can hold; null if unknown.
 
     docs/reference/summary.md describes every key. For a run that left no readable log, pass ``Flight()``.
     """
     factor = flight.duration_s / run.wall_time_s if run.wall_time_s else None
     settings = {
         key: value if (value := getattr(run, key)) is not None else flight.info.get(key)
-        for key in ("vehicle", "controller", "gains", "plant", "loops", "seed", "inner_hz", "outer_hz")
+        for key in (
+            "vehicle",
+            "controller",
+            "gains",
+            "plant",
+            "loops",
+            "state",
+            "seed",
+            "inner_hz",
+            "outer_hz",
+        )
     }
+    if settings["state"] is None and flight.info.get("sys_name") == "flightstack":
+        settings["state"] = ESTIMATED if len(flight.true_position.time_s) else TRUTH
     return {
         "outcome": run.outcome,
         "outcome_text": run.outcome_text,
@@ -98,7 +112,7 @@ def summarise(flight: Flight, plan: Plan, run: RunInfo) -> dict[str, Any]:
 
 
 def _control(flight: Flight) -> dict[str, Any]:
-    """How well the setpoints were followed in flight, and what that took."""
+    """Tracking errors in flight, and the control effort."""
     error_m, angle_rad = flight.tracking_error().values[:, 0], attitude_error(flight).values[:, 0]
     angle_deg, torque = np.degrees(angle_rad), rms_torque_n_m(flight)
     return {
@@ -120,7 +134,7 @@ def _flight_time_s(flight: Flight) -> float | None:
 
 
 def _conditions(run: RunInfo, flight: Flight) -> dict[str, Any]:
-    """What the simulator was asked to do to the vehicle, in the units of the flags; null where nothing was."""
+    """Disturbances requested of the simulator, in the units of the flags; null for none."""
     return {
         "wind_m_s": _numbers(run.wind),
         "gust_m_s": run.gust,

@@ -10,7 +10,7 @@ from flightstack.core.errors import ConfigError, TargetError
 from flightstack.testing import Verdict, run_scenario
 from gcs_cli.report.page import render_report
 from gcs_cli.report.summary import RunInfo, summarise
-from gcs_cli.scenarios.figures import figures_of
+from gcs_cli.scenarios.figures import figures_of, metrics_of
 from gcs_cli.scenarios.result import Result, Wanted, not_flown
 from gcs_cli.scenarios.selection import Case
 
@@ -35,7 +35,7 @@ def fly_case(case: Case, wanted: Wanted) -> Result:
 def _result(case: Case, verdict: Verdict, wanted: Wanted, began_s: float) -> Result:
     flight = verdict.flight
     content = flight.log.content
-    has_files = wanted.files and not verdict.passed
+    has_files = wanted.every_file or (wanted.files and not verdict.passed)
     texts = [(event.time_s, event.name) for event in flight.events]
     texts += [(text.time_s, text.text) for text in flight.log.texts]
     return Result(
@@ -48,6 +48,7 @@ def _result(case: Case, verdict: Verdict, wanted: Wanted, began_s: float) -> Res
         log_sha256=hashlib.sha256(content).hexdigest() if content else None,
         texts=tuple(sorted(texts, key=lambda text: text[0])),
         figures=figures_of(flight) if wanted.figures else (),
+        metrics=metrics_of(flight) if wanted.metrics else {},
         log=content if has_files else b"",
         report=_report(case, verdict) if has_files else "",
     )
@@ -66,6 +67,7 @@ def _report(case: Case, verdict: Verdict) -> str:
         gains=setup.gains,
         plant=setup.plant,
         loops=setup.loops,
+        state=setup.state,
         seed=case.seed,
         wind=wind,
         gust=setup.gust or None,

@@ -1,4 +1,7 @@
-"""The options of ``gcs test``."""
+"""The options of ``gcs test``.
+
+A module of its own: the help imports no scenario.
+"""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ class Notice(NamedTuple):
 
 
 class Tick(NamedTuple):
-    """Nothing happened for a while: time to redraw."""
+    """No event for a while: time to redraw."""
 
 
 Message = Started | Finished | Notice | Tick
@@ -122,7 +122,7 @@ class Pool:
     def fly(
         self, cases: Sequence[Case], wanted: Wanted, *, stops_at_failure: bool = False
     ) -> Generator[Message, None, None]:
-        """Fly the cases and yield what happens; end all flights if the iterator is closed.
+        """Fly the cases and yield their events; end all flights if the iterator is closed.
 
         With ``stops_at_failure`` no case after the first one that fails is flown, and those that already are end.
         """

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from flightstack.testing.expectations import Check
@@ -13,12 +13,16 @@ from gcs_cli.scenarios.selection import Case
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a worker returns besides the verdict."""
+    """Data that a worker returns besides the verdict."""
 
     figures: bool = False
     """Figures for the page."""
     files: bool = False
     """Log and report of a flight that failed."""
+    every_file: bool = False
+    """Log and report of any flight."""
+    metrics: bool = False
+    """Figures of the flight as numbers."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +41,8 @@ class Result:
     texts: tuple[tuple[float, str], ...] = ()
     """Times and names of the events and status texts, oldest first."""
     figures: tuple[Figure, ...] = ()
+    metrics: Mapping[str, float] = field(default_factory=dict)
+    """Figures of the flight by name, with their unit; NaN where it has none."""
     log: bytes = b""
     report: str = ""
 

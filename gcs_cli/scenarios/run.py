@@ -30,7 +30,7 @@ _POLL_S = 0.5
 
 @dataclass(frozen=True)
 class Run:
-    """What was flown."""
+    """The flown cases and their results."""
 
     rows: tuple[Row, ...]
     total: int
@@ -45,13 +45,13 @@ class Run:
         return DONE if all(row.result.passed for row in self.rows) else FAILED
 
 
-class Keeper:
+class FailureFiles:
     """Writes log and report of each failed flight to a folder, which it makes with the first."""
 
     def __init__(self, folder: Path | None) -> None:
         self._folder = folder
 
-    def keep(self, case: Case, result: Result) -> str | None:
+    def write(self, case: Case, result: Result) -> str | None:
         """Write the files of a flight; return its folder, or None without files. Raise CliError, OSError."""
         if not result.log:
             return None
@@ -127,7 +127,7 @@ def _fly(pool: Pool, cases: Sequence[Case], options: TestOptions, console: Conso
     began_s = time.monotonic()
     wanted = Wanted(figures=options.report is not None, files=True)
     display = make_display(console, cases)
-    collected = _Collected(cases, display, Keeper(options.keep))
+    collected = _Collected(cases, display, FailureFiles(options.keep))
     interrupted = False
     try:
         with contextlib.closing(pool.fly(cases, wanted, stops_at_failure=options.exitfirst)) as messages:
@@ -153,8 +153,8 @@ def _fly(pool: Pool, cases: Sequence[Case], options: TestOptions, console: Conso
 class _Collected:
     """The results so far; they are shown in the order of the cases."""
 
-    def __init__(self, cases: Sequence[Case], display: Display, keeper: Keeper) -> None:
-        self._cases, self._display, self._keeper = cases, display, keeper
+    def __init__(self, cases: Sequence[Case], display: Display, files: FailureFiles) -> None:
+        self._cases, self._display, self._files = cases, display, files
         self._rows: dict[int, Row] = {}
         self._shown = 0
         self._has_noted = False
@@ -165,7 +165,7 @@ class _Collected:
         result = message.result or not_flown(message.reason)
         kept = None
         try:
-            kept = self._keeper.keep(case, result)
+            kept = self._files.write(case, result)
         except (OSError, CliError) as error:
             self._display.note(f"gcs: the log of {case.name} is not kept: {error}")
         self._rows[message.case] = Row(case, replace(result, log=b"", report=""), kept)

@@ -13,8 +13,6 @@ import threading
 from queue import SimpleQueue
 from typing import IO, Any
 
-from numba.core import event
-
 from flightstack.process.compile_notice import CompileNotice
 from gcs_cli.scenarios.flying import fly_case
 from gcs_cli.scenarios.pipes import receive, send
@@ -26,7 +24,7 @@ def main() -> None:
     os.dup2(2, 1)  # what a library prints is no answer
     tasks: SimpleQueue[Any] = SimpleQueue()
     threading.Thread(target=_read, args=(sys.stdin.buffer, tasks), daemon=True).start()
-    event.register("numba:compile", CompileNotice(lambda line: send(answers, line), ()))
+    CompileNotice(lambda line: send(answers, line), ()).start()
     with contextlib.suppress(OSError):  # the parent has ended
         while True:
             send(answers, fly_case(*tasks.get()))

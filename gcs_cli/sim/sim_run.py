@@ -20,6 +20,7 @@ from gcs_cli.errors import FAILED, NO_ANSWER, CliError
 from gcs_cli.fly.fly_options import check_options, check_ports, simulator_arguments
 from gcs_cli.fly.processes import Children, Interruption
 from gcs_cli.link import calls
+from gcs_cli.link.endpoint import LOOPBACK
 from gcs_cli.link.session import Session
 from gcs_cli.output import Output
 from gcs_cli.run_directory import SIMULATOR, STACK
@@ -31,6 +32,7 @@ from gcs_cli.sim.sim_vehicles import (
     ready_text,
     stack_arguments,
     start_of,
+    station_port,
     vehicles_of,
 )
 from gcs_cli.vehicle_link import open_signing
@@ -196,6 +198,14 @@ def _ready_sentence(count: int) -> str:
     return f"{many}Ctrl-C ends the simulation"
 
 
+def view_link(vehicle: SimOptions) -> list[str]:
+    """Return the options of the link on which the view finds the vehicle, or all of several."""
+    port = station_port(vehicle)
+    if vehicle.vehicles == 1 or port is None:
+        return ["--instance", str(vehicle.instance)]
+    return ["--connect", f"udpin:{LOOPBACK}:{port}"]
+
+
 @contextlib.contextmanager
 def opened_view(vehicle: SimOptions, wanted: bool) -> Iterator[subprocess.Popen[bytes] | None]:
     """Run ``gcs watch`` on this terminal; at the end terminate it, so that it restores the terminal.
@@ -206,9 +216,9 @@ def opened_view(vehicle: SimOptions, wanted: bool) -> Iterator[subprocess.Popen[
         yield None
         return
     signing = [] if vehicle.signing_key is None else ["--signing-key", str(vehicle.signing_key)]
-    number = ["--instance", str(vehicle.instance)]
+    link = view_link(vehicle)
     inherited, own_end = os.pipe()
-    program = supervised("gcs_cli", *signing, *number, "watch", descriptor=inherited)
+    program = supervised("gcs_cli", *signing, *link, "watch", descriptor=inherited)
     with subprocess.Popen(program, pass_fds=(inherited,)) as view:
         os.close(inherited)
         try:

@@ -21,7 +21,7 @@ from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly.fly_flags import TO_STACK as FLOWN_TO_STACK
 from gcs_cli.fly.fly_flags import passed
 from gcs_cli.fly.fly_options import home_text, outer_rate_hz
-from gcs_cli.link.endpoint import vehicle_connection
+from gcs_cli.link.endpoint import LOOPBACK, vehicle_connection
 from gcs_cli.sim.sim_flags import TO_STACK, SimOptions
 from gcs_cli.vehicle.param_info import load_parameters, number_text
 
@@ -32,7 +32,8 @@ _ALL_INTERFACES = "0.0.0.0"
 def vehicles_of(options: SimOptions) -> list[SimOptions]:
     """Return the options of each vehicle; raise CliError (usage) or ConfigError.
 
-    Each has an instance, a start position and a seed of its own; several vehicles share no file that they write.
+    Each has an instance, a start position and a seed of its own; several vehicles share no file that they write. All
+    send to the ground station of the first, as PX4's instances do, so that one view shows them.
     """
     first = DEFAULT_HOME if options.home is None else parse_home(options.home)
     if options.instance + options.vehicles > INSTANCES:
@@ -43,12 +44,16 @@ def vehicles_of(options: SimOptions) -> list[SimOptions]:
         )
     single = options.vehicles == 1
     assignments = [] if single else shared_parameters(options)
+    stations = (
+        options.gcs if single else options.gcs or [f"{LOOPBACK}:{ground_station_port(options.instance)}"]
+    )
     frame = LocalFrame(first)
     return [
         replace(
             options,
             instance=options.instance + index,
             seed=options.seed + index,
+            gcs=stations,
             home=home_text(frame.to_geo(Vector3(0.0, index * options.spacing, 0.0)) if index else first),
             log=options.log if single else _own_log(options, options.instance + index),
             state_dir=options.state_dir if single else _own_state_dir(options, options.instance + index),
@@ -101,6 +106,14 @@ def stack_arguments(vehicle: SimOptions) -> list[str]:
     ]
 
 
+def station_port(vehicle: SimOptions) -> int | None:
+    """Return the UDP port of the ground station on this machine that the vehicle sends to; None if there is none."""
+    if not vehicle.gcs:
+        return ground_station_port(vehicle.instance)
+    ports = (station.rpartition(":") for station in vehicle.gcs)
+    return next((int(port) for host, _, port in ports if host == LOOPBACK and port.isdecimal()), None)
+
+
 def local_host(vehicle: SimOptions) -> str:
     """Return the address at which a program on this machine reaches the vehicle."""
     return "127.0.0.1" if vehicle.listen == _ALL_INTERFACES else vehicle.listen
@@ -113,7 +126,7 @@ def connections(vehicle: SimOptions) -> dict[str, Any]:
         "instance": instance,
         "system_id": system_id(instance),
         "mavsdk": f"udpin://127.0.0.1:{api_client_port(instance)}",
-        "ground_station_port": ground_station_port(instance),
+        "ground_station_port": station_port(vehicle),
         "gcs": vehicle_connection(instance),
         "tcp": f"tcp:{local_host(vehicle)}:{tcp_port(instance)}",
         "latitude_deg": home.latitude_deg,
@@ -126,14 +139,14 @@ def ready_text(vehicle: SimOptions) -> str:
     """Return the lines that say how to connect to the vehicle."""
     facts = connections(vehicle)
     key = "" if vehicle.signing_key is None else f" --signing-key {shlex.quote(str(vehicle.signing_key))}"
-    number = "" if vehicle.instance == 0 else f" --instance {vehicle.instance}"
-    port = facts["ground_station_port"]
-    stations = [f"UDP {port}" + ("" if vehicle.instance == 0 else ", added as a link")]
-    if vehicle.gcs:
-        stations = [f"UDP {', '.join(vehicle.gcs)}"]
+    is_alone = vehicle.instance == 0 and vehicle.vehicles == 1
+    number = "" if is_alone else f" --instance {vehicle.instance}"
+    port = station_port(vehicle)
+    stations = ", ".join(vehicle.gcs or ()) if port is None else str(port)
+    added = "" if port in (None, ground_station_port(0)) else ", added as a link"
     rows = (
         ("MAVSDK", facts["mavsdk"]),
-        ("QGroundControl", stations[0]),
+        ("QGroundControl", f"UDP {stations}{added}"),
         ("gcs", f"gcs{key}{number} status"),
         ("any program", facts["tcp"]),
     )

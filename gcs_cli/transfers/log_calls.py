@@ -24,7 +24,7 @@ Progress: TypeAlias = Callable[[int, int], None]
 
 def fetch_list(connection: Connection) -> tuple[LogEntry, ...]:
     """Return all logs of the vehicle, the oldest first; raise CliError."""
-    client = _log_client(connection)
+    client = _log_client(connection, "log list")
     client.start_list()
     connection.run(client, "log list")
     if isinstance(client.result, LogDone):
@@ -47,7 +47,7 @@ def kept_logs(before: tuple[LogEntry, ...], after: tuple[LogEntry, ...]) -> tupl
 
 def erase_logs(connection: Connection, before: int) -> tuple[LogEntry, ...]:
     """Erase the ``before`` logs of the vehicle; return those that are left; raise CliError."""
-    client = _log_client(connection)
+    client = _log_client(connection, "log erase")
     client.start_erase(before)
     connection.run(client, "log erase")
     if isinstance(client.result, LogDone):
@@ -105,7 +105,7 @@ def fetch_log(connection: Connection, log: LogEntry, file: Entry | None, show: P
         connection.run(over_ftp, name, show=show)
         if isinstance(over_ftp.result, FtpDone):
             return over_ftp.result.content
-    client = _log_client(connection)
+    client = _log_client(connection, name)
     client.start_download(log)
     connection.run(client, name, show=show)
     if isinstance(client.result, LogDone):
@@ -129,10 +129,14 @@ def _error(result: object, name: str) -> CliError:
     return CliError(f"{name}: the vehicle did not answer", NO_ANSWER)
 
 
-def _log_client(connection: Connection) -> LogClient:
+def _log_client(connection: Connection, name: str) -> LogClient:
     session = connection.session
-    is_silent = session.view.autopilot.is_silent_without_logs
-    return LogClient(vehicle_address(session), is_silent_without_logs=is_silent)
+    autopilot = session.view.autopilot
+    if session.view.armed and not autopilot.sends_logs_armed:
+        raise CliError(
+            f"{name} refused: {autopilot.title} sends no logs while it is armed: disarm it first", FAILED
+        )
+    return LogClient(vehicle_address(session), is_silent_without_logs=autopilot.is_silent_without_logs)
 
 
 def _ftp_client(connection: Connection) -> FtpClient:

@@ -1,4 +1,4 @@
-"""What commands do with plans of files and of the vehicle, and what they print: upload, download and comparison."""
+"""Upload, download and comparison of plans, and the lines that these commands print."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Units and enumerations of message fields, from MAVLink's definitions, for people. Pure."""
+"""Numbers, units and enumerations of message fields, from MAVLink's definitions, for people. Pure."""
 
 from __future__ import annotations
 
@@ -8,6 +8,18 @@ from typing import Any
 from flightstack.core.contract import FloatArray
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
+
+UNKNOWN = "—"
+
+
+def number(value: float | None, digits: int = 2, unit: str = "") -> str:
+    """Format a number; a dash if unknown."""
+    if value is None:
+        return UNKNOWN
+    if abs(value) >= 1e7:
+        return f"{value:.1e}{unit}"
+    return f"{round(value, digits) + 0.0:.{digits}f}{unit}"  # + 0.0: no -0.00
+
 
 _DEGREES = math.degrees(1.0)
 _SHOWN_UNITS: dict[str, tuple[float, str]] = {

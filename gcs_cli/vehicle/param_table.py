@@ -87,8 +87,11 @@ def description(parameter: Parameter, info: ParamInfo) -> str:
     lines = [f"{parameter.name} = {number_text(parameter.value)}{_unit(info)}"]
     if info.help:
         lines.append(f"  {info.help}")
-    if info.details:
-        lines.append(f"  {info.details}")
+    details = info.details.removeprefix(info.help).lstrip(
+        ". "
+    )  # some vehicles repeat the short text in the long one
+    if details:
+        lines.append(f"  {details}")
     limits = [
         f"default {number_text(info.default)}" if info.default is not None else "",
         f"range {info.range_text}" if info.range_text and not info.choices else "",

@@ -32,6 +32,7 @@ _IGNORE_ATTITUDE = 128  # ATTITUDE_TARGET_TYPEMASK
 _PREARM_CHECK = 1 << 28  # MAV_SYS_STATUS_PREARM_CHECK: no sensor
 _RATE_WINDOW_S = 1.0
 _MOST_ROTORS = 16
+_STANDARD = "MAV_STANDARD_MODE_"
 _NOT_SELECTABLE = 2  # MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
 _RESTART_S = 0.25
 """Step back of the vehicle's clock that no reordering of datagrams explains."""
@@ -77,11 +78,11 @@ def _counted(link: LinkCounts, sequence: int, now_s: float) -> LinkCounts:
     gap = 0 if link.last_sequence is None else (sequence - link.last_sequence - 1) % 256
     if gap > 128:  # out of order or repeated, not a gap of more than half the range
         gap = 0
-    start, count, rate = link.window_start_s, link.window_count + 1, link.rate_hz
-    if start is None:
-        start = now_s
-    elif now_s - start >= _RATE_WINDOW_S:
-        start, count, rate = now_s, 0, count / (now_s - start)
+    start, count, rate, last = link.window_start_s, link.window_count + 1, link.rate_hz, link.last_received_s
+    if start is None or last is None or (rate is None and now_s == start):
+        start, count = now_s, 0  # read at once with the first message: a backlog has no rate
+    elif now_s != last and last - start >= _RATE_WINDOW_S:  # messages read at one time belong to one window
+        start, count, rate = last, 1, link.window_count / (last - start)
     return LinkCounts(link.received + 1, link.lost + gap, sequence, now_s, rate, start, count)
 
 
@@ -124,9 +125,16 @@ def mode_name(view: VehicleView, custom_mode: int) -> str:
     return next(labels, f"mode {custom_mode}")
 
 
+def _standard_label(standard_mode: int) -> str:
+    """Return the label of a mode that has none of its own: PX4 leaves out those of MAVLink's standard modes."""
+    entry = mavlink.enums["MAV_STANDARD_MODE"].get(standard_mode) if standard_mode else None
+    return "" if entry is None else entry.name.removeprefix(_STANDARD).replace("_", " ").capitalize()
+
+
 def _available_mode(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     selectable = not message.properties & _NOT_SELECTABLE
-    entry = AvailableMode(message.custom_mode, message.mode_name, selectable, message.standard_mode)
+    label = message.mode_name or _standard_label(message.standard_mode)
+    entry = AvailableMode(message.custom_mode, label, selectable, message.standard_mode)
     others = [mode for mode in view.modes if mode.number != entry.number]
     view = view._replace(modes=(*others, entry), mode_total=message.number_modes)
     return view._replace(mode=mode_name(view, view.custom_mode))

@@ -197,7 +197,7 @@ class AvailableMode(NamedTuple):
     number: int
     """The custom mode."""
     label: str
-    """The vehicle's own name of it."""
+    """The vehicle's own name of it, else that of MAVLink's standard mode."""
     is_selectable: bool
     standard_mode: int
     """MAV_STANDARD_MODE; 0: none."""
@@ -316,7 +316,7 @@ class VehicleView(NamedTuple):
     partial_text: PartialText | None = None
     time_s: float | None = None
     restarts: int = 0
-    """How often the vehicle's clock began anew."""
+    """Number of restarts of the vehicle's clock."""
     link: LinkCounts = LinkCounts()
 
     @property

@@ -10,13 +10,13 @@ from flightstack.mavlink.link import Link
 from flightstack.params.vehicle import load_vehicle
 from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from flightstack.simulator_link.hot_frames import ActuatorsFrame
-from flightstack.testing import World
 from flightstack.testing.engine import Engine
 from gcs_cli.link.session import Service, Session
 from tests.fuzz.clients import SERVICES
 from tests.fuzz.inputs import KINDS
 from tests.fuzz.memory_logs import MemoryLogs
 from tests.fuzz.script import Style, of_frames, restyled, written
+from tests.support.truth import World
 
 _HERE = ("192.0.2.1", 18570)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from flightstack.mavlink.frames import FrameFinder
 from flightstack.mavlink.link import Link, Message
 from flightstack.services.routing.peer import PeerAddress
-from flightstack.testing import World
+from tests.support.truth import World
 
 _CHANGES_PARAMETERS = {"PARAM_SET", "COMMAND_LONG", "COMMAND_INT"}
 _CHANGES_LOOPS = {*_CHANGES_PARAMETERS, "SET_MODE"}  # arming resets them

@@ -22,7 +22,6 @@ from flightstack.params.vehicle import load_vehicle
 from flightstack.services.routing.hub import MAX_TO_FORWARD
 from flightstack.services.routing.peer import PeerAddress
 from flightstack.simulator_link.endpoint import SimulatorEndpoint
-from flightstack.testing import World
 from flightstack.testing.engine import Engine
 from gcs_cli.link.session import Session
 from sim_bridge.errors import PlantDivergedError
@@ -32,6 +31,7 @@ from sim_bridge.simulator import Simulator
 from tests.fuzz.clients import SERVICES
 from tests.fuzz.memory_logs import MemoryLogs
 from tests.fuzz.script import KEY, MOST_STEPS, steps
+from tests.support.truth import World
 
 SIGNED, FLYING = 1, 2
 """Bits of a hub script's first octet."""

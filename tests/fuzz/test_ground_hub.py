@@ -13,10 +13,10 @@ from flightstack.mavlink.link import Link
 from flightstack.mavlink.signing import Signing
 from flightstack.services.routing.hub import MAX_PEERS, MAX_TO_FORWARD
 from flightstack.services.routing.peer import PeerAddress
-from flightstack.testing import World
 from tests.fuzz.inputs import KINDS, Inputs
 from tests.fuzz.measure import calls, held
 from tests.support.plan_items import item
+from tests.support.truth import World
 
 MESSAGES = 8_000
 TICK_EVERY = 40

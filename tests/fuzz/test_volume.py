@@ -17,7 +17,6 @@ from flightstack.mavlink.link import Link
 from flightstack.mavlink.signing import MAX_STREAMS, LinkSigning, Signing
 from flightstack.services.routing.hub import MAX_PEERS, MAX_TO_FORWARD
 from flightstack.services.routing.peer import PeerAddress
-from flightstack.testing import World
 from flightstack.testing.engine import Engine
 from tests.fuzz.guard import Guard
 from tests.fuzz.inputs import KINDS, Inputs
@@ -27,6 +26,7 @@ from tests.fuzz.script import KEY
 from tests.fuzz.targets import answers, check_vehicle
 from tests.support.plan_items import item
 from tests.support.tools import NIGHTLY
+from tests.support.truth import World
 
 INPUTS = (
     {"plain": 80_000, "signed": 60_000, "stream": 60_000}

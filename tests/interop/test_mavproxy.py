@@ -72,10 +72,12 @@ def test_it_sets_parameters_and_tells_why_one_is_refused(proxy: MavProxy, witnes
     proxy.tell("param set MIS_TAKEOFF_ALT 4")
     changed = witness.until("PARAM_VALUE", lambda value: value.param_id == "MIS_TAKEOFF_ALT")
     assert changed.param_value == 4.0  # echoed on every link
+    proxy.tell("param fetch MIS_TAKEOFF_ALT", "MIS_TAKEOFF_ALT = 4.0")  # it hears of it after the witness
     proxy.tell("param show MIS_TAKEOFF_ALT", "MIS_TAKEOFF_ALT  4.0")
     proxy.tell("param set NAV_DLL_ACT 2")  # an integer, whose bytes it sends
     integer = witness.until("PARAM_VALUE", lambda value: value.param_id == "NAV_DLL_ACT")
     assert integer.param_type == mavlink.MAV_PARAM_TYPE_INT32
+    proxy.tell("param fetch NAV_DLL_ACT", "NAV_DLL_ACT = 2")
     proxy.tell("param show NAV_DLL_ACT", "NAV_DLL_ACT      2")
     proxy.tell("param set NAV_DLL_ACT 0")
     witness.until("PARAM_VALUE", lambda value: value.param_id == "NAV_DLL_ACT")

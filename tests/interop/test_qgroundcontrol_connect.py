@@ -35,7 +35,9 @@ MANUAL = 1 << 16
 @pytest.fixture(scope="module")
 def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
     """QGroundControl, which was there before the vehicle."""
-    vehicle = RealVehicle(tmp_path_factory.mktemp("qgroundcontrol"), 1.0)
+    vehicle = RealVehicle(
+        tmp_path_factory.mktemp("qgroundcontrol"), 1.0, "--inner-hz", "500"
+    )  # streams of 100 Hz
     station = Station(UdpPort(vehicle.gcs_port), 1 + vehicle.instance)
     yield station
     station.close()

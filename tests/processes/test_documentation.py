@@ -6,17 +6,15 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
-from typing import IO, Any
 
 import pytest
 
-import gcs_cli.fly.processes
 from flightstack.testing.instances import free_instance
 from tests.support import commands
 from tests.support.console_blocks import Command, File, Skipped, shows, steps
 from tests.support.plugin_run import PLUGIN
 from tests.support.programs import Program
+from tests.support.warm_children import warm_children
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGES = sorted(page for folder in ("start", "tutorials", "how-to") for page in (DOCS / folder).glob("*.md"))
@@ -26,7 +24,7 @@ SKIPPED = {
     "controller.md": 2,
     "mission-tests.md": 1,
     "qgroundcontrol-mavsdk.md": 1,
-    "pil.md": 3,
+    "pil.md": 4,
     "compare.md": 1,
     "faults.md": 1,
     "film.md": 1,
@@ -42,14 +40,6 @@ IN_PROCESS = {
     "flightstack": commands.flightstack_command,
     "sim-bridge": commands.sim_bridge_command,
 }
-
-
-def warm_child(arguments: list[str], *, stdout: IO[bytes], **_: Any) -> Program:
-    """Start a child of ``gcs fly`` from the server that has imported the programs."""
-    module = arguments.index("-m") + 1
-    child = Program(arguments[module], arguments[module + 1 :], listens=True, log=stdout)
-    child.stdout.close()  # all goes to the log
-    return child
 
 
 class Reader:
@@ -127,9 +117,7 @@ class Reader:
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_commands_of_a_page_run_as_shown(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    names = {name: getattr(subprocess, name) for name in ("DEVNULL", "PIPE", "STDOUT")}
-    warm = SimpleNamespace(Popen=warm_child, **names)
-    monkeypatch.setattr(gcs_cli.fly.processes, "subprocess", warm)
     reader = Reader(tmp_path)
-    reader.follow(page)
+    with warm_children():
+        reader.follow(page)
     assert reader.skipped == SKIPPED.get(page.name, 0)

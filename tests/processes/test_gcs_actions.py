@@ -10,6 +10,7 @@ from contextlib import contextmanager
 
 import pytest
 
+from flightstack.mavlink.link import Message
 from flightstack.transports.udp import UdpSocket
 from gcs_cli.actions.run import ActionRun
 from tests.support.commands import Ended, gcs
@@ -68,6 +69,15 @@ def test_arducopter_is_flown_from_the_command_line() -> None:
     assert not vehicle.armed
 
 
+def test_logs_of_an_armed_arducopter_are_refused_at_once() -> None:
+    with arducopter(FakeArduCopter(armed=True)) as link:
+        ended = gcs("--connect", link, "log", "list")
+    assert ended.returncode == 1
+    assert ended.stderr == (
+        "gcs: log list refused: ArduPilot sends no logs while it is armed: disarm it first\n"
+    )
+
+
 def test_a_refusal_is_an_object_in_json_and_a_sentence_on_stderr() -> None:
     result = told(FakeVehicle(refusals={ARM: "Command refused: no valid position yet"}), "arm", "--json")
     facts = json.loads(result.stdout)
@@ -85,12 +95,17 @@ def test_land_ends_when_the_vehicle_has_disarmed() -> None:
 
 
 def test_an_interrupted_action_says_that_the_vehicle_continues(monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupt(_run: ActionRun, _view: object, _now_s: float) -> None:
-        raise KeyboardInterrupt
+    poll = ActionRun.poll
+
+    def interrupt(run: ActionRun, now_s: float) -> list[Message]:
+        messages = poll(run, now_s)
+        if run.acknowledged:
+            raise KeyboardInterrupt
+        return messages
 
     vehicle = FakeVehicle()
     vehicle.armed = True
-    monkeypatch.setattr(ActionRun, "_await_effect", interrupt)
+    monkeypatch.setattr(ActionRun, "poll", interrupt)
     result = told(vehicle, "land")
     assert (result.stderr, result.returncode) == (
         "gcs: interrupted while landing: the vehicle continues\n",

@@ -229,7 +229,8 @@ def test_files_are_checked_as_the_vehicle_checks_them(tmp_path: Path) -> None:
     text = (MISSIONS / "fenced_square.plan").read_text()
     bad.write_text(text.replace('"radius": 4.0', '"radius": 15.0'))
     result = gcs("mission", "check", bad)
-    assert result.returncode == 1
+    assert result.returncode == 2
+    assert "good" not in result.stdout
     assert "mission: item 1 (NAV_WAYPOINT)" in result.stderr
 
 

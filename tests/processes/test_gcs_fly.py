@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import re
 import select
 import signal
 import socket
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -26,34 +26,38 @@ from gcs_cli.report.analysis import read_flight
 from gcs_cli.tui.fly.panels import SEVERITIES, clock_text
 from tests.support.commands import Ended, gcs
 from tests.support.process import await_output, children_of, ends_of
+from tests.support.programs import Program
+from tests.support.warm_children import warm_children
 
 LONG_S = 120.0  # a bound for a busy machine that compiles the kernels anew; a flight takes two seconds
 MISSIONS = Path(__file__).parents[2] / "missions"
-INSTANCE = free_instance()
 SIGNED = 0x01  # MAVLINK_IFLAG_SIGNED, in the third byte of a frame
+SENSORS = ("--state", "estimated")
 PATIENT = ["--speed", "1"]  # leaves time to interfere
 
 
+@functools.cache
+def instance() -> int:
+    """Return the instance of these tests, which is free when the first of them begins."""
+    return free_instance()
+
+
 def command(out: Path, *flags: str, plan: str = "hop.plan") -> list[str]:
-    fly = [sys.executable, "-m", "gcs_cli", "fly", str(MISSIONS / plan), "--out", str(out)]
-    return [*fly, "--instance", str(INSTANCE), *flags]
+    """Return a flight on the true state; ``flags`` with another ``--state`` come later and win."""
+    fly = ["fly", str(MISSIONS / plan), "--out", str(out), "--instance", str(instance())]
+    return [*fly, "--state", "truth", *flags]
 
 
 def run(out: Path, *flags: str, plan: str = "hop.plan") -> Ended:
-    """Fly within the test; simulator and flight stack are processes."""
-    return gcs(*command(out, *flags, plan=plan)[3:])
+    """Fly within the test; simulator and flight stack are processes, forked from the warm server."""
+    with warm_children():
+        return gcs(*command(out, *flags, plan=plan))
 
 
 @contextmanager
-def flight(out: Path, *flags: str) -> Iterator[tuple[subprocess.Popen[str], dict[str, int]]]:
+def flight(out: Path, *flags: str) -> Iterator[tuple[Program, dict[str, int]]]:
     """Begin a flight and wait until it is in the air; no child may be left afterwards."""
-    process = subprocess.Popen(
-        command(out, *flags, *PATIENT),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
+    process = Program("gcs_cli", command(out, *flags, *PATIENT))
     try:
         await_output(process, "Takeoff detected")
         children = children_of(process.pid)
@@ -73,10 +77,10 @@ def summary_of(out: Path) -> dict[str, object]:
 
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended]:
-    """A whole flight: its directory and what it printed."""
+    """A whole flight, whose children are new interpreters: its directory and what it printed."""
     out = tmp_path_factory.mktemp("flown") / "run"
-    flags = ("--json", "--seed", "5", "--controller", "backstepping", "--inner-hz", "250")
-    return out, run(out, *flags)
+    flags = ("--json", "--seed", "5", "--controller", "backstepping", "--inner-hz", "250", *SENSORS)
+    return out, gcs(*command(out, *flags))
 
 
 @pytest.mark.smoke
@@ -103,14 +107,15 @@ def text_lines(printed: str) -> list[str]:
 
 
 def test_equal_flights_print_equal_texts_and_log_equal_bytes(tmp_path: Path) -> None:
-    one, other = (text_lines(run(tmp_path / name).stdout) for name in ("one", "other"))
+    one, other = (text_lines(run(tmp_path / name, *SENSORS).stdout) for name in ("one", "other"))
     assert one == other
     assert not [line for line in one if "WARN" in line]
     logs = [(tmp_path / name / "flight.ulg").read_bytes() for name in ("one", "other")]
     assert logs[0] == logs[1]
+    flight = read_flight(tmp_path / "one" / "flight.ulg")
     logged = [
-        f"{clock_text(round(text.time_s, 6))}  {SEVERITIES[text.level]}: {text.text}"
-        for text in read_flight(tmp_path / "one" / "flight.ulg").texts
+        f"{clock_text(round(flight.start_s + text.time_s, 6))}  {SEVERITIES[text.level]}: {text.text}"
+        for text in flight.texts
     ]
     assert [line for line in one if "Mission loaded" not in line] == logged  # the log begins after the upload
 
@@ -127,11 +132,11 @@ def test_fly_works_beside_a_ground_station_that_holds_its_port(tmp_path: Path) -
     parameters = tmp_path / "my.params"
     parameters.write_text("1\t1\tSYS_AUTOSTART\t4001\t6\n")
     flags = ("--params", str(parameters), "--param", "MIS_TAKEOFF_ALT=4", "--force", "0.1,0,0")
-    with UdpSocket("127.0.0.1", FlyOptions(Path(), instance=INSTANCE).gcs_port) as station:
+    with UdpSocket("127.0.0.1", FlyOptions(Path(), instance=instance()).gcs_port) as station:
         result = run(tmp_path / "run", *flags)
         heard = b"".join(data for data, _ in station.receive())
     assert result.returncode == 0, result.stderr
-    assert bytes((1 + INSTANCE, 1, 0, 0, 0)) in heard  # a heartbeat of the vehicle's autopilot
+    assert bytes((1 + instance(), 1, 0, 0, 0)) in heard  # a heartbeat of the vehicle's autopilot
     assert result.stdout.count("flightstack: warning: ") == 1
     summary = summary_of(tmp_path / "run")
     assert (summary["param"], summary["force_n"]) == (["MIS_TAKEOFF_ALT=4"], [0.1, 0.0, 0.0])
@@ -140,8 +145,9 @@ def test_fly_works_beside_a_ground_station_that_holds_its_port(tmp_path: Path) -
 def test_signing_key_signs_both_ends_of_the_link(tmp_path: Path) -> None:
     key = tmp_path / "my.key"
     create_key(key)
-    with UdpSocket("127.0.0.1", FlyOptions(Path(), instance=INSTANCE).gcs_port) as station:
-        result = gcs("--signing-key", key, *command(tmp_path / "run")[3:])
+    with UdpSocket("127.0.0.1", FlyOptions(Path(), instance=instance()).gcs_port) as station:
+        with warm_children():
+            result = gcs("--signing-key", key, *command(tmp_path / "run"))
         heard = [data for data, _ in station.receive()]
     assert result.returncode == 0, result.stderr
     assert heard
@@ -150,7 +156,7 @@ def test_signing_key_signs_both_ends_of_the_link(tmp_path: Path) -> None:
 
 
 def test_missing_signing_key_is_refused_before_the_flight(tmp_path: Path) -> None:
-    result = gcs("--signing-key", tmp_path / "no.key", *command(tmp_path / "run")[3:])
+    result = gcs("--signing-key", tmp_path / "no.key", *command(tmp_path / "run"))
     assert result == ("", f"gcs: {tmp_path / 'no.key'}: No such file or directory\n", 2)
     assert not (tmp_path / "run").exists()
 
@@ -159,7 +165,7 @@ def test_overwrite_replaces_another_flight(tmp_path: Path) -> None:
     out = tmp_path / "run"
     out.mkdir()
     (out / "flight.ulg").write_bytes(b"x")
-    refused = subprocess.run(command(out), capture_output=True, text=True, timeout=LONG_S, check=False)
+    refused = run(out)
     assert (refused.returncode, refused.stdout) == (2, "")
     assert refused.stderr.endswith("choose another one, or give --overwrite\n")
     assert run(out, "--overwrite").returncode == 0
@@ -170,14 +176,14 @@ def test_the_tlog_holds_both_directions(flown: tuple[Path, Ended]) -> None:
     from pymavlink import mavutil  # noqa: PLC0415
 
     log = mavutil.mavlink_connection(str(flown[0] / "gcs.tlog"))
-    senders: dict[int, set[str]] = {1 + INSTANCE: set(), 255: set()}
+    senders: dict[int, set[str]] = {1 + instance(): set(), 255: set()}
     while (message := log.recv_match()) is not None:
         if message.get_srcSystem():  # 0: not in pymavlink's dialect
             senders[message.get_srcSystem()].add(message.get_type())
     log.close()
     assert senders[255] >= {"HEARTBEAT", "MISSION_COUNT", "MISSION_ITEM_INT", "COMMAND_LONG"}
     answers = {"MISSION_ACK", "COMMAND_ACK"}
-    assert senders[1 + INSTANCE] >= {"HEARTBEAT", "STATUSTEXT", "MISSION_CURRENT", *answers}
+    assert senders[1 + instance()] >= {"HEARTBEAT", "STATUSTEXT", "MISSION_CURRENT", *answers}
 
 
 def test_a_flight_is_never_overwritten(tmp_path: Path) -> None:
@@ -191,7 +197,7 @@ def test_a_flight_is_never_overwritten(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("number", [vehicle_ground_port, simulator_port])
 def test_a_busy_port_is_named_and_nothing_is_started(tmp_path: Path, number: Callable[[int], int]) -> None:
-    port, kind = number(INSTANCE), "TCP" if number is simulator_port else "UDP"
+    port, kind = number(instance()), "TCP" if number is simulator_port else "UDP"
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM if kind == "UDP" else socket.SOCK_STREAM) as taken:
         taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # past links of the port are no matter
         taken.bind(("127.0.0.1", port))
@@ -251,15 +257,11 @@ def test_killed_fly_ends_its_vehicle_and_its_log_is_whole(tmp_path: Path) -> Non
 
 
 def test_a_reader_that_goes_away_does_not_end_the_flight(tmp_path: Path) -> None:
-    with subprocess.Popen(
-        command(tmp_path / "run"), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout is not None
-        assert process.stderr is not None
-        process.stdout.readline()
-        process.stdout.close()
-        assert process.wait(LONG_S) == 0
-        assert process.stderr.read() == ""
+    process = Program("gcs_cli", command(tmp_path / "run"))
+    process.stdout.readline()
+    process.stdout.close()
+    assert process.communicate(LONG_S) == ("", "")
+    assert process.returncode == 0
     assert summary_of(tmp_path / "run")["outcome"] == "completed"
 
 

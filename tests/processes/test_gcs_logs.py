@@ -62,7 +62,8 @@ def test_report_of_a_log_alone(logs: Path) -> None:
     assert line["summary"]["flight_time_s"] > 20.0
     assert "Path in space" in (logs / "a.html").read_text()
     assert gcs("report", logs / "a.ulg").returncode == 2
-    assert gcs("report", logs / "b.tlog", "-o", logs / "c.html").returncode == 2
+    ended = gcs("report", logs / "b.tlog", "-o", logs / "c.html")
+    assert (ended.returncode, "b.tlog: is a tlog; give a ULog (.ulg)" in ended.stderr) == (2, True)
 
 
 def test_report_of_a_damaged_log_warns(logs: Path) -> None:
@@ -128,7 +129,7 @@ def test_download_of_all_logs_goes_on_after_one_that_exists(
     monkeypatch.setattr(log_calls, "fetch_log", lambda *_: b"new")
     grown = tmp_path / "log_1.ulg"
     grown.write_bytes(b"ab")
-    result = told(FakeVehicle(), "log", "download", "--all", "-o", tmp_path)
+    result = told(FakeVehicle(), "log", "download", "--all", "--out", tmp_path)
     assert (result.returncode, grown.read_bytes()) == (1, b"ab")
     assert result.stderr.startswith(f"gcs: {grown}: exists already with another size: ")
     assert [(tmp_path / f"log_{number}.ulg").read_bytes() for number in (0, 2)] == [b"new", b"new"]

@@ -89,7 +89,7 @@ def test_check_names_all_problems_of_a_file(tmp_path: Path) -> None:
     result = gcs("mission", "check", tmp_path / "low.plan", "--json")
     problems = [each for each in objects(result) if each["event"] == "problem"]
     assert [(each["part"], each["seq"]) for each in problems] == [("mission", 2), ("mission", 3)]
-    assert result.returncode == 1
+    assert result.returncode == 2
 
 
 @pytest.mark.parametrize("pattern", ["square", "circle", "lemniscate"])
@@ -114,7 +114,9 @@ def test_new_survey_and_corridor_read_an_area(tmp_path: Path) -> None:
         "mission", "new", "survey", tmp_path / "area.geojson", "--out", tmp_path / "s.plan", "--angle", 90
     )
     assert (survey.returncode, survey.stderr) == (0, "")
-    assert len(load_plan(tmp_path / "s.plan").fence) == 3
+    assert load_plan(tmp_path / "s.plan").fence == ()
+    checked = gcs("mission", "check", tmp_path / "s.plan")
+    assert (checked.returncode, checked.stderr) == (0, "")
     corridor = gcs("mission", "new", "corridor", tmp_path / "line.geojson", "--out", tmp_path / "c.kml")
     assert (corridor.returncode, corridor.stderr) == (0, "")
     result = gcs("mission", "new", "survey", "--out", tmp_path / "x.plan")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import json
 import os
@@ -15,7 +16,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from flightstack.firmware.build import host_program
+from flightstack.firmware.toolchain.build import host_program
 from flightstack.testing.instances import free_instance
 from gcs_cli.errors import DONE, FAILED, NO_ANSWER, USAGE, CliError
 from gcs_cli.fly.fly_flags import FlyOptions
@@ -27,10 +28,10 @@ from tests.support.commands import Ended, gcs
 from tests.support.plugin_site import install
 from tests.support.process import children_of
 from tests.support.tools import NIGHTLY
+from tests.support.warm_children import warm_children
 
 LONG_S = 120.0  # a bound for a busy machine that compiles the kernels anew
 MISSIONS = Path(__file__).parents[2] / "missions"
-INSTANCE = free_instance()
 emulation = pytest.mark.skipif(
     not all(map(importlib.util.find_spec, ("unicorn", "ziglang"))), reason="unicorn and ziglang are extras"
 )
@@ -40,8 +41,19 @@ def pil(*arguments: object) -> Ended:
     return gcs("pil", *arguments)
 
 
+@functools.cache
+def instance() -> int:
+    """Return the instance of these tests, which is free when the first of them begins."""
+    return free_instance()
+
+
+def hop(out: Path, target: str) -> tuple[object, ...]:
+    return (MISSIONS / "hop.plan", "--target", target, "--out", out, "--instance", instance())
+
+
 def fly(out: Path, target: str, *flags: str) -> Ended:
-    return pil(MISSIONS / "hop.plan", "--target", target, "--out", out, "--instance", INSTANCE, *flags)
+    with warm_children():
+        return pil(*hop(out, target), *flags)
 
 
 def result_of(out: Path) -> dict[str, Any]:
@@ -201,7 +213,7 @@ def test_a_board_that_is_unplugged_ends_the_run_with_a_sentence(
             board.remove()
 
     monkeypatch.setattr(pil_run.NoticeDisplay, "update", unplug)
-    done = fly(out, f"serial:{board.device}")
+    done = pil(*hop(out, f"serial:{board.device}"))
     assert not {"sim_bridge", "flightstack"} & set(children_of(os.getpid()))
     assert done.returncode == NO_ANSWER, done.stdout + done.stderr
     assert board.device in done.stderr
@@ -296,7 +308,7 @@ def test_limits_of_a_file_judge_a_replay(flown: Path, tmp_path: Path) -> None:
 def test_a_free_running_target_flies_in_real_time_and_reports_its_timing(tmp_path: Path) -> None:
     """How far it comes is left to the machine: a busy one is late. What is reported is complete in any case."""
     plan, out = MISSIONS / "hop.plan", tmp_path / "out"
-    done = pil("free-run", plan, "--target", "host", "--out", out, "--instance", INSTANCE, "--json")
+    done = pil("free-run", plan, "--target", "host", "--out", out, "--instance", instance(), "--json")
     assert done.returncode in (DONE, FAILED, NO_ANSWER), done.stdout + done.stderr
     told = json.loads(done.stdout)["free_running"]
     assert told["period_us"] == 2_000

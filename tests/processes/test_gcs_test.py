@@ -9,6 +9,7 @@ import select
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -18,9 +19,10 @@ import pytest
 from tests.support.commands import Ended, gcs
 from tests.support.plugin_site import ROOT, install
 from tests.support.process import BOUND_S, Process, children_of
+from tests.support.warm_children import warm_children
 
-GOOD = "plan = 'hop'\n[expect]\nmax_error_m = 0.2\n"
-BAD = "plan = 'hop'\n[expect]\nmax_error_m = 0.0001\n"
+GOOD = "plan = 'hop'\nstate = 'truth'\n[expect]\nmax_error_m = 0.2\n"
+BAD = "plan = 'hop'\nstate = 'truth'\n[expect]\nmax_error_m = 0.0001\n"
 ENDLESS = "duration_s = 1000000\n[expect]\nat_end = ['landed']\n"
 WORKER = "gcs_cli.scenarios.worker"
 
@@ -29,6 +31,13 @@ WORKER = "gcs_cli.scenarios.worker"
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+@pytest.fixture(autouse=True)
+def _warm() -> Iterator[None]:
+    """Fork the workers of commands in this process; those of commands in other processes are new interpreters."""
+    with warm_children():
+        yield
 
 
 def write(**texts: str) -> None:
@@ -90,7 +99,8 @@ def test_a_bad_file_or_option_exits_with_2_before_a_flight(
 
 def test_the_number_of_processes_changes_no_result(folder: Path) -> None:
     gusty = (
-        "plan = 'hop'\nvehicle = 'x_quad'\nrepeat = 3\nwind = {gust_m_s = 1}\n[expect]\nmax_error_m = 0.05\n"
+        "plan = 'hop'\nstate = 'truth'\nvehicle = 'x_quad'\nrepeat = 3\nwind = {gust_m_s = 1}\n"
+        "[expect]\nmax_error_m = 0.05\n"
     )
     write(b=gusty, a=BAD, c=GOOD)
     found = []

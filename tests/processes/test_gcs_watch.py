@@ -138,6 +138,19 @@ def test_a_suspended_view_gives_the_terminal_back_and_draws_again(link: list[str
         assert screen.process.wait(LONG_S) == 0
 
 
+def test_a_view_that_was_stopped_without_notice_draws_again_and_ends(link: list[str]) -> None:
+    with terminal(["-m", "gcs_cli", "watch", *link]) as screen:
+        screen.read_until(b"Position")
+        screen.process.send_signal(signal.SIGSTOP)
+        os.waitid(os.P_PID, screen.process.pid, os.WSTOPPED | os.WNOWAIT)
+        screen.seen = b""
+        screen.process.send_signal(signal.SIGCONT)
+        screen.read_until(b"Position")
+        screen.type(b"q")
+        assert screen.process.wait(LONG_S) == 0
+        assert screen.is_restored
+
+
 def test_gcs_alone_on_a_terminal_opens_the_view() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent:
         silent.bind(("127.0.0.1", 0))

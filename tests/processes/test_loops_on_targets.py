@@ -17,6 +17,7 @@ from pyulog import ULog
 from flightstack.testing.instances import free_instance
 from tests.support.commands import flightstack_command, gcs
 from tests.support.process import await_output, ends_of
+from tests.support.warm_children import warm_children
 
 LONG_S = 180.0  # a bound for a busy machine that compiles kernels and firmware anew
 HOP = Path(__file__).parents[2] / "missions" / "hop.plan"
@@ -29,7 +30,8 @@ def gcs_fly(out: Path, *flags: str) -> list[str]:
 
 
 def flown(out: Path, *flags: str) -> ULog:
-    done = gcs(*gcs_fly(out, *flags)[3:])
+    with warm_children():
+        done = gcs(*gcs_fly(out, *flags)[3:])
     assert done.returncode == 0, f"{done.stdout}{done.stderr}{(out / 'flightstack.log').read_text()}"
     return ULog(str(out / "flight.ulg"))
 
@@ -83,8 +85,10 @@ def test_a_target_flies_the_bits_of_c_here(tmp_path: Path, in_c: ULog, loops: st
     assert json.loads((out / "summary.json").read_text())["loops"] == loops
 
 
-def test_short_steps_fly_the_same_flight_and_log_fewer_stages(tmp_path: Path, in_c: ULog) -> None:
-    log = flown(tmp_path / "run", "--loops", "host,short")
+def test_short_steps_fly_the_same_flight_and_log_fewer_stages(tmp_path: Path) -> None:
+    """On the true state: the link carries the steps of the loops alone, no measurements."""
+    in_c = flown(tmp_path / "c", "--loops", "c", "--state", "truth")
+    log = flown(tmp_path / "run", "--loops", "host,short", "--state", "truth")
     for topic in ("rotor_speeds", "vehicle_attitude_setpoint", "vehicle_attitude", "vehicle_local_position"):
         here, there = in_c.get_dataset(topic).data, log.get_dataset(topic).data
         assert all(np.array_equal(here[name], there[name], equal_nan=True) for name in here), topic
@@ -179,7 +183,7 @@ def test_a_port_that_another_program_uses_is_refused() -> None:
 
 def test_the_firmware_behind_a_serial_port_flies(tmp_path: Path, in_c: ULog) -> None:
     """As a board would: the flight stack opens a device by its name."""
-    from flightstack.firmware.build import host_program  # noqa: PLC0415
+    from flightstack.firmware.toolchain.build import host_program  # noqa: PLC0415
 
     program = subprocess.Popen(
         [str(host_program())], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True

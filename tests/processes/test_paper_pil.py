@@ -10,6 +10,7 @@ import pytest
 
 from flightstack.testing.instances import free_instance
 from gcs_cli.experiments.paper import pil_section
+from tests.support.warm_children import warm_children
 
 emulation = pytest.mark.skipif(
     not all(map(importlib.util.find_spec, ("unicorn", "ziglang"))), reason="unicorn and ziglang are extras"
@@ -28,7 +29,8 @@ def test_the_paper_controller_gives_the_same_bits_on_the_target_and_replaces_an_
     older.mkdir()
     (older / "pil.json").write_text("{}")
     told: list[str] = []
-    found = pil_section.run(tmp_path, tell=told.append, instance=free_instance())
+    with warm_children():
+        found = pil_section.run(tmp_path, tell=told.append, instance=free_instance())
     assert told == ["processor in the loop: backstepping", "processor in the loop: backstepping, rigid"]
     assert found["why_left_out"] is None
     assert "stands for no board" in found["meaning"]

@@ -18,6 +18,7 @@ from flightstack.transports.udp import UdpSocket
 from gcs_cli.clients.mission_client import Done, MissionClient
 from tests.support.commands import gcs
 from tests.support.vehicle_processes import LONG_S, VehicleProcesses, vehicle
+from tests.support.warm_children import warm_children
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 OPTIONS = ("--log", "none", "--state-dir", "state")
@@ -152,6 +153,7 @@ def test_gcs_fly_inherits_no_plan(tmp_path: Path) -> None:
         assert there.stack.poll() is None
         instance = there.instance
         kill(there)
-    flown = gcs("fly", MISSIONS / "hop.plan", "--instance", instance, "--out", tmp_path / "run")
+    with warm_children():
+        flown = gcs("fly", MISSIONS / "hop.plan", "--instance", instance, "--out", tmp_path / "run")
     assert flown.returncode == 0, flown.stderr
     assert "no state kept" in (tmp_path / "run" / "flightstack.log").read_text()

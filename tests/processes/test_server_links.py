@@ -20,7 +20,7 @@ LONG_S = 60.0
 @pytest.fixture(scope="module")
 def vehicle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     folder = tmp_path_factory.mktemp("vehicle")
-    setup = Setup(vehicle="x_quad", params={"MIS_TAKEOFF_ALT": 4.0})
+    setup = Setup(vehicle="x_quad", state="truth", params={"MIS_TAKEOFF_ALT": 4.0})
     with Server(setup, folder, speed=4.0, faults=["battery level 0.6 @0.5"]) as started:
         yield started
 

@@ -61,7 +61,7 @@ def start() -> Iterator[Callable[..., Process]]:
         instance = free_instance()
         simulator = StandingVehicle(instance, stamp)
         process = Process(
-            "flightstack", "--instance", str(instance), "--gcs-port", "9", "--api-port", "9",
+            "flightstack", "--instance", str(instance), "--gcs-port", "9", "--api-port", "9", "--state", "truth",
             "--log", "none", "--params", "none", *options,
         )  # fmt: skip
         ends.extend((process.kill, simulator.close))

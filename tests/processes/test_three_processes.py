@@ -19,6 +19,7 @@ from flightstack.testing.instances import free_instance
 from tests.support.commands import flightstack_command, gcs
 from tests.support.process import BOUND_S, Process
 from tests.support.vehicle_processes import wait_until_healthy
+from tests.support.warm_children import warm_children
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 
@@ -40,7 +41,8 @@ def start() -> Iterator[Start]:
 
 
 def fly(out: Path, instance: int, *options: str) -> tuple[dict[str, object], bytes]:
-    run = gcs("fly", MISSIONS / "hop.plan", "--json", "--out", out, "--instance", instance, *options)
+    with warm_children():
+        run = gcs("fly", MISSIONS / "hop.plan", "--json", "--out", out, "--instance", instance, *options)
     assert run.returncode == 0, run.stderr
     summary = json.loads(run.stdout)
     log = (out / "flight.ulg").read_bytes()

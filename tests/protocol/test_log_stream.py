@@ -12,7 +12,7 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Link
 from flightstack.process.log_files import FileTail
 from flightstack.services.logs.log_stream import CHUNK, GIVE_UP_S, NO_MESSAGE_BEGINS, LogStream
-from flightstack.testing import World
+from tests.support.truth import World
 
 VEHICLE, CLIENT = Address(1, 1), Address(255, 190)
 PEER, OTHER = "peer", "other"

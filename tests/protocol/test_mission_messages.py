@@ -13,7 +13,7 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Link, Message
 from flightstack.mavlink.mission_messages import mission_id
 from flightstack.plan import Command, Frame, MissionItem, MissionResult, MissionType
-from flightstack.plan import vocabulary as words
+from flightstack.plan import commands as words
 from flightstack.services.commands.command_server import CommandServer
 from flightstack.services.mission.mission_server import MissionServer
 from gcs_cli.clients.mission_client import Done, Failed, MissionClient
@@ -63,7 +63,7 @@ def names(messages: list[Message]) -> list[str]:
     return [message.get_type() for message in messages]
 
 
-def test_the_vocabulary_is_mavlinks() -> None:
+def test_numbers_of_items_are_mavlinks() -> None:
     for enum, prefix in (
         (words.Command, "MAV_CMD_"),
         (words.Frame, "MAV_FRAME_"),

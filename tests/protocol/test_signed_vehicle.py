@@ -12,7 +12,7 @@ from flightstack.core.port_numbers import GROUND
 from flightstack.mavlink.signing import NO_KEY, Signing, timestamp_of
 from flightstack.services.routing.hub import MAX_PEERS
 from flightstack.services.routing.peer import PeerAddress
-from flightstack.testing import World
+from tests.support.truth import World
 
 KEY, OTHER_KEY = bytes(range(32)), bytes(range(1, 33))
 HERE, ELSEWHERE = "127.0.0.1", "192.0.2.7"

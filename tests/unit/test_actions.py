@@ -8,14 +8,14 @@ import pytest
 from typer.core import TyperGroup
 from typer.main import get_command
 
-from flightstack.testing import World
-from gcs_cli.actions import in_flight, on_vehicle
+from gcs_cli.actions import in_flight, in_mission, on_vehicle
 from gcs_cli.actions.action import Action
 from gcs_cli.actions.conditions import ConditionError, parse_condition
 from gcs_cli.actions.run import ActionRun, Outcome, Result
-from gcs_cli.clients.mode_client import ModeClient
+from gcs_cli.clients.command_client import ModeClient
 from gcs_cli.commands import actions
 from gcs_cli.vehicle.view_types import VehicleView
+from tests.support.truth import World
 
 LIMIT_S = 200.0
 
@@ -121,6 +121,19 @@ def test_mission_start_ends_when_the_mission_runs(world: World) -> None:
     world.upload("hop")
     assert perform(world, in_flight.start_mission())[:2] == (Outcome.DONE, "mission started")
     assert (seen(world).mode, seen(world).armed) == ("MISSION", True)
+
+
+def test_a_refused_start_names_the_item_where_the_mission_continues(world: World) -> None:
+    world.upload("hop")
+    assert perform(world, in_mission.jump(1)).outcome is Outcome.DONE
+    result = perform(world, in_flight.start_mission())
+    assert result[:2] == (
+        Outcome.REFUSED,
+        "mission start refused: the vehicle is on the ground and the mission continues with a landing or a return; "
+        "the mission is at item 1 (last 1): `gcs mission jump 0`, then start, flies it from its first item",
+    )
+    assert perform(world, in_mission.jump(0)).outcome is Outcome.DONE
+    assert perform(world, in_flight.start_mission()).outcome is Outcome.DONE
 
 
 def test_termination_ends_when_the_vehicle_reports_it(flying: World) -> None:

@@ -152,13 +152,13 @@ def test_yaw_selects_guided_first_and_ends_at_the_heading(rig: Rig) -> None:
     assert rig.vehicle.heading_deg == pytest.approx(90.0, abs=3.1)
 
 
-def test_speed_is_refused_outside_guided_and_has_no_default(rig: Rig) -> None:
+def test_speed_is_refused_outside_its_modes_and_has_no_default(rig: Rig) -> None:
     rig.flying()
     assert rig.perform(in_flight.speed(3.0)).outcome is Outcome.ACKNOWLEDGED
     assert rig.perform(in_flight.speed(None)).outcome is Outcome.IMPOSSIBLE
     rig.perform(in_flight.hold())
     assert rig.perform(in_flight.speed(3.0)).sentence == (
-        "speed refused: the vehicle answered MAV_RESULT_FAILED"
+        "speed refused: not possible in mode BRAKE, only in AUTO, GUIDED, RTL"
     )
 
 
@@ -286,6 +286,25 @@ def test_landing_is_done_if_the_landed_state_follows_the_disarm(rig: Rig) -> Non
     rig.run_for(0.5)
     assert run.result is not None
     assert run.result.outcome is Outcome.DONE
+
+
+def test_landing_is_done_if_the_reports_of_its_end_were_lost(rig: Rig) -> None:
+    """A receiver loses 3 s of telemetry after the disarm; the next datagram has the clock, not the landed state."""
+    rig.flying()
+    run = ActionRun(in_flight.land(), lambda: rig.view, rig.now_s, rig.session.own)
+    rig.session.use(run)
+    rig.run_for(1.5)
+    rig.vehicle.armed = False
+    rig.run_for(1.05)
+    rig.vehicle.altitude_m = 0.0
+    rig.now_s += 3.0
+    rig.vehicle.advance(rig.now_s)
+    rig.now_s += 0.3
+    for frame in rig.vehicle.advance(rig.now_s):
+        rig.session.receive(frame, PEER, rig.now_s)
+        rig.session.poll(rig.now_s)
+    assert run.result is not None
+    assert run.result[:2] == (Outcome.DONE, "landed and disarmed")
 
 
 def test_jump_is_a_message_to_a_vehicle_without_the_command(rig: Rig) -> None:

@@ -30,6 +30,7 @@ from gcs_cli.charts.figure import (
 )
 from gcs_cli.charts.pages import render_page
 from gcs_cli.charts.plotly_json import chart_json
+from gcs_cli.charts.plotly_parts import numbers
 from gcs_cli.charts.print_figure import write_figure
 
 
@@ -193,3 +194,18 @@ def test_rare_bar_of_a_histogram_stays_visible() -> None:
     assert trace["y"][2] > 0.0
     assert trace["marker"]["line"]["width"] >= 1.5
     assert trace["marker"]["line"]["color"] == trace["marker"]["color"]
+
+
+@given(
+    st.lists(st.floats(-1e12, 1e12) | st.sampled_from([math.nan, math.inf, -math.inf])),
+    st.sampled_from([4, 6, 7, 8]),
+)
+def test_numbers_are_those_that_the_text_with_these_digits_names(values: list[float], digits: int) -> None:
+    """A half of the last digit may be rounded either way. Smaller values may lose digits, which no chart shows."""
+    shown = [value for value in values if not 0.0 < abs(value) < 1e-15]
+    for value, number in zip(shown, numbers(np.array(shown), digits), strict=True):
+        if math.isfinite(value):
+            assert number == float(f"{number:.{digits}g}")
+            assert abs(number - value) <= 0.5001 * 10.0 ** (1 - digits) * abs(value)
+        else:
+            assert number is None

@@ -274,7 +274,7 @@ def test_the_children_are_told_everything() -> None:
         "--torque-gust=0.02", "--ideal-rotors", "--port=4562", "--home=47.1,-8.2,3.5", "--timeout=12",
     ]  # fmt: skip
     assert stack_arguments(options, home, Path("runs/x"), 40_000) == [
-        "--vehicle=x_quad", "--controller=backstepping", "--gains=paper", "--loops=c", "--state=truth",
+        "--vehicle=x_quad", "--controller=backstepping", "--gains=paper", "--loops=c", "--state=estimated",
         "--inner-hz=1000.0", "--instance=2", "--ideal-rotors", "--outer-hz=250.0", "--sim-port=4562",
         "--sim-timeout=12", "--gcs=127.0.0.1:40000", f"--gcs=127.0.0.1:{options.gcs_port}", "--log=runs/x/flight.ulg",
         "--home=47.1,-8.2,3.5", "--exit-on-gcs-loss=5", "--params=none", "--state-dir=none", "--wait-for-start",

@@ -6,7 +6,7 @@ import pytest
 
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
 from flightstack.mavlink.link import Address, Link, Message
-from gcs_cli.link.snapshot import Snapshot
+from gcs_cli.link.subscription import Snapshot
 from gcs_cli.vehicle.view_types import (
     Estimator,
     Euler,

@@ -73,3 +73,13 @@ def test_wind_without_a_vertical_part_is_shown() -> None:
     nan = math.nan
     wind = mavlink.MAVLink_wind_cov_message(0, 3.0, -4.0, nan, 0.1, nan, nan, 0.3, nan)
     assert vehicle.send(wind).wind_ned_m_s == (3.0, -4.0, 0.0)
+
+
+def test_status_tells_the_current_item_from_the_items_of_the_mission() -> None:
+    vehicle = Vehicle()
+    vehicle.send(heartbeat())
+    vehicle.send(mavlink.MAVLink_mission_item_reached_message(1))
+    assert lines(vehicle.send(mavlink.MAVLink_mission_current_message(2, 6, 3)))["mission"] == (
+        "current item 2 (items 0 to 5), last reached 1"
+    )
+    assert lines(vehicle.send(mavlink.MAVLink_mission_current_message(0, 0)))["mission"] == "none"

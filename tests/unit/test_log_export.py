@@ -165,7 +165,7 @@ def test_a_missing_library_is_one_sentence(
     def refuse(name: str) -> Any:
         raise ImportError(name)
 
-    monkeypatch.setattr("gcs_cli.logs.libraries.import_module", refuse)
+    monkeypatch.setattr("gcs_cli.logs.export_tables.import_module", refuse)
     log = tmp_path / "a.tlog"
     log.write_bytes(small_tlog())
     ended = gcs("log", "export", log, option, tmp_path / "out")

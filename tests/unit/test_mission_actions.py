@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Link
 from gcs_cli.actions.action import Action, NotReadyError
-from gcs_cli.actions.in_flight import hold
+from gcs_cli.actions.in_flight import hold, start_mission
 from gcs_cli.actions.in_mission import jump, pause, resume
 from gcs_cli.actions.run import ActionRun
 from gcs_cli.autopilots.autopilot import Role
@@ -96,6 +98,18 @@ def test_a_complete_mission_is_started_again_not_resumed() -> None:
     view = view._replace(mission=view.mission._replace(state=MISSION_COMPLETE))
     with pytest.raises(NotReadyError, match="the mission is complete: `gcs mission start` flies it again"):
         resume().plan(view)
+
+
+@pytest.mark.parametrize("state", [
+    {"mission": Mission(current=0, total=2)},
+    {"mission": Mission(current=1, total=2, state=MISSION_COMPLETE)},
+    {"can_arm": False},
+    {"armed": True},
+])  # fmt: skip
+def test_start_advises_a_jump_only_where_the_current_item_can_be_the_reason(state: dict[str, Any]) -> None:
+    late = view_in(Role.HOLD, armed=False)._replace(mission=Mission(current=1, total=2))
+    assert "`gcs mission jump 0`" in start_mission().plan(late)[-1].advice
+    assert not start_mission().plan(late._replace(**state))[-1].advice
 
 
 def test_hold_needs_a_known_speed() -> None:

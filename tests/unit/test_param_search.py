@@ -7,6 +7,7 @@ import pytest
 from flightstack.mavlink.param_values import Parameter
 from gcs_cli.vehicle.param_info import ParamInfo
 from gcs_cli.vehicle.param_search import search_parameters
+from gcs_cli.vehicle.param_table import description
 
 INFOS = {
     "MPC_XY_CRUISE": ParamInfo(help="Horizontal speed in auto modes"),
@@ -41,3 +42,11 @@ def test_search_prefers_names_to_descriptions() -> None:
     found = search_parameters(PARAMETERS, INFOS, ["max"])
     assert [each.name for each in found] == ["MPC_XY_VEL_MAX", "GF_MAX_HOR_DIST"]
     assert search_parameters(PARAMETERS, {}, ["nav"])[0].name == "NAV_ACC_RAD"
+
+
+def test_description_prints_a_repeated_text_once() -> None:
+    info = ParamInfo(help="Maximum distance", details="Maximum distance. Takes effect immediately.")
+    assert description(PARAMETERS[0], info).splitlines()[1:] == [
+        "  Maximum distance",
+        "  Takes effect immediately.",
+    ]

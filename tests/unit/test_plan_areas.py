@@ -286,7 +286,7 @@ def test_older_versions_are_kept_but_not_read(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "b.plan").read_text())["geoFence"] == old
 
 
-def test_the_vocabulary_is_mavlinks() -> None:
+def test_numbers_of_items_are_mavlinks() -> None:
     from flightstack.mavlink.dialect import mavlink  # noqa: PLC0415
     from flightstack.plan import RALLY_POINT  # noqa: PLC0415
 

@@ -226,6 +226,7 @@ BAD_PLANS: dict[str, tuple[Any, str]] = {
         "item 0, command: 65536 must be a whole number from 0 to 65535",
     ),
     "command text": (document(simple("16")), "item 0, command: '16' must be a whole number from 0"),  # type: ignore[arg-type]
+    "no command": (document(simple(None)), "item 0, command: is missing; it must be a whole number"),  # type: ignore[arg-type]
     "survey": (
         document(simple(), survey(simple(), simple(-1))),
         "item 2, command: -1 must be a whole number",

@@ -52,7 +52,7 @@ def test_gcs_fly_flies_the_square_by_default(monkeypatch: pytest.MonkeyPatch) ->
         asked.append(options)
         raise CliError("enough", USAGE)
 
-    monkeypatch.setattr("gcs_cli.fly.fly_command.checked_plan", check)
+    monkeypatch.setattr("gcs_cli.fly.fly_run.checked_plan", check)
     monkeypatch.setattr("gcs_cli.pil.pil_commands.checked_plan", check)
     assert main(["fly"]) == USAGE
     assert main(["pil", "hop"]) == USAGE
@@ -63,6 +63,17 @@ def test_examples_are_checked_by_name(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.chdir(tmp_path)
     assert main(["mission", "check", "square"]) == DONE
     assert "mission of 6 items" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", [("mission", "check"), ("fly",)])
+def test_plan_that_no_vehicle_accepts_is_a_bad_file(
+    command: tuple[str, ...], tmp_path: Path, capsys: Any
+) -> None:
+    bad = tmp_path / "bad.plan"
+    text = (ROOT / "missions" / "fenced_square.plan").read_text()
+    bad.write_text(text.replace('"radius": 4.0', '"radius": 15.0'))
+    assert main([*command, str(bad)]) == USAGE
+    assert "mission: item 1 (NAV_WAYPOINT)" in capsys.readouterr().err
 
 
 def test_wheel_holds_the_examples_where_they_are_looked_for() -> None:

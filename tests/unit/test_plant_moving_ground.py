@@ -15,7 +15,7 @@ from flightstack.simulator_link.hot_frames import ARMED_FLAG, ActuatorsFrame
 from sim_bridge import arguments
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.plant.disturbance import Disturbance
-from sim_bridge.plant.fault_schedule import parse_fault
+from sim_bridge.plant.faults.schedule import parse_fault
 from sim_bridge.plant.layout import CONTACT
 from sim_bridge.plant.plant import InitialState, PlantOptions
 from sim_bridge.plants import make_plant

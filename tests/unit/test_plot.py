@@ -254,6 +254,6 @@ def test_curves_of_received_and_missing_fields():
     assert curves["ATTITUDE.roll"].values == pytest.approx(np.degrees([0.0, 0.1, 0.2]), abs=1e-5)
     assert len(curves["VFR_HUD.alt"].values) == 0
     choices = {choice.name: choice for choice in field_choices(history, 1, fields)}
-    assert choices["ATTITUDE.roll"].note == "11.46 deg"
+    assert choices["ATTITUDE.roll"].note() == "11.46 deg"
     assert choices["ATTITUDE.yaw"].colour is None
-    assert choices["VFR_HUD.alt"].note == "not received"
+    assert choices["VFR_HUD.alt"].note() == "not received"

@@ -29,7 +29,7 @@ from tests.support.synthetic_flight import HOME, INFO, PARAMETERS, synthetic_fli
 from tests.support.written_flights import armed_from, samples
 
 REQUIRED = {
-    "outcome", "plan", "vehicle", "controller", "gains", "plant", "loops", "seed", "inner_hz", "outer_hz",
+    "outcome", "plan", "vehicle", "controller", "gains", "plant", "loops", "state", "seed", "inner_hz", "outer_hz",
     "sim_time_s", "wall_time_s", "real_time_factor", "waypoints", "rms_tracking_error_m",
     "max_tracking_error_m", "overruns", "log_sha256", "wind_m_s", "gust_m_s", "torque_gust_n_m",
     "battery_start_percent", "battery_capacity_mah", "battery_drain", "faults", "ideal_rotors",

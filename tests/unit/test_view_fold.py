@@ -311,3 +311,31 @@ def test_vehicle_of_this_project_is_distinguished_from_px4(vehicle: Vehicle) -> 
     assert vehicle.view.is_own is None
     assert vehicle.send(version(NAME_IN_VERSION)).is_own
     assert vehicle.send(version([1] * 8)).is_own is False
+
+
+def test_rate_leaves_out_the_backlog_of_the_first_read() -> None:
+    vehicle = Vehicle()
+    for _ in range(500):
+        vehicle.send(heartbeat(), 5.0)
+    for step in range(1, 51):
+        view = vehicle.send(heartbeat(), 5.0 + step / 40)
+    assert view.link.rate_hz == pytest.approx(40.0)
+
+
+def test_rate_counts_messages_that_were_read_late_once() -> None:
+    vehicle = Vehicle()
+    vehicle.send(heartbeat(), 5.0)
+    for _ in range(120):  # of 3 s
+        vehicle.send(heartbeat(), 8.0)
+    for step in range(1, 51):
+        assert vehicle.send(heartbeat(), 8.0 + step / 40).link.rate_hz == pytest.approx(40.0)
+
+
+def test_standard_mode_without_a_name_has_the_standard_label() -> None:
+    vehicle = Vehicle()
+    vehicle.send(heartbeat())
+    standard = mavlink.MAV_STANDARD_MODE_ALTITUDE_HOLD
+    for name, mode in ((b"", standard), (b"Own", standard), (b"", 0)):
+        message = mavlink.MAVLink_available_modes_message(1, 1, mode, 2 << 16, 0, name)
+        view = vehicle.send(message)
+        assert [each.label for each in view.modes] == ["Own" if name else "Altitude hold" if mode else ""]

@@ -146,7 +146,7 @@ def test_transfer_stays_on_its_vehicle_if_the_selection_moves() -> None:
 
             connection.run(client, "a parameter", 0.1, move)
             assert connection.session is not first
-            assert first._service is None
+            assert first.service is None
             connection.fleet.selection = (None, first)
             with pytest.raises(CliError, match="vehicle 1 is no longer selected"):
                 change_all(connection, {"NONE": 1.0}, {"NONE": Parameter("NONE", 0.0, False, 0, 1)}, move)

@@ -92,7 +92,7 @@ def claims(cases: Cases, linear: Mapping[str, Any]) -> list[dict[str, Any]]:
     left out; any other missing figure raises KeyError.
     """
     both = (SMALL_ANGLE, RIGID)
-    judges: tuple[tuple[Callable[[str], dict[str, Any]], Sequence[str]], ...] = (
+    evaluations: tuple[tuple[Callable[[str], dict[str, Any]], Sequence[str]], ...] = (
         (lambda plant: _compared(_similar, _SIMILAR, cases, plant), both),
         (lambda plant: _compared(_lower_overshoot, _OVERSHOOT, cases, plant), both),
         (lambda plant: _compared(_limits_matter, _LIMITS, cases, plant), both),
@@ -103,18 +103,18 @@ def claims(cases: Cases, linear: Mapping[str, Any]) -> list[dict[str, Any]]:
         (lambda _: spin_up(cases), (RIGID,)),
     )
     found = []
-    for judge, plants in judges:
+    for evaluate, plants in evaluations:
         for plant in plants:
             with contextlib.suppress(NotFlownError):
-                found.append({"plant": plant, **judge(plant)})
+                found.append({"plant": plant, **evaluate(plant)})
     return found
 
 
 def _compared(
-    judge: Callable[[Question, Cases, str], dict[str, Any]], question: Question, cases: Cases, plant: str
+    evaluate: Callable[[Question, Cases, str], dict[str, Any]], question: Question, cases: Cases, plant: str
 ) -> dict[str, Any]:
     try:
-        return judge(question, cases, plant)
+        return evaluate(question, cases, plant)
     except NothingToCompareError as why:
         return question.nothing_to_compare(str(why), where_of(plant))
 

@@ -54,7 +54,7 @@ class Nearness(NamedTuple):
 
 
 def stays_stable(linear: Mapping[str, Any], plant: str) -> dict[str, Any]:
-    """Judge by margins and lowest rates of the attitude loops as they fly; raise NotFlownError without the analysis."""
+    """Evaluate margins and lowest rates of the attitude loops as they fly; raise NotFlownError without the analysis."""
     if not linear:
         raise NotFlownError("linear analysis")
     question = Question(
@@ -102,7 +102,7 @@ def _is_nearer(one: Nearness, than: Nearness) -> bool:
 
 
 def survives(cases: Cases, plant: str) -> dict[str, Any]:
-    """Judge by the conditions of the hard profile in which a flight ends early."""
+    """Evaluate the conditions of the hard profile in which a flight ends early."""
     question = Question(
         "survives",
         "backstepping survives whatever the PID survives",
@@ -143,7 +143,7 @@ def yaw_saturated_percent(case: Mapping[str, Any]) -> float:
 
 
 def spin_up(cases: Cases) -> dict[str, Any]:
-    """Judge the spin-up torque of the rotors, which only the rigid body and the multibody plant have."""
+    """Evaluate the spin-up torque of the rotors, which only the rigid body and the multibody plant have."""
     question = Question(
         "spin_up",
         "the torque that spins the rotors up may be left out",

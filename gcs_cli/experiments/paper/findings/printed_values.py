@@ -158,7 +158,7 @@ CORRECTIONS = (
         "equation 6, pitch",
         "Ω3² − Ω2²",
         "Ω3² − Ω1²",
-        "the misprint halves the pitch gain and lets half of a roll command into pitch",
+        "the misprint halves the pitch gain and couples half of a roll command into pitch",
         "sim_bridge/plant/paper.py",
     ),
     Correction(

@@ -135,7 +135,7 @@ class Exchange:
 
     def tick(
         self,
-        aim: FloatArray,
+        demand: FloatArray,
         outer_due: bool,
         attitude_only: bool,
         row: FloatArray,
@@ -143,12 +143,12 @@ class Exchange:
     ) -> bool:
         """Run one inner tick, fill ``row``, shape (48,), and return True if the plant diverged.
 
-        ``aim`` is a setpoint (11,), or an attitude target (5,) for the inner loop alone, set when ``outer_due``.
+        ``demand`` is a setpoint (11,), or an attitude target (5,) for the inner loop alone, set when ``outer_due``.
         ``instead`` replaces the rotor commands that are due.
         """
         if attitude_only and outer_due:
-            self.loops.set_attitude_target(aim)
-        self.loops.step(self.state, aim, self._speeds, outer_due and not attitude_only, row)
+            self.loops.set_attitude_target(demand)
+        self.loops.step(self.state, demand, self._speeds, outer_due and not attitude_only, row)
         self._waiting.append(row[LoopRow.ROTOR_COMMAND].copy())
         due = self._waiting.pop(0)
         return bool(self._plant.advance(due if instead is None else instead, _ARMED, self._steps) & DIVERGED)

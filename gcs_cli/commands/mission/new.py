@@ -70,7 +70,7 @@ class ShapeOptions:
 
 @dataclass(frozen=True)
 class RouteOptions:
-    """How a pattern is flown."""
+    """Options of all patterns."""
 
     laps: Annotated[int, typer.Option(metavar="N", min=1, max=10_000, help="Repetitions of the pattern.")] = 1
     altitude: AltitudeOption = DEFAULT_ALTITUDE_M
@@ -92,7 +92,26 @@ class RouteOptions:
             show_default=False,
         ),
     ] = None
-    end: Annotated[Ending, typer.Option("--end", help="How the mission ends.")] = Ending.RETURN
+    end: Annotated[Ending, typer.Option("--end", help="End of the mission.")] = Ending.RETURN
+
+
+_Area = Annotated[
+    Path | None,
+    typer.Argument(
+        metavar="[AREA]",
+        help="Area of a survey (a polygon or a geofence) or line of a corridor: a file of any plan format.",
+        show_default=False,
+    ),
+]
+_Out = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="FILE",
+        help=f"File to write: {', '.join(SUFFIXES)}.  [default: PATTERN.plan]",
+        show_default=False,
+    ),
+]
 
 
 @app.command()
@@ -102,29 +121,15 @@ def new(
     pattern: Annotated[Pattern, typer.Argument(metavar="PATTERN", help=f"{', '.join(Pattern)}.")],
     shape: ShapeOptions,
     route: RouteOptions,
-    area: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="[AREA]",
-            help="Area of a survey (a polygon or a geofence) or line of a corridor: a file of any plan format.",
-            show_default=False,
-        ),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            metavar="FILE",
-            help=f"File to write: {', '.join(SUFFIXES)}.  [default: PATTERN.plan]",
-            show_default=False,
-        ),
-    ] = None,
+    area: _Area = None,
+    out: _Out = None,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Write a mission of a pattern.
 
-    A square begins at home and extends north and east; a circle and a lemniscate have their centre there.
+    A square begins at home and extends north and east; a circle and a lemniscate have their centre there. The lines of
+    a survey end at the border of AREA, which is not the geofence of the plan.
     """
     out = Path(f"{pattern.value}.plan") if out is None else out
     check_suffix(out)
@@ -136,7 +141,8 @@ def new(
     home = _home_of_area(given) if route.home is None else parse_home(route.home)
     places = _places(pattern, shape, given, area, home)
     flown = patterns.Route(route.altitude, route.speed, laps=route.laps, ending=route.end.value)
-    plan = Plan(patterns.pattern_items(places, home, home, flown), home, fence=given.fence)
+    fence = () if pattern == Pattern.SURVEY else given.fence  # its own lines would leave it
+    plan = Plan(patterns.pattern_items(places, home, home, flown), home, fence=fence)
     output = output_of(context, as_json)
     lost = save_any(out, plan)
     flight = itinerary(plan.items, home)

@@ -12,7 +12,7 @@ import typer
 from flightstack.core.atomic_file import check_new
 from flightstack.plan import PLAN_NAMES, MissionType, Plan
 from flightstack.process.command_line import expand_options, make_app
-from gcs_cli.commands.asking import YesOption, confirm_if_armed
+from gcs_cli.commands.confirmation import YesOption, confirm_if_armed
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly.processes import Interruption
 from gcs_cli.link import calls

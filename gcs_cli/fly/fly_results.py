@@ -1,44 +1,85 @@
-"""``gcs fly``: fly, write the results and print a summary."""
+"""The results of a flight: summary, report, and the figures that are printed. Needed after the flight only."""
 
 from __future__ import annotations
 
-import json
-import webbrowser
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
+from flightstack.core.errors import ConfigError
+from flightstack.params.vehicle import NO_DRAG_PLANT
+from flightstack.plan import Plan
 from gcs_cli.errors import CliError
-from gcs_cli.fly.fly_display import FlyConsole, make_display
-from gcs_cli.fly.fly_flags import FlyOptions, RunOptions
-from gcs_cli.fly.fly_options import checked_plan
-from gcs_cli.fly.fly_run import fly, write_results
+from gcs_cli.fly.fly_flags import FlyOptions
+from gcs_cli.fly.fly_options import flown_vehicle, outer_rate_hz
+from gcs_cli.fly.fly_run import Flown
+from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.conditions import conditions
-from gcs_cli.report.flight_outcome import Code
-from gcs_cli.report.summary import max_overshoot_m
-from gcs_cli.run_directory import REPORT_NAME
+from gcs_cli.report.flight_data import Flight as FlightData
+from gcs_cli.report.flight_outcome import Code, Outcome, with_log
+from gcs_cli.report.page import write_report
+from gcs_cli.report.summary import RunInfo, max_overshoot_m, summarise, write_summary
+from gcs_cli.run_directory import LOG_NAME, REPORT_NAME, SUMMARY_NAME, TLOG_NAME
 
 
-def run_fly(options: FlyOptions, run: RunOptions, out: Path | None) -> None:
-    """Fly the mission, write the results to ``out`` and print a summary; raise CliError, ConfigError."""
-    items = checked_plan(options)
-    console = FlyConsole(stderr=run.as_json, highlight=False)
-    display = make_display(console)
+def _drag_of(options: FlyOptions) -> tuple[float, float, float]:
+    return (0.0, 0.0, 0.0) if options.plant == NO_DRAG_PLANT else flown_vehicle(options).linear_drag_n_s_m
+
+
+def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[str, Any], Outcome]:
+    """Write summary and report; return the summary, and the outcome after reading the log."""
+    log, outcome = flown.folder / LOG_NAME, flown.outcome
     try:
-        flown = fly(options, items, out, display, run.overwrite)
-    finally:
-        display.close()
-    summary, outcome = write_results(options, items, flown)
-    if run.as_json:
-        print(json.dumps({**summary, "directory": str(flown.folder)}), flush=True)
+        data = read_flight(log)
+    except (ConfigError, OSError) as error:
+        data = FlightData()
+        if outcome.completed:
+            outcome = Outcome(Code.NO_LOG, f"the mission was flown, but its log cannot be read: {error}")
     else:
-        print_summary(console, summary, flown.folder)
-    report = flown.folder / REPORT_NAME
-    if run.open_report and report.exists():
-        webbrowser.open(report.resolve().as_uri())
-    if not outcome.completed:
-        raise CliError(f"{outcome.reason} (see {flown.folder})", outcome.exit_code)
+        outcome = with_log(outcome, data, plan.items)
+    summary = summarise(data, plan, _run_info(options, flown, outcome))
+    try:
+        write_summary(flown.folder / SUMMARY_NAME, summary)
+        write_report(flown.folder / REPORT_NAME, data, plan, summary, flown.folder / TLOG_NAME)
+    except OSError as error:
+        raise CliError(f"{flown.folder}: the results cannot be written: {error.strerror}") from None
+    return summary, outcome
+
+
+def _run_info(options: FlyOptions, flown: Flown, outcome: Outcome) -> RunInfo:
+    return RunInfo(
+        outcome=outcome.code.value,
+        outcome_text=outcome.reason,
+        plan=str(options.plan_path),
+        wall_time_s=flown.wall_time_s,
+        vehicle=options.vehicle,
+        controller=options.controller,
+        gains=options.gains,
+        plant=options.plant,
+        loops=options.loops,
+        state=options.state,
+        seed=options.seed,
+        wind=options.wind,
+        gust=options.gust,
+        drag_n_s_m=_drag_of(options),
+        torque_gust=options.torque_gust,
+        force=options.force,
+        torque=options.torque,
+        slope=options.slope,
+        boat=options.boat,
+        battery_start=options.battery_start,
+        battery_capacity=options.battery_capacity,
+        battery_drain=options.battery_drain,
+        faults=tuple(options.faults or ()),
+        ideal_rotors=options.ideal_rotors,
+        params=None if options.params is None else str(options.params),
+        param=tuple(options.param or ()),
+        inner_hz=options.inner_hz,
+        outer_hz=outer_rate_hz(options),
+        overruns=flown.overruns,
+        log_path=flown.folder / LOG_NAME,
+    )
 
 
 def print_summary(console: Console, summary: dict[str, Any], folder: Path) -> None:

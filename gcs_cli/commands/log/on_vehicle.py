@@ -14,7 +14,7 @@ from flightstack.mavlink.files import Entry
 from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.autopilots.registry import autopilot_of
 from gcs_cli.clients.log_client import LogEntry
-from gcs_cli.commands.asking import YesOption, confirm
+from gcs_cli.commands.confirmation import YesOption, confirm
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.output import Output
@@ -56,7 +56,7 @@ def download(
     ] = "latest",
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="File to write; with --all, the folder.", show_default=False),
+        typer.Option("--out", "-o", help="File to write; with --all, the folder.", show_default=False),
     ] = None,
     everything: Annotated[
         bool, typer.Option("--all", help="All logs, except those that are already in the folder.")
@@ -134,7 +134,7 @@ def _download_all(
     if refused:
         verb = "exists" if len(refused) == 1 else "exist"
         raise CliError(
-            f"{', '.join(refused)}: {verb} already with another size: give another --output, or --overwrite",
+            f"{', '.join(refused)}: {verb} already with another size: give another --out, or --overwrite",
             FAILED,
         )
 

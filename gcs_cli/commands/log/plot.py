@@ -12,7 +12,7 @@ from rich.console import Console
 from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.process.command_line import make_app
 from gcs_cli.charts.pages import render_page
-from gcs_cli.commands.log_file import LogArgument, warn_if_damaged
+from gcs_cli.commands.log.file import LogArgument, warn_if_damaged
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.logs.fields import Field, find_fields
 from gcs_cli.logs.info import start_utc
@@ -24,7 +24,7 @@ from gcs_cli.settings import JsonOption, OverwriteOption, output_of
 
 app = make_app(add_completion=False)
 
-_TEMPLATES = Path(__file__).resolve().parents[1] / "logs" / "templates"
+_TEMPLATES = Path(__file__).resolve().parents[2] / "logs" / "templates"
 _PANEL_ROWS = 12
 _PRINTED = (".png", ".svg", ".pdf")
 FieldsArgument = Annotated[

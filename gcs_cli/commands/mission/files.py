@@ -71,10 +71,12 @@ def check(
 
     Without a vehicle, or with one's geofence, home and parameters.
 
-    Checks geofence, mission and rally points, and names all items that are refused.
+    Checks geofence, mission and rally points, and names all items that are refused. Exits with 2 if there are any;
+    with 1 if they were checked for a vehicle.
     """
     plan, output = load_any(file), output_of(context, link)
-    if _uses_vehicle(link, vehicle):
+    on_vehicle = _uses_vehicle(link, vehicle)
+    if on_vehicle:
         with connect_vehicle(context, link) as connection:
             problems, unchecked = problems_on_vehicle(connection, plan)
             autopilot = connection.session.view.autopilot.name
@@ -86,14 +88,15 @@ def check(
         output.say("problem", f"{problem.part}: {problem.reason}", **problem._asdict())
     refused = {problem.part for problem in problems}
     for part in plan_parts(plan):
-        if part.name not in refused:
+        if part.name not in refused and (output.as_json or not problems):
             output.say(
                 "good", f"{part.name} of {len(part.items)} items: good", part=part.name, items=len(part.items)
             )
     if problems:
         first, more = problems[0], len(problems) - 1
         raise CliError(
-            f"{file}: {first.part}: {first.reason}" + (f" (and {more} more)" if more else ""), FAILED
+            f"{file}: {first.part}: {first.reason}" + (f" (and {more} more)" if more else ""),
+            FAILED if on_vehicle else USAGE,
         )
 
 

@@ -38,24 +38,29 @@ def info(context: typer.Context, log: LogArgument, as_json: JsonOption = False) 
         out.say(line.event, line.sentence, **line.facts)
 
 
+_Csv = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Write a CSV file for each topic.", show_default=False)
+]
+_Parquet = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Write a Parquet file for each topic.", show_default=False)
+]
+_Mcap = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Write an MCAP file, for Foxglove and others.", show_default=False),
+]
+_Rerun = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Write a Rerun recording (.rrd).", show_default=False)
+]
+
+
 @app.command()
 def export(
     context: typer.Context,
     log: LogArgument,
-    csv: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write a CSV file for each topic.", show_default=False)
-    ] = None,
-    parquet: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Write a Parquet file for each topic.", show_default=False),
-    ] = None,
-    mcap: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write an MCAP file, for Foxglove and others.", show_default=False),
-    ] = None,
-    rerun: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write a Rerun recording (.rrd).", show_default=False)
-    ] = None,
+    csv: _Csv = None,
+    parquet: _Parquet = None,
+    mcap: _Mcap = None,
+    rerun: _Rerun = None,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:

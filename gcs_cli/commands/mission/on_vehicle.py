@@ -11,8 +11,8 @@ from flightstack.plan import MissionType
 from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.actions import in_flight, in_mission
 from gcs_cli.commands.actions import ActionOptions, run_action
-from gcs_cli.commands.asking import YesOption
-from gcs_cli.commands.plan_commands import add_download, add_upload, add_verify, clear_part
+from gcs_cli.commands.confirmation import YesOption
+from gcs_cli.commands.mission.plan_parts import add_download, add_upload, add_verify, clear_part
 from gcs_cli.settings import LinkOptions
 from gcs_cli.transfers.vehicle_plans import KINDS
 
@@ -60,7 +60,7 @@ add_verify(
 def clear(
     context: typer.Context,
     link: LinkOptions,
-    part: Annotated[Part, typer.Option("--type", help="What to remove.")] = Part.MISSION,
+    part: Annotated[Part, typer.Option("--type", help="Part of the plan to remove.")] = Part.MISSION,
     yes: YesOption = False,
 ) -> None:
     """Remove the vehicle's mission, geofence or rally points.

@@ -1,0 +1,1 @@
+"""``gcs log``: logs on the vehicle and log files."""

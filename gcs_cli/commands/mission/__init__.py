@@ -1,0 +1,1 @@
+"""``gcs mission``, ``fence`` and ``rally``: plans in files and on the vehicle."""
