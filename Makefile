@@ -10,7 +10,10 @@ export PYTHONDONTWRITEBYTECODE :=
 INSTALL := $(BIN)/python -m pip install -q --no-compile --disable-pip-version-check -e
 # test processes side by side: twice the cores, because flights in real time wait most of theirs
 WORKERS ?= 4
-# the quick tests never wait
+# the quick tests, and where they are: other folders are not imported
+QUICK := -m "(unit or protocol or flight or parity or smoke) and not long" \
+	tests/parity tests/processes/test_gcs_fly.py tests/protocol tests/scenarios tests/unit
+# they never wait
 CORES := $(shell getconf _NPROCESSORS_ONLN)
 # files in order: those of firmware, interop and processes, which take longest, come first
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
@@ -21,7 +24,7 @@ PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-r
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
 
-setup: $(READY) ## Make the virtual environment with the developers' tools, and compile the kernels
+setup: $(READY) ## Make the virtual environment with the developers' tools; compile kernels and tests
 
 $(FLY_READY): pyproject.toml
 	@test -x $(BIN)/python || $(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -35,15 +38,16 @@ $(READY): $(FLY_READY)
 	@echo "Installing the developers' tools into $(VENV) ..."
 	@$(INSTALL) '.[dev]'
 	@$(BIN)/python -m compileall -qq -j 0 $(VENV)/lib || true  # test processes side by side import most of it
-	@$(BIN)/sim-bridge open-loop --rotors 214,214,214,214 --seconds 0.01 --json >/dev/null & \
-		$(BIN)/flightstack --check && $(BIN)/flightstack --check --state estimated && wait $$!
+	@{ $(BIN)/sim-bridge open-loop --rotors 214,214,214,214 --seconds 0.01 --json >/dev/null && \
+		{ $(BIN)/python -m pytest --collect-only -qq >/dev/null || true; }; } & \
+		$(BIN)/flightstack --check && $(BIN)/flightstack --check --state estimated && wait $$!  # bytecode of tests too
 	@touch $@
 
 fly: $(FLY_READY) ## Fly missions/square.plan: simulator, flight stack and ground station as three processes
 	@$(BIN)/gcs fly missions/square.plan
 
 test: $(READY) ## Run the tests that a developer runs all day: unit, protocol, flights, C against Python, one real flight
-	@$(PYTEST) -n $(CORES) -m "(unit or protocol or flight or parity or smoke) and not long"
+	@$(PYTEST) -n $(CORES) $(QUICK)
 
 test-all: $(READY) ## Run every test
 	@$(PYTEST) --durations 15

@@ -76,7 +76,7 @@ def main() -> int:
         )
         results["three_processes"] = _measured(
             "flights of three processes",
-            lambda: three_processes.flights((500.0, 250.0), 2 if quick else 7),
+            lambda: three_processes.flights(three_processes.CASES, 2 if quick else 7),
         )
     if "emulated" in wanted:
         results["emulated"] = _measured(

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from benchmarks.measure import Figure, figure
 from benchmarks.ports import free_instance
+from flightstack.params.config import TRUTH
 
 ROOT = Path(__file__).resolve().parent.parent
 PLAN = ROOT / "benchmarks" / "minute.plan"
@@ -42,7 +43,7 @@ def _fly(loops: str) -> tuple[float, float, float]:
     with tempfile.TemporaryDirectory() as folder:
         command = [
             sys.executable, "-m", "gcs_cli", "fly", str(PLAN), "--json", "--out", folder, "--loops", loops,
-            "--instance", str(free_instance()),
+            "--instance", str(free_instance()), "--state", TRUTH,
         ]  # fmt: skip
         done = subprocess.run(command, check=False, capture_output=True, text=True, cwd=ROOT)
     if done.returncode:

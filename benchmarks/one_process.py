@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from benchmarks.measure import Figure, figure
 from flightstack.flight_log.flight_log import FlightLog
+from flightstack.params.config import ESTIMATED, TRUTH
 from flightstack.testing import World
 from flightstack.testing.engine import Engine
 
@@ -29,15 +30,20 @@ class UnloggedEngine(Engine):
         return None
 
 
-def flying(log: bool, station: Station, inner_hz: float = 500.0) -> World:
-    """Return a world that flies its mission, with or without a log and a ground station."""
+def flying(log: bool, station: Station, state: str = TRUTH, inner_hz: float = 500.0) -> World:
+    """Return a world that flies its mission, with or without a log and a ground station.
+
+    ``state`` is that of ``Setup``: on sensors, the mission starts once the vehicle is ready.
+    """
     world = World(
         telemetry=True,
         make_engine=Engine if log else UnloggedEngine,
         inner_hz=inner_hz,
         outer_hz=inner_hz / 5.0,
+        state=state,
     )
     world.upload(PLAN)
+    world.wait_until_ready()
     world.arm()
     world.start_mission()
     if station is not Station.READS:
@@ -59,6 +65,7 @@ class Variant(NamedTuple):
     name: str
     log: bool
     station: Station
+    state: str = TRUTH
 
 
 VARIANTS = (
@@ -66,12 +73,14 @@ VARIANTS = (
     Variant("log, telemetry sent", True, Station.HEARS),
     Variant("log", True, Station.IS_GONE),
     Variant("neither", False, Station.IS_GONE),
+    Variant("sensors and estimator, log, telemetry sent and read", True, Station.READS, ESTIMATED),
+    Variant("sensors and estimator, log", True, Station.IS_GONE, ESTIMATED),
 )
 
 
 def _fly(variant: Variant) -> tuple[float, float]:
     """Return the real-time factor and the time of a step [µs]."""
-    world = flying(variant.log, variant.station)
+    world = flying(variant.log, variant.station, variant.state)
     began_s, simulated_s = time.perf_counter(), world.time_s
     world.run_until("not armed")
     wall_s = time.perf_counter() - began_s

@@ -222,7 +222,7 @@ def parts() -> list[Part]:
             0.2,
             True,
         ),
-        Part("guidance", lambda: navigator.step(now.status.mode, state, now.attitude_target), 0.2, True),
+        Part("guidance", lambda: navigator.step(now.status.mode, state, now.attitude_target, 0.0), 0.2, True),
         Part("log: rows, and bytes of them", _log(world), 0.2, True),
         Part("simulator, without its socket", simulator_side, 1.0, False),
         Part("flight stack's end of the simulator link", stack_side, 1.0, False),

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from benchmarks.measure import Figure, figure
 from benchmarks.ports import free_instance
 from flightstack.core.port_numbers import simulator_port
-from flightstack.params.config import DEFAULT_HOME
+from flightstack.params.config import DEFAULT_HOME, ESTIMATED, TRUTH
 from flightstack.params.vehicle import load_vehicle
 from flightstack.simulator_link.endpoint import SimulatorEndpoint
 
@@ -23,20 +23,35 @@ ROOT = Path(__file__).resolve().parent.parent
 PLAN = ROOT / "missions" / "square.plan"
 
 
+class Case(NamedTuple):
+    """What ``gcs fly`` flies."""
+
+    inner_hz: float
+    state: str
+
+    def __str__(self) -> str:
+        return f"{self.inner_hz:g} Hz, {self.state}"
+
+
+ON_TRUTH, ON_SENSORS = Case(500.0, TRUTH), Case(500.0, ESTIMATED)
+CASES = (ON_TRUTH, Case(250.0, TRUTH), ON_SENSORS)
+
+
 class Flights(NamedTuple):
-    """Figures of ``gcs fly`` at one inner rate."""
+    """Figures of ``gcs fly`` of one case."""
 
     factor: Figure
     step_us: Figure
     command_s: Figure
 
 
-def fly(inner_hz: float, plant: str = "rigid") -> tuple[dict[str, Any], float]:
+def fly(inner_hz: float, plant: str = "rigid", state: str = TRUTH) -> tuple[dict[str, Any], float]:
     """Fly once; return the summary and how long the whole command took [s]."""
     with tempfile.TemporaryDirectory() as folder:
         command = [
             sys.executable, "-m", "gcs_cli", "fly", str(PLAN), "--json", "--out", folder,
             "--inner-hz", f"{inner_hz:g}", "--instance", str(free_instance()), "--plant", plant,
+            "--state", state,
         ]  # fmt: skip
         began_s = time.perf_counter()
         done = subprocess.run(command, check=False, capture_output=True, text=True, cwd=ROOT)
@@ -47,18 +62,19 @@ def fly(inner_hz: float, plant: str = "rigid") -> tuple[dict[str, Any], float]:
     return summary, took_s
 
 
-def flights(rates_hz: tuple[float, ...], rounds: int) -> dict[float, Flights]:
-    """Fly at each inner rate, interleaved; the first flight of all only warms the caches."""
-    fly(rates_hz[0])
-    seen: dict[float, list[tuple[float, float, float]]] = {rate: [] for rate in rates_hz}
+def flights(cases: tuple[Case, ...], rounds: int) -> dict[Case, Flights]:
+    """Fly each case, interleaved; its first flight only warms the caches."""
+    for case in cases:
+        fly(case.inner_hz, state=case.state)
+    seen: dict[Case, list[tuple[float, float, float]]] = {case: [] for case in cases}
     for _ in range(rounds):
-        for rate in rates_hz:
-            summary, took_s = fly(rate)
+        for case in cases:
+            summary, took_s = fly(case.inner_hz, state=case.state)
             factor = summary["real_time_factor"]
-            seen[rate].append((factor, 1e6 / factor / rate, took_s))
+            seen[case].append((factor, 1e6 / factor / case.inner_hz, took_s))
     return {
-        rate: Flights(*(figure(values) for values in zip(*flown, strict=True)))
-        for rate, flown in seen.items()
+        case: Flights(*(figure(values) for values in zip(*flown, strict=True)))
+        for case, flown in seen.items()
     }
 
 

@@ -1,4 +1,4 @@
-"""Fly twenty flights in this process and print the SHA-256 of their logs: a change of form changes none of them.
+"""Fly flights in this process and print the SHA-256 of their logs: a change of form changes none of them.
 
 python -m tools.flight_hashes > before.txt; ...; python -m tools.flight_hashes | diff before.txt -
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 from typing import Any
 
+from flightstack.params.config import ESTIMATED, TRUTH
 from flightstack.testing import World
 
 GUSTY: dict[str, Any] = {"vehicle": "x_quad", "wind": (4.0, -2.0, 0.0), "gust": 1.0, "seed": 3}
@@ -35,15 +36,20 @@ FLIGHTS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("fenced_square.plan", {**GUSTY, "loops": "c"}),
     ("triangle.waypoints", {"vehicle": "x_quad"}),
     ("every_item.plan", {**GUSTY, "seed": 5}),
+    ("square.plan", {"state": ESTIMATED}),
+    ("square.plan", {"state": ESTIMATED, "controller": "backstepping", **GUSTY}),
+    ("hop.plan", {"state": ESTIMATED, "loops": "c", "boat": (1.0, 0.5)}),
+    ("hop.plan", {"state": ESTIMATED, "plant": "multibody", "inner_hz": 250.0, "outer_hz": 50.0}),
 )
-"""Plans by vehicles, controllers, gains, plants, loops and rates."""
+"""Plans by vehicles, controllers, gains, plants, loops, rates and sources of the state; true unless they say so."""
 LIMIT_S = 400.0
 
 
 def fly(plan: str, options: dict[str, Any]) -> str:
     """Return the SHA-256 of the log without the version of the loops, which hashes C sources with their comments."""
-    with World(**options) as world:
+    with World(**{"state": TRUTH, **options}) as world:
         world.upload(plan)
+        world.wait_until_ready()
         world.arm()
         world.start_mission()
         world.run_until("not armed", LIMIT_S)

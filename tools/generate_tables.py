@@ -13,7 +13,7 @@ from flightstack.flight_log.local_position import LOCAL_POSITION
 from flightstack.flight_log.sensor_recorder import SENSOR_GROUPS
 from flightstack.flight_log.topics import EVENT_TOPICS, OUTER_TOPICS, Field, Topic, inner_topics
 from flightstack.params.behaviour import Behaviour
-from sim_bridge.plant.fault_table import SENSORS, TABLE, Row
+from sim_bridge.plant.faults.table import SENSORS, TABLE, Row
 from tools.generated import ROOT, write_or_check
 from tools.law_subset import subset_page
 from tools.link_tables import link_page
@@ -30,11 +30,12 @@ WATCHED = {
     "ATTITUDE": "roll or pitch beyond `FD_FAIL_R`, `FD_FAIL_P`, or the thrust axis off its reference by `FS_ATT_ERR`",
     "ROTOR": "a measured rotor speed differs from its command by `FS_ROT_ERR` for `FD_ACT_MOT_TOUT`",
     "BATTERY_EMERGENCY": "charge at or below `BAT_EMERGEN_THR`",
-    "IMU_FAULT": "no measurement of the inertial sensor for 0.04 s, or 100 equal ones",
+    "IMU_FAULT": "no measurement of the inertial sensor for 0.04 s, or 100 equal ones; of several, if "
+    "none can replace it",
     "ATTITUDE_DOUBTFUL": "standard deviation of the estimated tilt above `FS_TILT_DEV`",
     "POSITION_LOST": "dead reckoning for `FS_DEAD_RECK_T`, or standard deviation of the estimated position above "
     "`COM_POS_FS_EPH` (until it is below 80 % of that for 1 s), or a filter that is late by 0.5 s",
-    "GNSS_REFUSED": "positions of GNSS are refused for 1 s",
+    "GNSS_REFUSED": "horizontal positions or heights of GNSS are refused for 1 s",
     "FENCE": "outside the geofence, `GF_MAX_HOR_DIST` or `GF_MAX_VER_DIST`",
     "POSITION_ERROR": "the position differs from its setpoint by `FS_POS_ERR` for `FS_POS_ERR_T`",
     "BATTERY_CRITICAL": "charge at or below `BAT_CRIT_THR`",
@@ -70,7 +71,7 @@ TOPICS = {
     "vehicle_status": "arming state, navigation state, failsafe",
     "mission_result": "current and reached mission item",
     "vehicle_land_detected": "stages of the land detector",
-    "sensor_combined": "each measurement of the inertial sensor",
+    "sensor_combined": "each measurement of the inertial sensor that the vehicle flies on",
     "vehicle_magnetometer": "each measurement of the magnetic field",
     "vehicle_air_data": "each measurement of the barometer; density of dry air",
     "vehicle_gps_position": "each fix of the receiver, with the time of its reception",
@@ -84,6 +85,8 @@ TOPICS = {
     "estimator_innovations": "innovations by sensor; NaN for a sensor that the filter does not have",
     "estimator_innovation_variances": "variances of the innovations",
     "estimator_innovation_test_ratios": "squares of the ratios of the innovations to their gates",
+    "estimator_selector_status": "of a vehicle with several inertial sensors: the one that it flies"
+    " on, and the reasons",
     "vehicle_attitude_groundtruth": "true attitude",
     "vehicle_angular_velocity_groundtruth": "true rates",
     "vehicle_local_position_groundtruth": "true position and velocity, in the vehicle's local frame",
@@ -321,7 +324,7 @@ def fault_row(row: Row) -> str:
 
 def faults_page() -> str:
     """Return the page of the faults."""
-    note = NOTE.format(source="sim_bridge/plant/fault_table.py")
+    note = NOTE.format(source="sim_bridge/plant/faults/table.py")
     sensors = "".join(
         f"| `{name}` | {SENSOR_PARTS[name]} | {unit.unit} |\n" for name, unit in SENSORS.items()
     )
@@ -339,7 +342,7 @@ if __name__ == "__main__":
         "scenarios.md": scenarios_page(NOTE.format(source="flightstack/testing")),
         "scenario.schema.json": schema_text(),
         "generated-c.md": subset_page(NOTE.format(source="flightstack/firmware/generator")),
-        "pil-link.md": link_page(NOTE.format(source="flightstack/firmware/line_model.py")),
+        "pil-link.md": link_page(NOTE.format(source="flightstack/firmware/pil/line_model.py")),
         "watch-keys.md": keys_page(NOTE.format(source="gcs_cli/tui")),
     }
     sys.exit(write_or_check({FOLDER / name: text for name, text in pages.items()}))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flightstack.firmware.line_model import (
+from flightstack.firmware.pil.line_model import (
     STATE_OCTETS,
     Line,
     Octets,

@@ -13,6 +13,7 @@ from flightstack.testing.faults import DIRECTIONS, LINK_FAULTS
 from flightstack.testing.orders import ORDERS
 from flightstack.testing.scenario import ClientKey, Event, Expect, Scenario, Wind
 from flightstack.testing.toml_record import json_schema, key_rows
+from gcs_cli.campaign.definition import Plan
 from gcs_cli.report.flight_outcome import Code
 from tools.generated import ROOT
 
@@ -43,6 +44,23 @@ TABLES = (
     ),
     ("`[expect]`", Expect, ""),
 )
+CAMPAIGN = """
+A file with this table and `[vary]` is a campaign: [`gcs campaign`](../how-to/campaigns.md) flies it, not `gcs test`.
+`seed` and `repeat` of the scenario have no effect there.
+"""
+VARY = """
+Each entry of `[vary]` is an input and its distribution:
+
+| distribution | values |
+| --- | --- |
+| `{ uniform = [LOW, HIGH] }` | numbers of a range |
+| `{ log_uniform = [LOW, HIGH] }` | numbers whose logarithm is uniform |
+| `{ normal = [MEAN, DEVIATION] }` | normally distributed numbers, cut off at `low` and `high` if they are given |
+| `{ choice = [A, B, …] }` | one of these numbers, texts or flags |
+
+`steps` is the number of values in a grid: both ends of a range and what lies evenly between them. `nominal` is the
+value without variation, from which `--seek worst` counts.
+"""
 EXPRESSIONS = """
 Expressions compare signals with numbers and modes: `<`, `<=`, `>`, `>=`, `==`, `!=`, `and`, `or`, `not`, `+ - * /`,
 and the functions `abs`, `sqrt`, `hypot`, `min`, `max`. In `always` and `eventually`, `after EVENT` and
@@ -77,6 +95,11 @@ def scenarios_page(note: str) -> str:
     for kind, names in (("code", Code), ("mode", Mode.__members__), ("failsafe", Failsafe.__members__)):
         parts.append(f"\n`outcome` as a {kind}: {', '.join(f'`{name}`' for name in names)}.\n")
     parts.append("\nWithout `outcome` a plan is expected to be completed.\n")
+    rows = [
+        (f"`{name}`", value, meaning, f"`{default}`" if default else "")
+        for name, value, meaning, default in key_rows(Plan)
+    ]
+    parts += ["\n## `[campaign]`\n", CAMPAIGN, table(("key", "value", "meaning", "default"), rows), VARY]
     parts += ["\n## Signals\n", EXPRESSIONS, table(("signal", "meaning"), rows_of(SIGNALS.items()))]
     events = ((f"`{event.form}`", event.meaning, "yes" if event.is_live else "") for event in EVENTS)
     parts.append(

@@ -6,15 +6,30 @@ import ast
 import re
 import statistics
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PROGRAMS = ("flightstack", "sim_bridge", "gcs_cli")
 SMALL = 60
+LONGEST_FUNCTION = 40
+COLUMNS = (
+    "files",
+    "median lines",
+    "p90",
+    "one definition",
+    "small ones without a reason",
+    "long functions",
+    "index constants",
+    "packages in cycles",
+)
+LIBRARY_NAMES = {"_replace", "_fields", "_asdict", "_header", "_pack", "_timestamp", "_link", "_time"}
+"""Private by their form: of named tuples, of messages of pymavlink, and a module of Textual."""
 INDEX = re.compile(r"[A-Z]+_[A-Z0-9_]+$")
 
 
+@cache
 def sources(program: str) -> dict[str, ast.Module]:
     """Return the modules of a program by name; packages are named without ``__init__``."""
     found = {}
@@ -34,17 +49,86 @@ def lines(program: str) -> list[int]:
     ]
 
 
-def has_one_small_definition(tree: ast.Module) -> bool:
-    """Return True for a module whose only function or class has at most SMALL lines."""
-    kinds = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
-    found = [node for node in tree.body if isinstance(node, kinds)]
-    return len(found) == 1 and (found[0].end_lineno or 0) - found[0].lineno < SMALL
-
-
 def has_one_definition(tree: ast.Module) -> bool:
-    """Return True for a module with a single function or class at its top."""
+    """Return True for a module with a single function or class at its top; a package's ``__getattr__`` is none."""
+    return len(_definitions(tree)) == 1
+
+
+def has_one_small_definition(tree: ast.Module) -> bool:
+    """Return True for a module whose only function or class has at most SMALL lines, and that does not say why."""
+    found = _definitions(tree)
+    is_small = len(found) == 1 and (found[0].end_lineno or 0) - found[0].lineno < SMALL
+    return is_small and not is_own_module(tree)
+
+
+def _definitions(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef]:
     kinds = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
-    return sum(isinstance(node, kinds) for node in tree.body) == 1
+    return [node for node in tree.body if isinstance(node, kinds) and node.name != "__getattr__"]
+
+
+def is_own_module(tree: ast.Module) -> bool:
+    """Return True if the docstring of a module says why it is one: ``A module of its own``."""
+    return "module of its own" in (ast.get_docstring(tree) or "")
+
+
+def long_functions(modules: dict[str, ast.Module]) -> Iterator[str]:
+    """Yield each function that is longer than LONGEST_FUNCTION, but those of generated modules."""
+    for name, tree in modules.items():
+        for node in ast.walk(tree) if not name.endswith("_generated") else ():
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                length = (node.end_lineno or 0) - node.lineno + 1
+                if length > LONGEST_FUNCTION:
+                    yield f"{name}.{node.name}: {length} lines"
+
+
+def private_names(modules: Iterable[ast.Module]) -> set[str]:
+    """Return the names with one underscore that modules define: functions, classes, constants and attributes."""
+    found = set()
+    for node in (node for tree in modules for node in ast.walk(tree)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            found.add(node.name)
+        elif isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store):
+            found.add(node.id if isinstance(node, ast.Name) else node.attr)
+    return {name for name in found if name.startswith("_") and not name.startswith("__")}
+
+
+def private_uses(modules: dict[str, ast.Module]) -> Iterator[str]:
+    """Yield each use of a private name of the programs in other ``modules``, with its place.
+
+    Uses are attributes, imports, and texts of ``setattr`` and ``getattr``. Attributes of ``self`` count if no class of
+    these modules has them; those of named tuples and of the libraries ``LIBRARY_NAMES`` do not.
+    """
+    programs = (tree for program in PROGRAMS for tree in sources(program).values())
+    names = private_names(programs) - LIBRARY_NAMES
+    owned = {module: private_names([tree]) for module, tree in modules.items()}
+    own = set[str]().union(*owned.values())
+    for module, tree in modules.items():
+        others = names - owned[module]
+        for node in ast.walk(tree):
+            yield from (f"{module}:{node.lineno}: {name}" for name in _used(node, own) if name in others)
+
+
+def _used(node: ast.AST, own: set[str]) -> list[str]:
+    """Return the names that a node takes from others; attributes of ``self`` in ``own`` are no such names."""
+    if isinstance(node, ast.Attribute):
+        is_own = isinstance(node.value, ast.Name) and node.value.id in ("self", "cls") and node.attr in own
+        return [] if is_own else [node.attr]
+    if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] in PROGRAMS:
+        return [alias.name for alias in node.names]
+    if isinstance(node, ast.Call) and _name(node.func) in ("setattr", "getattr"):
+        texts = (part.value for part in node.args if isinstance(part, ast.Constant))
+        return [text.rpartition(".")[2] for text in texts if isinstance(text, str)]
+    return []
+
+
+def _name(called: ast.expr) -> str:
+    return (
+        called.attr
+        if isinstance(called, ast.Attribute)
+        else called.id
+        if isinstance(called, ast.Name)
+        else ""
+    )
 
 
 def index_constants(tree: ast.Module) -> int:
@@ -89,10 +173,7 @@ def cycles(modules: dict[str, ast.Module]) -> list[str]:
 
 def main() -> None:
     """Print a table in Markdown."""
-    print(
-        "| | files | median lines | p90 | one definition | small ones of them | index constants | packages in cycles |"
-    )
-    print("|---|---|---|---|---|---|---|---|")
+    print(f"| {' | '.join(('', *COLUMNS))} |\n{'|---' * (len(COLUMNS) + 1)}|")
     for program in PROGRAMS:
         modules, sizes = sources(program), lines(program)
         row = (
@@ -102,6 +183,7 @@ def main() -> None:
             round(statistics.quantiles(sizes, n=10)[-1]),
             sum(map(has_one_definition, modules.values())),
             sum(map(has_one_small_definition, modules.values())),
+            len(list(long_functions(modules))),
             sum(map(index_constants, modules.values())),
             len(cycles(modules)),
         )
