@@ -71,13 +71,20 @@ class Server:
         self._selector.register(requests, selectors.EVENT_READ)
 
     def serve(self) -> None:
-        """Serve until the client closes the socket."""
-        while True:
-            for key, _ in self._selector.select():
-                if key.data is not None:
-                    self._report_end(key.fd, *key.data)
-                elif not self._start():
-                    return
+        """Serve until the client closes the socket, and end the programs that a killed client left behind."""
+        while self._serve_once():
+            pass
+        for key in list(self._selector.get_map().values()):
+            if key.data is not None:
+                signal.pidfd_send_signal(key.fd, signal.SIGKILL)
+
+    def _serve_once(self) -> bool:
+        for key, _ in self._selector.select():
+            if key.data is not None:
+                self._report_end(key.fd, *key.data)
+            elif not self._start():
+                return False
+        return True
 
     def _start(self) -> bool:
         message, descriptors, _, _ = socket.recv_fds(self._requests, LARGEST_REQUEST, 4)
