@@ -301,7 +301,8 @@ class World:
             self.arm()
 
     def start_mission(self) -> None:
-        """Start the mission."""
+        """Start the mission, which arms; wait before as ``arm`` does; raise RefusedError."""
+        await_first_state(self)
         self.request("the start of the mission", calls.START_MISSION)
 
     def goto(self, north_m: float, east_m: float, alt_m: float = math.nan) -> None:

@@ -75,3 +75,10 @@ def test_home_far_from_the_first_fix_moves_there() -> None:
         world.wait_until_ready()
         assert places.home_point.latitude_deg == pytest.approx(DEFAULT_HOME.latitude_deg, abs=1e-3)
         assert any("Home moved to the origin: home is more than 100 km" in text for text in world.texts)
+
+
+def test_mission_starts_on_the_first_estimate() -> None:
+    with World(vehicle="x_quad") as world:
+        world.upload("hop")
+        world.start_mission()
+        assert world.state.armed
