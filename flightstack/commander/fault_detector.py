@@ -41,8 +41,6 @@ FASTEST_RAD_S = 1e6
 """A larger rotor speed is not a measurement; ideal rotors without limits stay below it."""
 UNMEASURED_AFTER_S = 0.5
 """Time without a measurement after which a rotor is reported as not measured."""
-FROZEN_S = 0.5
-"""Time for which the speed of a rotor has not changed, after which its thrust is that of the expected speed."""
 
 FAULTS = (
     (NOT_FINITE, Failsafe.NOT_FINITE),
@@ -74,8 +72,6 @@ ROTOR_SPEEDS = np.dtype(
         ("mean", "f8", MAX_ROTORS),  # of the expected speed
         ("error", "f8", MAX_ROTORS),  # mean of the measured minus the expected speed
         ("missing", "f8", MAX_ROTORS),  # s without a measurement
-        ("speed", "f8", MAX_ROTORS),  # rad/s; the last measured one
-        ("equal", "f8", MAX_ROTORS),  # s for which it has not changed
         ("measured", "i8"),  # 1 after the first measured speed other than 0
         ("thrust", "f8"),  # N, at the mean speeds
     ]
@@ -142,8 +138,6 @@ def follow_rotors(row: FloatArray, speeds: RecordArray, lags: RecordArray) -> No
         is_measured = abs(speed) <= FASTEST_RAD_S  # NaN is not
         error = speed - expected if is_measured else 0.0
         s["error"][i] += (error - s["error"][i]) * lag["mean"]
-        s["equal"][i] = s["equal"][i] + lag["dt"] if speed == s["speed"][i] != 0.0 else 0.0
-        s["speed"][i] = speed
         s["missing"][i] = 0.0 if is_measured else s["missing"][i] + lag["dt"]
         if abs(command) <= FASTEST_RAD_S:
             s["expected"][i] = expected + (command - expected) * lag["lag"][i]
@@ -192,13 +186,12 @@ def _rotor_error(row: FloatArray, speeds: Record, limits: Record) -> float:
 def _thrust_n(speeds: Record, limits: Record) -> float:
     """Return the thrust at the mean measured speeds; without measurements, at the mean expected speeds.
 
-    A speed other than 0 that has not changed for ``FROZEN_S`` is no measurement; that of a rotor at its limit is the
-    expected one too.
+    A measured speed that does not change counts: a rotor that is stuck turns so. If instead its telemetry is, the
+    vehicle is not found landed, and stands with little thrust until it is disarmed.
     """
     thrust_n = 0.0
     for i in range(limits["rotors"]):
-        is_measured = speeds["measured"] and speeds["equal"][i] < FROZEN_S
-        speed = speeds["mean"][i] + (speeds["error"][i] if is_measured else 0.0)
+        speed = speeds["mean"][i] + (speeds["error"][i] if speeds["measured"] else 0.0)
         thrust_n += limits["thrust"][i] * speed * abs(speed)
     return thrust_n
 

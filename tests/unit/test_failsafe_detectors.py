@@ -192,17 +192,15 @@ def test_rotors_that_are_shaken_are_no_fault(period: int) -> None:
         speed += (command - speed) * (1.0 - math.exp(-INNER_S / lag_s))
 
 
-@pytest.mark.parametrize(("noise_rad_s", "carries"), [(0.0, False), (0.5, True)])
-def test_speed_that_stays_equal_is_no_thrust_without_a_command(noise_rad_s: float, carries: bool) -> None:
-    """Frozen telemetry must not keep a vehicle from landing; rotors that do turn carry it."""
+def test_speed_that_stays_equal_is_thrust_without_a_command() -> None:
+    """A rotor that is stuck turns so; the vehicle must not be found landed and disarmed in the air."""
     bench = Bench()
     bench.run(1.0)
     thrust_n = float(bench.rotors["thrust"][0])
     bench.row[LoopRow.ROTOR_COMMAND] = 0.0
-    for step in range(100):
-        bench.row[LoopRow.ROTOR_SPEED] = 300.0 + noise_rad_s * (step % 2)
-        bench.run(0.01)
-    assert float(bench.rotors["thrust"][0]) == pytest.approx(thrust_n if carries else 0.0, rel=0.01, abs=1e-3)
+    bench.row[LoopRow.ROTOR_SPEED] = 300.0
+    bench.run(1.0)
+    assert float(bench.rotors["thrust"][0]) == pytest.approx(thrust_n, rel=0.01)
 
 
 def test_speeds_that_nobody_measures_are_no_fault() -> None:
