@@ -55,14 +55,16 @@ def digest_of_flight() -> str:
 
 def run(code: str, *arguments: str, cache: Path) -> subprocess.CompletedProcess[str]:
     environment = {key: text for key, text in os.environ.items() if key != "NUMBA_CACHE_DIR"}
-    return subprocess.run(
+    done = subprocess.run(
         [sys.executable, "-c", code, *arguments],
         cwd=ROOT,
         env={**environment, "XDG_CACHE_HOME": str(cache)},
         capture_output=True,
         text=True,
-        check=True,
+        check=False,
     )
+    assert done.returncode == 0, done.stderr
+    return done
 
 
 @pytest.fixture

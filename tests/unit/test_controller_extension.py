@@ -212,7 +212,7 @@ def test_a_controller_that_is_gone_leaves_the_others_compilable(installed: Path)
     top, base = Path(kernel_cache.__file__).parents[2], Path(mix.stats.cache_path).parents[1]
     digests = {kernel_cache.digest(top, [name], numba.__version__) for name in sys.modules if is_own(name)}
     folders = {base / digest for digest in digests} | {
-        Path(kernel.stats.cache_path).parent for kernel in specialised.values()
+        Path(path).parent for kernel in specialised.values() if (path := kernel.stats.cache_path)
     }
     indices = [path for folder in folders for path in folder.rglob("*.nbi")]
     kernels = [path for path in indices if "kernel__lqr" in path.name]
