@@ -73,7 +73,8 @@ def free_run(
 @expand_options
 def replay(
     log: Annotated[
-        Path, typer.Argument(help="A flight log (ULog), or test vectors (.csv, .mat).", show_default=False)
+        Path,
+        typer.Argument(help="A flight log (ULog), or test vectors (.csv, .mat, .h5).", show_default=False),
     ],
     judge: JudgeOptions,
     target: Annotated[
@@ -95,7 +96,7 @@ def replay(
 @app.command()
 def vectors(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="The file to write: .csv or .mat.", show_default=False)
+        Path, typer.Argument(metavar="FILE", help="The file to write: .csv, .mat or .h5.", show_default=False)
     ],
     log: Annotated[
         Path | None,

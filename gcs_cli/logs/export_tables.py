@@ -27,7 +27,7 @@ def library(module: str) -> Any:
     except ImportError:
         name = module.partition(".")[0]
         package = _PACKAGES.get(name, name)
-        raise CliError(f"this export needs {package}: pip install 'flightstack[export]'", USAGE) from None
+        raise CliError(f"this format needs {package}: pip install 'flightstack[export]'", USAGE) from None
 
 
 TIME_COLUMN = "timestamp"

@@ -72,7 +72,9 @@ def run_vectors(
     ``loops``: vehicle, controller, gains, rates of inner and outer loop.
     """
     if file.suffix.lower() not in SUFFIXES:
-        raise CliError(f"{file}: give the file a name that ends in {' or '.join(SUFFIXES)}", USAGE)
+        raise CliError(
+            f"{file}: give the file a name that ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}", USAGE
+        )
     if file.exists() and not overwrite:
         raise CliError(f"{file}: exists; give --overwrite to replace it", USAGE)
     if log is None:

@@ -1,8 +1,8 @@
-"""Test vectors: the inputs of the loops, and the outputs of a flight, as columns of a CSV or MATLAB file.
+"""Test vectors: the inputs of the loops, and the outputs of a flight, as columns of a CSV, MATLAB or HDF5 file.
 
 Numbers are float32, as on the line to a target; nine digits hold them to the last bit. The description (vehicle,
 controller, rates, parameters) is one JSON object: the first line of a CSV file, after ``#``; the variable ``about`` of
-a MATLAB file.
+a MATLAB file, the attribute ``about`` of an HDF5 file.
 """
 
 from __future__ import annotations
@@ -18,13 +18,15 @@ import numpy as np
 from flightstack.core.atomic_file import write_bytes_atomically
 from flightstack.core.contract import MAX_ROTORS, FloatArray, LoopFlags
 from flightstack.core.errors import ConfigError
+from gcs_cli.errors import CliError
+from gcs_cli.logs.export_tables import library
 from gcs_cli.pil.flight_samples import FlightSamples, Samples, TimeArray
 from gcs_cli.pil.replay import INPUT_SIZE, OUTPUT_SIZE, OUTPUTS, Recording, as_flight
 
 FORMAT = "flightstack-vectors-1"
-SUFFIXES = (".csv", ".mat")
+SUFFIXES = (".csv", ".mat", ".h5")
 TABLE = "vectors"
-"""Name of the table in a MATLAB file."""
+"""Name of the table in a MATLAB file, and of the group in an HDF5 file."""
 
 
 def _axes(name: str, unit: str, axes: str) -> list[str]:
@@ -96,7 +98,7 @@ def vectors_of(flight: FlightSamples, record: Recording) -> Vectors:
 
 
 def write_vectors(path: Path, vectors: Vectors) -> None:
-    """Write a CSV or MATLAB file, by the suffix; raise ConfigError."""
+    """Write a file, its format by its suffix; raise ConfigError, CliError without the package of HDF5."""
     record = vectors.record
     columns: dict[str, Any] = {"time_us": record.time_us, "flags": record.flags}
     columns |= dict(zip(_INPUTS, record.inputs.astype(np.float32).T, strict=True))
@@ -135,20 +137,37 @@ def _as_mat(about: str, columns: Mapping[str, Any]) -> bytes:
     return content.getvalue()
 
 
-_WRITERS: Mapping[str, Callable[[str, Mapping[str, Any]], bytes]] = {".csv": _as_csv, ".mat": _as_mat}
+def _as_hdf5(about: str, columns: Mapping[str, Any]) -> bytes:
+    content = io.BytesIO()
+    with library("h5py").File(content, "w") as file:
+        file.attrs["about"] = about
+        group = file.create_group(TABLE)
+        for name, column in columns.items():
+            group.create_dataset(name, data=column, compression="gzip")
+    return content.getvalue()
+
+
+_WRITERS: Mapping[str, Callable[[str, Mapping[str, Any]], bytes]] = {
+    ".csv": _as_csv,
+    ".mat": _as_mat,
+    ".h5": _as_hdf5,
+}
 
 
 def read_vectors(path: Path) -> Vectors:
-    """Read a CSV or MATLAB file; raise ConfigError."""
+    """Read a file, its format by its suffix; raise ConfigError, CliError without the package of HDF5."""
     try:
         content = path.read_bytes()
-        about, columns = (_from_csv if path.suffix.lower() == ".csv" else _from_mat)(content)
-        return _vectors(json.loads(about), columns)
     except OSError as error:
         raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
+    try:
+        about, columns = _READERS.get(path.suffix.lower(), _from_csv)(content)
+        return _vectors(json.loads(about), columns)
     except KeyError as error:
         raise ConfigError(path, "", f"is not a file of test vectors: it has no {error.args[0]}") from error
-    except Exception as error:  # SciPy raises what it meets in a damaged file
+    except CliError:
+        raise
+    except Exception as error:  # SciPy and h5py raise what it meets in a damaged file
         raise ConfigError(path, "", f"is not a file of test vectors: {error}") from error
 
 
@@ -164,6 +183,15 @@ def _from_mat(content: bytes) -> tuple[str, dict[str, FloatArray]]:
     file = loadmat(io.BytesIO(content), simplify_cells=True)
     table = {name: np.atleast_1d(np.asarray(column, np.float64)) for name, column in file[TABLE].items()}
     return str(file["about"]), table
+
+
+def _from_hdf5(content: bytes) -> tuple[str, dict[str, FloatArray]]:
+    with library("h5py").File(io.BytesIO(content), "r") as file:
+        table = {name: np.asarray(column, np.float64) for name, column in file[TABLE].items()}
+        return str(file.attrs["about"]), table
+
+
+_READERS = {".csv": _from_csv, ".mat": _from_mat, ".h5": _from_hdf5}
 
 
 def _vectors(about: Mapping[str, Any], columns: Mapping[str, FloatArray]) -> Vectors:

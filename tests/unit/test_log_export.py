@@ -169,6 +169,6 @@ def test_a_missing_library_is_one_sentence(
     log = tmp_path / "a.tlog"
     log.write_bytes(small_tlog())
     ended = gcs("log", "export", log, option, tmp_path / "out")
-    said = f"gcs: this export needs {package}: pip install 'flightstack[export]'\n"
+    said = f"gcs: this format needs {package}: pip install 'flightstack[export]'\n"
     assert (ended.returncode, ended.stderr) == (USAGE, said)
     assert [path.name for path in tmp_path.iterdir()] == ["a.tlog"]

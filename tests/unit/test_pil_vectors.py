@@ -1,17 +1,20 @@
-"""Test vectors as CSV and MATLAB files: the same bits there and back, and damaged files refused."""
+"""Test vectors as CSV, MATLAB and HDF5 files: the same bits there and back, and damaged files refused."""
 
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from rich.console import Console
 from scipy.io import loadmat
 
 from flightstack.core.errors import ConfigError
+from gcs_cli.errors import CliError
 from gcs_cli.pil.excitation import excitation
 from gcs_cli.pil.replay import Recording
 from gcs_cli.pil.replay_run import configured, fed, judged, prepared, read_flight
@@ -47,15 +50,25 @@ def assert_same(one: Recording, other: Recording) -> None:
         assert np.array_equal(mine, theirs) if isinstance(mine, np.ndarray) else mine == theirs
 
 
-@pytest.mark.parametrize("ending", ["csv", "mat"])
-def test_vectors_of_a_flight_replay_to_the_last_bit(log: Path, ending: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("ending", ["csv", "mat", "h5"])
+def test_vectors_of_a_flight_are_held_to_the_last_bit(log: Path, ending: str, tmp_path: Path) -> None:
     file = tmp_path / f"vectors.{ending}"
     flight, record = read_flight(log)
     assert record.changes
-    write_vectors(file, vectors_of(flight, record))
+    written = vectors_of(flight, record)
+    write_vectors(file, written)
+    read = read_vectors(file)
+    assert_same(read.record, record)
+    assert written.outputs is not None
+    assert read.outputs is not None
+    assert np.array_equal(read.outputs.astype(np.float32), written.outputs.astype(np.float32))
+    assert prepared(file, None).numbers == prepared(log, None).numbers
+
+
+def test_vectors_of_a_flight_replay_without_a_difference(log: Path, tmp_path: Path) -> None:
+    file = tmp_path / "vectors.csv"
+    write_vectors(file, vectors_of(*read_flight(log)))
     replay = prepared(file, None)
-    assert_same(replay.record, record)
-    assert replay.numbers == prepared(log, None).numbers
     outputs, _ = fed(replay, "c", tmp_path, Console(quiet=True))
     outcome = judged(replay, outputs, None, True, FACTS)
     assert outcome.passed
@@ -64,9 +77,8 @@ def test_vectors_of_a_flight_replay_to_the_last_bit(log: Path, ending: str, tmp_
     assert {row["largest"] for row in of_log} == {0.0}
 
 
-@pytest.mark.parametrize("ending", ["csv", "mat"])
-def test_excitation_is_replayed_without_a_flight(excited: Vectors, ending: str, tmp_path: Path) -> None:
-    file = tmp_path / f"excitation.{ending}"
+def test_excitation_is_replayed_without_a_flight(excited: Vectors, tmp_path: Path) -> None:
+    file = tmp_path / "excitation.csv"
     write_vectors(file, excited)
     replay = prepared(file, None)
     assert_same(replay.record, excited.record)
@@ -86,6 +98,27 @@ def test_matlab_file_holds_a_table_of_named_columns(excited: Vectors, tmp_path: 
     assert np.array_equal(table["position_n_m"], excited.record.inputs[:, 0].astype(np.float32))
     assert table["time_us"].dtype == np.int64
     assert table["rate_z_rad_s"].dtype == np.float32
+
+
+def test_hdf5_file_holds_a_group_of_named_columns(excited: Vectors, tmp_path: Path) -> None:
+    path = tmp_path / "excitation.h5"
+    write_vectors(path, excited)
+    with h5py.File(path) as file:
+        table = file["vectors"]
+        assert np.array_equal(table["position_n_m"], excited.record.inputs[:, 0].astype(np.float32))
+        assert table["time_us"].dtype == np.int64
+        assert table["rate_z_rad_s"].dtype == np.float32
+
+
+def test_file_names_the_missing_package_of_its_format(
+    excited: Vectors, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "excitation.h5"
+    write_vectors(path, excited)
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    for act in (lambda: read_vectors(path), lambda: write_vectors(path, excited)):
+        with pytest.raises(CliError, match=r"needs h5py: pip install 'flightstack\[export\]'"):
+            act()
 
 
 def csv_of(excited: Vectors, tmp_path: Path) -> Path:
@@ -122,7 +155,7 @@ def test_damaged_vectors_are_refused_in_one_sentence(
 
 
 def test_files_that_are_no_vectors_are_refused(excited: Vectors, tmp_path: Path) -> None:
-    for name in ("rubbish.csv", "rubbish.mat"):
+    for name in ("rubbish.csv", "rubbish.mat", "rubbish.h5"):
         (tmp_path / name).write_bytes(b"rubbish")
         with pytest.raises(ConfigError, match="is not a file of test vectors"):
             prepared(tmp_path / name, None)
