@@ -9,7 +9,7 @@ import platform
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from benchmarks import (
     emulated,
@@ -27,19 +27,48 @@ from benchmarks import (
 )
 from benchmarks.measure import OtherLoad
 
-SECTIONS = (
-    "steps",
-    "flights",
-    "emulated",
-    "multibody",
-    "realtime",
-    "load",
-    "transfers",
-    "start",
-    "startup",
-    "watch",
-)
 
+class Measurement(NamedTuple):
+    """Figures under ``key``; ``quick`` and ``whole`` are the arguments of ``measure``."""
+
+    section: str
+    key: str
+    name: str
+    measure: Callable[..., Any]
+    quick: tuple[Any, ...]
+    whole: tuple[Any, ...]
+
+
+def _flights(count: int) -> Any:
+    return three_processes.flights(three_processes.CASES, count)
+
+
+MEASUREMENTS = (
+    Measurement("steps", "round_trips", "round trips", round_trip.round_trips, (2, 0.2), (5, 0.5)),
+    Measurement("steps", "costs", "the parts of a step", step_costs.costs, (2, 0.01), (7, 0.05)),
+    Measurement("flights", "one_process", "flights in one process", one_process.flights, (2,), (7,)),
+    Measurement("flights", "three_processes", "flights of three processes", _flights, (2,), (7,)),
+    Measurement(
+        "emulated", "emulated", "flights with loops on an emulated processor", emulated.flights, (1,), (3,)
+    ),
+    Measurement("multibody", "plants", "flights with each plant", plants.plants, (2, 0.01), (5, 0.05)),
+    Measurement("realtime", "lateness", "lateness in real time", real_time.lateness, (2.0,), (10.0,)),
+    Measurement(
+        "load",
+        "load",
+        "ground stations, noise and clients that never read",
+        ground_load.loads,
+        (2.0, 1),
+        (5.0, 3),
+    ),
+    Measurement(
+        "transfers", "transfers", "transfers of plans and parameters", transfers.transfers, (2,), (5,)
+    ),
+    Measurement("start", "start", "the start of each process", three_processes.start_ups, (1,), (5,)),
+    Measurement("startup", "startup", "commands of gcs", startup.startup, (3,), (20,)),
+    Measurement("watch", "watch", "the screens of gcs watch", watching.watching, (1, 3.0), (3, 10.0)),
+)
+SECTIONS = tuple(dict.fromkeys(each.section for each in MEASUREMENTS))
 _LONG = ("watch",)
 """Sections that run only if selected."""
 
@@ -52,63 +81,16 @@ def _arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _measured(name: str, measure: Callable[[], Any]) -> Any:
-    print(f"measuring {name} …", file=sys.stderr, flush=True)
-    return measure()
-
-
 def main() -> int:
     """Measure and print; return the exit code."""
     arguments = _arguments()
     wanted = arguments.only or [section for section in SECTIONS if section not in _LONG]
-    quick = arguments.quick
-    rounds, seconds = (2, 0.01) if quick else (7, 0.05)
     load = OtherLoad()
     results: dict[str, Any] = {}
-    if "steps" in wanted:
-        results["round_trips"] = _measured(
-            "round trips", lambda: round_trip.round_trips(min(rounds, 5), 0.2 if quick else 0.5)
-        )
-        results["costs"] = _measured("the parts of a step", lambda: step_costs.costs(rounds, seconds))
-    if "flights" in wanted:
-        results["one_process"] = _measured(
-            "flights in one process", lambda: one_process.flights(2 if quick else 7)
-        )
-        results["three_processes"] = _measured(
-            "flights of three processes",
-            lambda: three_processes.flights(three_processes.CASES, 2 if quick else 7),
-        )
-    if "emulated" in wanted:
-        results["emulated"] = _measured(
-            "flights with loops on an emulated processor", lambda: emulated.flights(1 if quick else 3)
-        )
-    if "multibody" in wanted:
-        results["plants"] = _measured(
-            "flights with each plant", lambda: plants.plants(2 if quick else 5, seconds)
-        )
-    if "realtime" in wanted:
-        results["lateness"] = _measured(
-            "lateness in real time", lambda: real_time.lateness(2.0 if quick else 10.0)
-        )
-    if "load" in wanted:
-        results["load"] = _measured(
-            "ground stations, noise and clients that never read",
-            lambda: ground_load.loads(2.0 if quick else 5.0, 1 if quick else 3),
-        )
-    if "transfers" in wanted:
-        results["transfers"] = _measured(
-            "transfers of plans and parameters", lambda: transfers.transfers(2 if quick else 5)
-        )
-    if "start" in wanted:
-        results["start"] = _measured(
-            "the start of each process", lambda: three_processes.start_ups(1 if quick else 5)
-        )
-    if "startup" in wanted:
-        results["startup"] = _measured("commands of gcs", lambda: startup.startup(3 if quick else 20))
-    if "watch" in wanted:
-        results["watch"] = _measured(
-            "the screens of gcs watch", lambda: watching.watching(*((1, 3.0) if quick else (3, 10.0)))
-        )
+    for each in MEASUREMENTS:
+        if each.section in wanted:
+            print(f"measuring {each.name} …", file=sys.stderr, flush=True)
+            results[each.key] = each.measure(*(each.quick if arguments.quick else each.whole))
     machine = {
         "system": f"{platform.system()} {platform.machine()}",
         "cores": os.cpu_count(),

@@ -27,7 +27,7 @@ class ViewCondition(NamedTuple):
     text: str
     holds: Callable[[VehicleView], bool]
     value: Callable[[VehicleView], str]
-    """The present value, in words."""
+    """The present value as text."""
     mode: str = ""
     """Name of the mode that it needs."""
 
@@ -135,7 +135,7 @@ def parse_condition(text: str) -> ViewCondition:
 
 
 def choices() -> str:
-    """Return the conditions in words."""
+    """Return the conditions as text."""
     return (
         f"{', '.join(STATES)}, mode=NAME, position=LAT,LON[,RADIUS], or one of {', '.join(QUANTITIES)} "
         "with >, <, >=, <= or = and a number"

@@ -259,7 +259,7 @@ class ActionRun:
 
 
 def _disarmed_where(view: VehicleView, timer: EffectTimer) -> str | None:
-    """Return in words where the vehicle disarmed, or None while its landed state may be older than the disarming."""
+    """Return the text for where it disarmed, or None while its landed state may be older than the disarming."""
     if view.on_ground is not False:
         return "disarmed"
     is_known = timer.disarmed_s >= LANDED_STATE_S and timer.reports_disarmed >= LANDED_STATE_REPORTS

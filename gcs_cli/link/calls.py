@@ -103,7 +103,7 @@ class Call:
         return Answer(False, reason, result=result.result or 0)
 
     def _refused_item(self, failed: Failed) -> str:
-        """Return the item that the vehicle refused, in words; MISSION_ACK does not name it."""
+        """Return the item that the vehicle refused, as text; MISSION_ACK does not name it."""
         if failed.seq is None or failed.seq >= len(self._items):
             return ""
         name = f"item {failed.seq} ({any_command_name(self._items[failed.seq].command)})"

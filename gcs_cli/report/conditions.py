@@ -1,4 +1,4 @@
-"""Vehicle and conditions of a flight in words, from ``summary.json``; unknown values are omitted."""
+"""Vehicle and conditions of a flight as text, from ``summary.json``; unknown values are omitted."""
 
 from __future__ import annotations
 

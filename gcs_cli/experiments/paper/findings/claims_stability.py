@@ -42,7 +42,7 @@ class Nearness(NamedTuple):
 
     @property
     def words(self) -> str:
-        """The figures in words."""
+        """The figures as text."""
         if self.gain_db < 0.0:
             margins = f"unstable at {_RATE_HZ} Hz"
         else:

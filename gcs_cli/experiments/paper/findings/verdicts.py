@@ -80,7 +80,7 @@ def flight(cases: Cases, name: str) -> Mapping[str, Any]:
 
 
 def who_ended(names: Sequence[str], found: Sequence[Mapping[str, Any]]) -> str | None:
-    """Return the contenders that crashed or lost control, in words; None if all flights are complete."""
+    """Return the contenders that crashed or lost control, as text; None if all flights are complete."""
     ended = [
         f"{NAMES[name]} {how_ended(case)}"
         for name, case in zip(names, found, strict=True)
