@@ -10,7 +10,7 @@ from flightstack.testing.scenario import check_scenario
 from gcs_cli.campaign.definition import Campaign
 from gcs_cli.campaign.display import Display
 from gcs_cli.campaign.journal import Journal
-from gcs_cli.campaign.options import CampaignOptions, only_command
+from gcs_cli.campaign.options import CampaignOptions, continuing, only_command
 from gcs_cli.campaign.plan import PlannedFlight
 from gcs_cli.campaign.rows import row_of
 from gcs_cli.errors import CliError
@@ -53,7 +53,7 @@ class Flyer:
                 else:
                     self._display.tick()
         for number, reason in lost:
-            raise LostWorkerError(f"flight {number}: {reason}; the same command flies it again")
+            raise LostWorkerError(f"flight {number}: {reason}; {continuing(self._options)} flies it again")
 
     def _add(self, flight: PlannedFlight, finished: Finished) -> None:
         assert finished.result is not None

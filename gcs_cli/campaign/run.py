@@ -22,7 +22,7 @@ from gcs_cli.campaign.journal import (
     open_journal,
     record_of,
 )
-from gcs_cli.campaign.options import CampaignOptions
+from gcs_cli.campaign.options import CampaignOptions, continuing
 from gcs_cli.campaign.page import render_campaign
 from gcs_cli.campaign.plan import PlannedFlight, plan_flights
 from gcs_cli.campaign.rows import Row, row_of
@@ -59,7 +59,7 @@ def run_campaign(pool: Pool, options: CampaignOptions, console: Console) -> int:
             Flyer(pool, campaign, journal, display, options).fly(flights)
         except KeyboardInterrupt:
             over = f"{len(journal.rows)} of {len(flights)} flights are over"
-            raise CliError(f"interrupted: {over}; the same command continues", INTERRUPTED) from None
+            raise CliError(f"interrupted: {over}; {continuing(options)} continues", INTERRUPTED) from None
         finally:
             display.close()
         rows = ordered(journal)
