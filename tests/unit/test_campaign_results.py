@@ -10,8 +10,9 @@ from typing import Any
 
 import pytest
 
+from flightstack.core.errors import ConfigError
 from flightstack.testing.expectations import Check
-from gcs_cli.campaign.journal import JOURNAL, RECORD, Journal, open_journal, record_of
+from gcs_cli.campaign.journal import JOURNAL, RECORD, RESULTS, Journal, open_journal, record_of
 from gcs_cli.campaign.plan import PlannedFlight
 from gcs_cli.campaign.rows import columns, row_of
 from gcs_cli.campaign.statistics import pass_probability, quantiles, sensitivities, worst
@@ -96,6 +97,15 @@ def test_journal_is_written_before_add_returns(tmp_path: Path) -> None:
         assert json.loads((tmp_path / JOURNAL).read_text()) == ROWS[0]
 
 
+def test_each_row_is_synced_before_add_returns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    synced: list[bytes] = []
+    with open_journal(tmp_path, RECORD_1) as journal:
+        monkeypatch.setattr(os, "fsync", lambda descriptor: synced.append((tmp_path / JOURNAL).read_bytes()))
+        for each in ROWS[:2]:
+            journal.add(each)
+            assert synced.pop() == (tmp_path / JOURNAL).read_bytes()
+
+
 @pytest.mark.parametrize(
     ("record", "difference"),
     [
@@ -142,6 +152,25 @@ def test_a_journal_without_its_record_is_refused(tmp_path: Path) -> None:
     os.unlink(tmp_path / RECORD)
     with pytest.raises(Exception, match=f"is missing beside {JOURNAL}"):
         Journal(tmp_path, RECORD_1)
+
+
+@pytest.mark.parametrize("content", [b"", b"{}", b"[]", b'{"files": 3}', b"\xff"])
+def test_a_damaged_record_is_refused(tmp_path: Path, content: bytes) -> None:
+    with open_journal(tmp_path, RECORD_1) as journal:
+        journal.add(ROWS[0])
+    (tmp_path / RECORD).write_bytes(content)
+    with pytest.raises(ConfigError, match="is damaged"):
+        Journal(tmp_path, RECORD_1)
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_a_new_campaign_keeps_files_of_other_commands(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("other")
+    with pytest.raises(ConfigError, match=f"{name}: exists already: give another --out, or --overwrite"):
+        Journal(tmp_path, RECORD_1)
+    assert (tmp_path / name).read_text() == "other"
+    with open_journal(tmp_path, RECORD_1, overwrite=True):
+        assert not (tmp_path / name).exists()
 
 
 def test_table_does_not_depend_on_the_order_of_the_rows(tmp_path: Path) -> None:
