@@ -46,6 +46,7 @@ class Flyer:
                     self._display.begin(missing[message.case].number)
                 elif isinstance(message, Finished) and message.result is None:
                     lost.append((missing[message.case].number, message.reason))
+                    self._display.lose(*lost[-1])
                 elif isinstance(message, Finished):
                     self._add(missing[message.case], message)
                 elif isinstance(message, Notice):

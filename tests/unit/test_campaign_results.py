@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import os
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 
 from flightstack.core.errors import ConfigError
 from flightstack.testing.expectations import Check
+from gcs_cli.campaign.display import LiveDisplay, make_display
 from gcs_cli.campaign.journal import JOURNAL, RECORD, RESULTS, Journal, open_journal, record_of
 from gcs_cli.campaign.plan import PlannedFlight
 from gcs_cli.campaign.rows import columns, row_of
@@ -222,3 +225,36 @@ def test_worst_flights_come_first() -> None:
 def test_quantiles_leave_out_missing_numbers() -> None:
     assert quantiles([None, 1.0, 2.0, 3.0]) == pytest.approx((1.0, 1.1, 2.0, 2.9, 3.0))
     assert quantiles([None]) is None
+
+
+def test_lost_flight_is_named_and_no_longer_under_way() -> None:
+    console = Console(file=io.StringIO(), force_terminal=True, width=100, color_system=None)
+    display = LiveDisplay(console, 5, ROWS[:1])
+    for number in (2, 3):
+        display.begin(number)
+    display.lose(2, "was killed by signal 9")
+    display.tick()
+    display.add(ROWS[2])
+    display.close()
+    shown = console.file.getvalue()
+    assert "LOST  flight 2: was killed by signal 9" in shown
+    assert shown.index("in flight: 2, 3") < shown.index("in flight: 3") < shown.rindex("in flight: none")
+
+
+def test_lines_show_failures_and_each_tenth() -> None:
+    console = Console(file=io.StringIO(), width=200)
+    display = make_display(console, 5, ROWS[:1])
+    for each in ROWS[1:]:
+        display.begin(each["flight"])
+        display.add(each)
+    display.close()
+    assert console.file.getvalue().splitlines() == [
+        "1 of 5 flights are over already",
+        "2 of 5 flights, 0 failed",
+        "FAIL  flight 3: max_error_m ≤ 0.6; wind 1.5, law pid",
+        "3 of 5 flights, 1 failed",
+        "FAIL  flight 4: max_error_m ≤ 0.6; wind 2, law pid",
+        "4 of 5 flights, 2 failed",
+        "FAIL  flight 5: max_error_m ≤ 0.6; wind 2.5, law pid",
+        "5 of 5 flights, 3 failed",
+    ]
