@@ -57,6 +57,7 @@ class Journal:
             if overwrite:
                 self._clear(folder)
             _check_record(folder, record)
+            self._record = record
             self.rows = self._read()
         except BaseException:
             self.close()
@@ -94,6 +95,12 @@ class Journal:
             raise OSError(f"{JOURNAL}: {written} of {len(line)} bytes were written")
         os.fsync(self._descriptor)
         self.rows[int(row["flight"])] = row
+
+    def check_unchanged(self, record: Mapping[str, Any]) -> None:
+        """Raise CliError if ``record``, made after the flights, differs from that before: they differ too."""
+        difference = _difference(self._record, record)
+        if difference:
+            raise CliError(f"{difference} during the flights: --overwrite to fly all of them again")
 
     def close(self) -> None:
         """Release the journal."""

@@ -48,7 +48,8 @@ def run_campaign(pool: Pool, options: CampaignOptions, console: Console) -> int:
     if options.only is not None:
         return fly_only(pool, campaign, _numbered(campaign, flights, options.only), options, console)
     check_flights(campaign, flights)
-    record = record_of("plan", campaign.files([flight.inputs for flight in flights]), flights)
+    inputs = [flight.inputs for flight in flights]
+    record = record_of("plan", campaign.files(inputs), flights)
     began_s = time.monotonic()
     with (
         results_directory(options.folder),
@@ -62,6 +63,7 @@ def run_campaign(pool: Pool, options: CampaignOptions, console: Console) -> int:
             raise CliError(f"interrupted: {over}; {continuing(options)} continues", INTERRUPTED) from None
         finally:
             display.close()
+        journal.check_unchanged(record_of("plan", campaign.files(inputs), flights))
         rows = ordered(journal)
         write_tables(options.folder, rows, options.csv)
         write_text_atomically(options.folder / REPORT, render_campaign(campaign, rows, options))

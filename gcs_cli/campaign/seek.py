@@ -53,6 +53,7 @@ def run_search(pool: Pool, campaign: Campaign, options: CampaignOptions, console
             raise CliError(f"interrupted: {over}; {continuing(options)} continues", INTERRUPTED) from None
         finally:
             display.close()
+        journal.check_unchanged(record_of("seek", campaign.files([marker.inputs]), [marker]))
         rows = [journal.rows[each.number] for each in found.flown]
     sentences = list(_sentences(campaign, found, journal, options))
     write_tables(options.folder, rows, options.csv)

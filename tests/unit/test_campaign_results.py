@@ -6,6 +6,8 @@ import csv
 import io
 import json
 import os
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +18,14 @@ from flightstack.core.errors import ConfigError
 from flightstack.testing.expectations import Check
 from gcs_cli.campaign.display import LiveDisplay, make_display
 from gcs_cli.campaign.journal import JOURNAL, RECORD, RESULTS, Journal, open_journal, record_of
+from gcs_cli.campaign.options import CampaignOptions
 from gcs_cli.campaign.plan import PlannedFlight
 from gcs_cli.campaign.rows import columns, row_of
+from gcs_cli.campaign.run import run_campaign
 from gcs_cli.campaign.statistics import pass_probability, quantiles, sensitivities, worst
 from gcs_cli.campaign.table import write_csv, write_parquet
 from gcs_cli.errors import CliError
+from gcs_cli.scenarios.pool import Finished
 from gcs_cli.scenarios.result import Result, not_flown
 
 FLIGHTS = tuple(
@@ -258,3 +263,25 @@ def test_lines_show_failures_and_each_tenth() -> None:
         "FAIL  flight 5: max_error_m ≤ 0.6; wind 2.5, law pid",
         "5 of 5 flights, 3 failed",
     ]
+
+
+def test_plan_that_changes_during_the_flights_is_no_result(tmp_path: Path) -> None:
+    plan = tmp_path / "own.plan"
+    plan.write_bytes((Path(__file__).parents[2] / "missions" / "hop.plan").read_bytes())
+    file = tmp_path / "c.toml"
+    vary = "'force_n[0]' = {uniform = [0, 1]}"
+    file.write_text(f"plan = 'own.plan'\n[campaign]\nflights = 2\n[vary]\n{vary}\n[expect]\n")
+    changed = plan.read_bytes() + b"\n"
+
+    class Pool:
+        def fly(self, cases: Sequence[Any], wanted: Any) -> Iterator[Finished]:
+            for number in range(len(cases)):
+                plan.write_bytes(changed)
+                yield Finished(number, Result(()))
+
+    options, console = CampaignOptions(file, out=tmp_path / "out"), Console(file=io.StringIO())
+    with pytest.raises(CliError, match=r"^own.plan has changed during the flights: --overwrite"):
+        run_campaign(Pool(), options, console)
+    assert not (options.folder / "flights.parquet").exists()
+    assert run_campaign(Pool(), replace(options, overwrite=True), console) == 0
+    assert (options.folder / "flights.parquet").exists()
