@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import operator
 import os
+from pickle import UnpicklingError
 from types import FunctionType, SimpleNamespace
 from typing import Any
 
@@ -25,6 +26,17 @@ from numba.core.typing.templates import AbstractTemplate, Signature, infer_globa
 from flightstack.core.kernel_cache import is_own
 
 _DEFAULTS = {name: option.default for name, option in Flags.options.items()}
+_DAMAGED = (
+    UnpicklingError,
+    EOFError,
+    AttributeError,
+    ImportError,
+    IndexError,
+    KeyError,
+    TypeError,
+    ValueError,
+)
+"""Exceptions of ``pickle`` for a file that is not what was written."""
 _NO_ENVIRONMENT = SimpleNamespace(set_env=lambda name, environment: None)
 
 
@@ -157,11 +169,15 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
 
         Numba would first install all types and functions that it can compile. A stored result needs its runtime alone.
         Two processes that save for the first time at once choose the same file: the index of one names the other's.
+        Numba does not sync its files: those that a power failure damaged are stored again.
         """
         stored = None
         rtsys.initialize(target_context)
-        with self._guard_against_spurious_io_errors():
-            stored = self._load_overload(sig, target_context)
+        try:
+            with self._guard_against_spurious_io_errors():
+                stored = self._load_overload(sig, target_context)
+        except _DAMAGED:
+            self.flush()
         arguments, _ = normalize_signature(sig)
         return stored if stored is not None and tuple(stored.signature.args) == tuple(arguments) else None
 

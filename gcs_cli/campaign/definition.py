@@ -22,6 +22,8 @@ MOST_FLIGHTS = 1_000_000
 _FLAT = ("params", "simulated")
 """Tables whose keys may contain dots and brackets."""
 _OWN = re.compile(r"[A-Za-z_]\w*")
+_DEFAULT = Scenario()
+"""A scenario without keys."""
 _NOT_VARIED = {
     "expect": "what is expected is the same in each flight",
     "seed": "each flight has a seed of its own",
@@ -101,15 +103,14 @@ class Campaign:
             return _number(read_toml(find_file(file, BUILT_IN, KIND)).values(), _steps(rest))
         steps = [table, rest] if table in _FLAT else _steps(name)
         found = _number(self.values, steps)
-        return _number(asdict(Scenario()), steps) if found is None else found
+        return _number(asdict(_DEFAULT), steps) if found is None else found
 
     def _set(self, values: dict[str, Any], name: str, value: Value) -> None:
         table, _, rest = name.partition(".")
         if table in _FLAT and rest:
             values.setdefault(table, {})[rest] = value
             return
-        if table == "wind":
-            values.setdefault("wind", {}).setdefault("mean_m_s", [0.0, 0.0])
+        _add_defaults(values, _steps(name)[0])
         try:
             set_value(values, name, value)
         except KeyError as error:
@@ -135,7 +136,9 @@ def load_campaign(path: Path) -> Campaign:
         scenario_path = path.parent / plan.scenario
         values = dict(read_toml(scenario_path).values())
     if "expect" not in values:
-        raise ConfigError(scenario_path, "expect", "is missing: a campaign judges each flight by it")
+        raise ConfigError(
+            scenario_path, "expect", "is missing: each flight of a campaign is checked against it"
+        )
     values = {name: value for name, value in values.items() if name not in ("seed", "repeat")}
     campaign = Campaign(path, plan, _distributions(path, vary), scenario_path, values)
     _check(campaign)
@@ -186,6 +189,15 @@ def _check(campaign: Campaign) -> None:
         near = 1 << (flights.bit_length() - 1)
         problem = f"{flights} is no power of 2, as sobol needs it: give {near} or {2 * near}"
         raise ConfigError(campaign.path, "campaign.flights", problem)
+
+
+def _add_defaults(values: dict[str, Any], top: str) -> None:
+    """Add the numbers of a list without a key, so that one of them can be set."""
+    default = getattr(_DEFAULT, top, None)
+    if isinstance(default, tuple):
+        values.setdefault(top, list(default))
+    elif top == "wind" and isinstance(wind := values.setdefault(top, {}), dict):
+        wind.setdefault("mean_m_s", list(_DEFAULT.wind.mean_m_s))
 
 
 def _steps(path: str) -> list[str]:

@@ -30,6 +30,9 @@ class Display(Protocol):
     def add(self, row: Row) -> None:
         """A flight is over."""
 
+    def lose(self, number: int, reason: str) -> None:
+        """A flight ends without a row."""
+
     def note(self, line: str) -> None:
         """Show a line."""
 
@@ -79,6 +82,10 @@ class LineDisplay:
         if tenths != 10 * (self._over - 1) // self._total:
             self.note(f"{self._over} of {self._total} flights, {self._failed} failed")
 
+    def lose(self, number: int, reason: str) -> None:
+        """Print the reason."""
+        self.note(f"LOST  flight {number}: {reason}")
+
     def note(self, line: str) -> None:
         """Print the line."""
         self._console.print(line, markup=False, soft_wrap=True)
@@ -111,12 +118,17 @@ class LiveDisplay:
 
     def add(self, row: Row) -> None:
         """Count the flight."""
-        self._flying = [number for number in self._flying if number != row["flight"]]
+        self._flying.remove(row["flight"])
         self._over, self._flown = self._over + 1, self._flown + 1
         self._total = max(self._total, self._over)
         self._failed += not row["passed"]
         self._worst = worst([*self._worst, row], _WORST)
         self.tick()
+
+    def lose(self, number: int, reason: str) -> None:
+        """Remove the flight from those under way, and print the reason above the live table."""
+        self._flying.remove(number)
+        self.note(f"LOST  flight {number}: {reason}")
 
     def note(self, line: str) -> None:
         """Print the line above the live table."""

@@ -107,6 +107,8 @@ def read_distribution(values: Mapping[str, Any]) -> Distribution:
     )
     if not low < high:
         raise ValueError(f"low must be below high, and {low:g} is not below {high:g}")
+    if kind == "normal" and not ndtr((high - first) / second) > ndtr((low - first) / second):
+        raise ValueError(f"no number of normal = [{first:g}, {second:g}] lies between {low:g} and {high:g}")
     steps = values.get("steps")
     if steps is not None and (
         isinstance(steps, bool) or not isinstance(steps, int) or not 2 <= steps <= 10_000

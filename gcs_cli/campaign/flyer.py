@@ -10,7 +10,7 @@ from flightstack.testing.scenario import check_scenario
 from gcs_cli.campaign.definition import Campaign
 from gcs_cli.campaign.display import Display
 from gcs_cli.campaign.journal import Journal
-from gcs_cli.campaign.options import CampaignOptions, only_command
+from gcs_cli.campaign.options import CampaignOptions, continuing, only_command
 from gcs_cli.campaign.plan import PlannedFlight
 from gcs_cli.campaign.rows import row_of
 from gcs_cli.errors import CliError
@@ -46,6 +46,7 @@ class Flyer:
                     self._display.begin(missing[message.case].number)
                 elif isinstance(message, Finished) and message.result is None:
                     lost.append((missing[message.case].number, message.reason))
+                    self._display.lose(*lost[-1])
                 elif isinstance(message, Finished):
                     self._add(missing[message.case], message)
                 elif isinstance(message, Notice):
@@ -53,7 +54,7 @@ class Flyer:
                 else:
                     self._display.tick()
         for number, reason in lost:
-            raise LostWorkerError(f"flight {number}: {reason}; the same command flies it again")
+            raise LostWorkerError(f"flight {number}: {reason}; {continuing(self._options)} flies it again")
 
     def _add(self, flight: PlannedFlight, finished: Finished) -> None:
         assert finished.result is not None

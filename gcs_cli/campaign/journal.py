@@ -1,8 +1,8 @@
 """The directory of a campaign: what is flown, and each row as soon as its flight is over.
 
-``flights.jsonl`` is appended to, a line for each flight in a single write, so that SIGKILL loses no flight that is
-over; a last line without its end is removed at the next start. ``campaign.json`` has the digests of all that the
-flights depend on.
+``flights.jsonl`` is appended to, a line for each flight in a single write, which is synced: neither SIGKILL nor a power
+failure loses a flight that is over. A last line without its end is removed at the next start. ``campaign.json`` has the
+digests of all that the flights depend on.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from gcs_cli.campaign.rows import Row
 from gcs_cli.errors import USAGE, CliError
 
 JOURNAL, RECORD = "flights.jsonl", "campaign.json"
-PARQUET, CSV, REPORT = "flights.parquet", "flights.csv", "report.html"
+RESULTS = PARQUET, CSV, REPORT = "flights.parquet", "flights.csv", "report.html"
 _FORM = 1
 """Version of the directory's form."""
 
@@ -57,6 +57,7 @@ class Journal:
             if overwrite:
                 self._clear(folder)
             _check_record(folder, record)
+            self._record = record
             self.rows = self._read()
         except BaseException:
             self.close()
@@ -72,7 +73,7 @@ class Journal:
             ) from None
 
     def _clear(self, folder: Path) -> None:
-        for name in (RECORD, PARQUET, CSV, REPORT):
+        for name in (RECORD, *RESULTS):
             (folder / name).unlink(missing_ok=True)
         os.ftruncate(self._descriptor, 0)
 
@@ -92,7 +93,14 @@ class Journal:
         written = os.write(self._descriptor, line)
         if written < len(line):  # a full disk; the next start removes the part
             raise OSError(f"{JOURNAL}: {written} of {len(line)} bytes were written")
+        os.fsync(self._descriptor)
         self.rows[int(row["flight"])] = row
+
+    def check_unchanged(self, record: Mapping[str, Any]) -> None:
+        """Raise CliError if ``record``, made after the flights, differs from that before: they differ too."""
+        difference = _difference(self._record, record)
+        if difference:
+            raise CliError(f"{difference} during the flights: --overwrite to fly all of them again")
 
     def close(self) -> None:
         """Release the journal."""
@@ -140,12 +148,15 @@ def _check_record(folder: Path, record: Mapping[str, Any]) -> None:
     if not path.exists():
         if (folder / JOURNAL).stat().st_size:
             raise ConfigError(path, "", f"is missing beside {JOURNAL}: give another --out, or --overwrite")
+        for name in RESULTS:  # of another command
+            if (folder / name).exists():
+                raise ConfigError(folder / name, "", "exists already: give another --out, or --overwrite")
         write_text_atomically(path, json.dumps(record, indent=2) + "\n")
         return
     try:
         before = json.loads(path.read_text(encoding="utf-8"))
         difference = _difference(before, record)
-    except (ValueError, TypeError, AttributeError):
+    except (ValueError, TypeError, AttributeError, KeyError):
         raise ConfigError(path, "", "is damaged: give another --out, or --overwrite") from None
     if difference:
         remedy = "give another --out, or --overwrite to fly all of them again"

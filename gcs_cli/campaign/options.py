@@ -69,6 +69,11 @@ class CampaignOptions:
         return self.out or Path("runs") / f"campaign-{self.file.stem}"
 
 
+def continuing(options: CampaignOptions) -> str:
+    """Return which command continues the campaign, as the subject of a sentence: --overwrite would begin it anew."""
+    return f"the same command{' without --overwrite' if options.overwrite else ''}"
+
+
 def only_command(options: CampaignOptions, number: int) -> str:
     """Return the command that flies one flight alone."""
     out = f" --out {shlex.quote(str(options.out))}" if options.out is not None else ""

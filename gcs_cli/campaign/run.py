@@ -22,7 +22,7 @@ from gcs_cli.campaign.journal import (
     open_journal,
     record_of,
 )
-from gcs_cli.campaign.options import CampaignOptions
+from gcs_cli.campaign.options import CampaignOptions, continuing
 from gcs_cli.campaign.page import render_campaign
 from gcs_cli.campaign.plan import PlannedFlight, plan_flights
 from gcs_cli.campaign.rows import Row, row_of
@@ -48,7 +48,8 @@ def run_campaign(pool: Pool, options: CampaignOptions, console: Console) -> int:
     if options.only is not None:
         return fly_only(pool, campaign, _numbered(campaign, flights, options.only), options, console)
     check_flights(campaign, flights)
-    record = record_of("plan", campaign.files([flight.inputs for flight in flights]), flights)
+    inputs = [flight.inputs for flight in flights]
+    record = record_of("plan", campaign.files(inputs), flights)
     began_s = time.monotonic()
     with (
         results_directory(options.folder),
@@ -59,9 +60,10 @@ def run_campaign(pool: Pool, options: CampaignOptions, console: Console) -> int:
             Flyer(pool, campaign, journal, display, options).fly(flights)
         except KeyboardInterrupt:
             over = f"{len(journal.rows)} of {len(flights)} flights are over"
-            raise CliError(f"interrupted: {over}; the same command continues", INTERRUPTED) from None
+            raise CliError(f"interrupted: {over}; {continuing(options)} continues", INTERRUPTED) from None
         finally:
             display.close()
+        journal.check_unchanged(record_of("plan", campaign.files(inputs), flights))
         rows = ordered(journal)
         write_tables(options.folder, rows, options.csv)
         write_text_atomically(options.folder / REPORT, render_campaign(campaign, rows, options))

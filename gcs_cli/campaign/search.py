@@ -94,20 +94,24 @@ def search(fly: Fly, nominal: FloatArray, flights: int, seed: int) -> Search:
     failed = sorted(
         (each for each in flown if not each.passed), key=lambda each: math.dist(each.point, nominal)
     )
-    ends = fly_all([end for end in box_ends(nominal) if not np.array_equal(end, nominal)])
+    ends = fly_all(box_ends(nominal))
     rays = [Ray(start, end) for end in (*ends, *failed[: min(_NEAREST, len(nominal))]) if not end.passed]
     return Search(start, flown, _boundary(fly_all, rays))
 
 
 def box_ends(nominal: FloatArray) -> list[FloatArray]:
-    """Return the ends of the rays along each input, and for two inputs also the corners; shape (inputs,) each."""
+    """Return the ends of the rays along each input, and for two inputs also the corners; shape (inputs,) each.
+
+    Each place is there once, the nominal one not at all: it may be at an end of a range.
+    """
     ends = []
     for index, end in itertools.product(range(len(nominal)), (0.0, 1.0)):
         ends.append(nominal.copy())
         ends[-1][index] = end
     if len(nominal) == 2:
         ends += [np.array(corner) for corner in itertools.product((0.0, 1.0), repeat=2)]
-    return ends
+    places = {tuple(end): end for end in ends}
+    return [end for place, end in places.items() if place != tuple(nominal)]
 
 
 def _find_least(fly: Fly, nominal: FloatArray, flights: int, seed: int) -> None:

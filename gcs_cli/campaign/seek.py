@@ -17,7 +17,7 @@ from gcs_cli.campaign.display import inputs_text, make_display
 from gcs_cli.campaign.figures import map_figure
 from gcs_cli.campaign.flyer import Flyer
 from gcs_cli.campaign.journal import REPORT, Journal, open_journal, record_of
-from gcs_cli.campaign.options import CampaignOptions, only_command
+from gcs_cli.campaign.options import CampaignOptions, continuing, only_command
 from gcs_cli.campaign.page import render_campaign
 from gcs_cli.campaign.plan import PlannedFlight, flight_seed
 from gcs_cli.campaign.rows import Row
@@ -50,9 +50,10 @@ def run_search(pool: Pool, campaign: Campaign, options: CampaignOptions, console
             found = search(evaluation.fly, nominal, flights, campaign.plan.seed)
         except KeyboardInterrupt:
             over = f"{len(journal.rows)} flights are over"
-            raise CliError(f"interrupted: {over}; the same command continues", INTERRUPTED) from None
+            raise CliError(f"interrupted: {over}; {continuing(options)} continues", INTERRUPTED) from None
         finally:
             display.close()
+        journal.check_unchanged(record_of("seek", campaign.files([marker.inputs]), [marker]))
         rows = [journal.rows[each.number] for each in found.flown]
     sentences = list(_sentences(campaign, found, journal, options))
     write_tables(options.folder, rows, options.csv)

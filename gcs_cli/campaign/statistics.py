@@ -1,4 +1,4 @@
-"""What the rows of a campaign say: pass probability, distributions, sensitivities, worst cases. Pure."""
+"""Statistics of a campaign's rows: pass probability, distributions, sensitivities, worst cases. Pure."""
 
 from __future__ import annotations
 

@@ -126,10 +126,10 @@ class Pool:
 
         With ``stops_at_failure`` no case after the first one that fails is flown, and those that already are end.
         """
-        end, next_index, done = len(cases), 0, 0
+        end, next_index = len(cases), 0
         finished: set[int] = set()
         try:
-            while done < end:
+            while len(finished) < end:
                 while next_index < end and len(self._busy) < self.jobs:
                     self._take().fly(next_index, cases[next_index], wanted)
                     yield Started(next_index)
@@ -150,7 +150,7 @@ class Pool:
                 if stops_at_failure and flown.failed:
                     end = min(end, flown.case + 1)
                     self._cancel_from(end)
-                done = sum(number < end for number in finished)
+                    finished = {number for number in finished if number < end}
                 yield flown
         finally:
             self._cancel_from(0)

@@ -82,14 +82,20 @@ def parameter_table(parameters: Sequence[Parameter], infos: Infos, compared: str
     return table
 
 
+def _without_repetition(details: str, short: str) -> str:
+    """Return the long text without the short one at its begin, a sentence that some vehicles repeat there."""
+    begin = short.rstrip(".")
+    rest = details.removeprefix(begin)
+    is_repeated = bool(begin) and rest != details and (not rest or rest[0] == ".")
+    return rest.lstrip(". ") if is_repeated else details
+
+
 def description(parameter: Parameter, info: ParamInfo) -> str:
     """Return one parameter with its metadata, on several lines."""
     lines = [f"{parameter.name} = {number_text(parameter.value)}{_unit(info)}"]
     if info.help:
         lines.append(f"  {info.help}")
-    details = info.details.removeprefix(info.help).lstrip(
-        ". "
-    )  # some vehicles repeat the short text in the long one
+    details = _without_repetition(info.details, info.help)
     if details:
         lines.append(f"  {details}")
     limits = [

@@ -95,14 +95,19 @@ def test_a_failed_flight_exits_with_1_and_flies_alone(folder: Path) -> None:
     assert gcs("campaign", "c.toml", "--only", 3).stderr == "gcs: --only 3: c.toml has 2 flights\n"
 
 
-def test_ctrl_c_keeps_what_is_over(folder: Path) -> None:
+@pytest.mark.parametrize(
+    ("options", "command"),
+    [((), "the same command"), (("--overwrite",), "the same command without --overwrite")],
+    ids=["first", "overwrite"],
+)
+def test_ctrl_c_keeps_finished_flights(folder: Path, options: tuple[str, ...], command: str) -> None:
     (folder / "c.toml").write_text(SCENARIO.replace("= 6", "= 500"))
-    run = Process("gcs_cli", "campaign", "c.toml", "--workers", "1", "--json")
+    run = Process("gcs_cli", "campaign", "c.toml", "--workers", "1", "--json", *options)
     run.wait_for('"event": "flight"')
     run.interrupt()
     assert run.end() == 130
     over = len(Path("runs/campaign-c/flights.jsonl").read_text().splitlines())
-    assert f"gcs: interrupted: {over} of 500 flights are over; the same command continues" in run.lines
+    assert f"gcs: interrupted: {over} of 500 flights are over; {command} continues" in run.lines
 
 
 def test_a_killed_worker_leaves_its_flight_to_the_next_run(folder: Path) -> None:

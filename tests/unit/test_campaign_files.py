@@ -62,6 +62,22 @@ def test_inputs_reach_every_kind_of_key(folder: Path) -> None:
     assert found.scenario({}).wind.gust_m_s == 0.5  # the content of the file is not changed
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "found"),
+    [
+        ("force_n[2]", -1.0, {"force_n": (0.0, 0.0, -1.0)}),
+        ("torque_n_m[0]", 0.1, {"torque_n_m": (0.1, 0.0, 0.0)}),
+        ("boat_m_s[1]", 2.0, {"boat_m_s": (0.0, 2.0)}),
+    ],
+)
+def test_part_of_a_list_that_the_file_does_not_have_varies(
+    folder: Path, name: str, value: float, found: dict[str, tuple[float, ...]]
+) -> None:
+    vary = f'[vary]\n"{name}" = {{ uniform = [0, 1] }}\n'
+    flown = campaign(folder, vary=vary, scenario='plan = "hop"\n[expect]\n').scenario({name: value})
+    assert {key: getattr(flown, key) for key in found} == found
+
+
 def test_simulated_mass_leaves_rotors_and_flight_stack_as_they_are(folder: Path) -> None:
     flown = campaign(folder).scenario({"simulated.body.mass_kg": 1.8}).setup(1)
     file = load_vehicle("x_quad")
@@ -172,6 +188,11 @@ def test_normal_distribution_has_its_mean_and_deviation() -> None:
             "",
             "[vary]\nweak = {normal = [2, 0]}",
             "vary.weak: normal = [2, 0]: the standard deviation must be above 0",
+        ),
+        (
+            "",
+            "[vary]\nweak = {normal = [0, 1], low = 9, high = 10}",
+            "vary.weak: no number of normal = [0, 1] lies between 9 and 10",
         ),
         (
             "",

@@ -3,20 +3,29 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import os
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 
+from flightstack.core.errors import ConfigError
 from flightstack.testing.expectations import Check
-from gcs_cli.campaign.journal import JOURNAL, RECORD, Journal, open_journal, record_of
+from gcs_cli.campaign.display import LiveDisplay, make_display
+from gcs_cli.campaign.journal import JOURNAL, RECORD, RESULTS, Journal, open_journal, record_of
+from gcs_cli.campaign.options import CampaignOptions
 from gcs_cli.campaign.plan import PlannedFlight
 from gcs_cli.campaign.rows import columns, row_of
+from gcs_cli.campaign.run import run_campaign
 from gcs_cli.campaign.statistics import pass_probability, quantiles, sensitivities, worst
 from gcs_cli.campaign.table import write_csv, write_parquet
 from gcs_cli.errors import CliError
+from gcs_cli.scenarios.pool import Finished
 from gcs_cli.scenarios.result import Result, not_flown
 
 FLIGHTS = tuple(
@@ -96,6 +105,15 @@ def test_journal_is_written_before_add_returns(tmp_path: Path) -> None:
         assert json.loads((tmp_path / JOURNAL).read_text()) == ROWS[0]
 
 
+def test_each_row_is_synced_before_add_returns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    synced: list[bytes] = []
+    with open_journal(tmp_path, RECORD_1) as journal:
+        monkeypatch.setattr(os, "fsync", lambda descriptor: synced.append((tmp_path / JOURNAL).read_bytes()))
+        for each in ROWS[:2]:
+            journal.add(each)
+            assert synced.pop() == (tmp_path / JOURNAL).read_bytes()
+
+
 @pytest.mark.parametrize(
     ("record", "difference"),
     [
@@ -142,6 +160,25 @@ def test_a_journal_without_its_record_is_refused(tmp_path: Path) -> None:
     os.unlink(tmp_path / RECORD)
     with pytest.raises(Exception, match=f"is missing beside {JOURNAL}"):
         Journal(tmp_path, RECORD_1)
+
+
+@pytest.mark.parametrize("content", [b"", b"{}", b"[]", b'{"files": 3}', b"\xff"])
+def test_a_damaged_record_is_refused(tmp_path: Path, content: bytes) -> None:
+    with open_journal(tmp_path, RECORD_1) as journal:
+        journal.add(ROWS[0])
+    (tmp_path / RECORD).write_bytes(content)
+    with pytest.raises(ConfigError, match="is damaged"):
+        Journal(tmp_path, RECORD_1)
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_a_new_campaign_keeps_files_of_other_commands(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("other")
+    with pytest.raises(ConfigError, match=f"{name}: exists already: give another --out, or --overwrite"):
+        Journal(tmp_path, RECORD_1)
+    assert (tmp_path / name).read_text() == "other"
+    with open_journal(tmp_path, RECORD_1, overwrite=True):
+        assert not (tmp_path / name).exists()
 
 
 def test_table_does_not_depend_on_the_order_of_the_rows(tmp_path: Path) -> None:
@@ -193,3 +230,58 @@ def test_worst_flights_come_first() -> None:
 def test_quantiles_leave_out_missing_numbers() -> None:
     assert quantiles([None, 1.0, 2.0, 3.0]) == pytest.approx((1.0, 1.1, 2.0, 2.9, 3.0))
     assert quantiles([None]) is None
+
+
+def test_lost_flight_is_named_and_no_longer_under_way() -> None:
+    console = Console(file=io.StringIO(), force_terminal=True, width=100, color_system=None)
+    display = LiveDisplay(console, 5, ROWS[:1])
+    for number in (2, 3):
+        display.begin(number)
+    display.lose(2, "was killed by signal 9")
+    display.tick()
+    display.add(ROWS[2])
+    display.close()
+    shown = console.file.getvalue()
+    assert "LOST  flight 2: was killed by signal 9" in shown
+    assert shown.index("in flight: 2, 3") < shown.index("in flight: 3") < shown.rindex("in flight: none")
+
+
+def test_lines_show_failures_and_each_tenth() -> None:
+    console = Console(file=io.StringIO(), width=200)
+    display = make_display(console, 5, ROWS[:1])
+    for each in ROWS[1:]:
+        display.begin(each["flight"])
+        display.add(each)
+    display.close()
+    assert console.file.getvalue().splitlines() == [
+        "1 of 5 flights are over already",
+        "2 of 5 flights, 0 failed",
+        "FAIL  flight 3: max_error_m ≤ 0.6; wind 1.5, law pid",
+        "3 of 5 flights, 1 failed",
+        "FAIL  flight 4: max_error_m ≤ 0.6; wind 2, law pid",
+        "4 of 5 flights, 2 failed",
+        "FAIL  flight 5: max_error_m ≤ 0.6; wind 2.5, law pid",
+        "5 of 5 flights, 3 failed",
+    ]
+
+
+def test_plan_that_changes_during_the_flights_is_no_result(tmp_path: Path) -> None:
+    plan = tmp_path / "own.plan"
+    plan.write_bytes((Path(__file__).parents[2] / "missions" / "hop.plan").read_bytes())
+    file = tmp_path / "c.toml"
+    vary = "'force_n[0]' = {uniform = [0, 1]}"
+    file.write_text(f"plan = 'own.plan'\n[campaign]\nflights = 2\n[vary]\n{vary}\n[expect]\n")
+    changed = plan.read_bytes() + b"\n"
+
+    class Pool:
+        def fly(self, cases: Sequence[Any], wanted: Any) -> Iterator[Finished]:
+            for number in range(len(cases)):
+                plan.write_bytes(changed)
+                yield Finished(number, Result(()))
+
+    options, console = CampaignOptions(file, out=tmp_path / "out"), Console(file=io.StringIO())
+    with pytest.raises(CliError, match=r"^own.plan has changed during the flights: --overwrite"):
+        run_campaign(Pool(), options, console)
+    assert not (options.folder / "flights.parquet").exists()
+    assert run_campaign(Pool(), replace(options, overwrite=True), console) == 0
+    assert (options.folder / "flights.parquet").exists()

@@ -18,7 +18,7 @@ from gcs_cli.campaign.options import CampaignOptions
 from gcs_cli.campaign.page import render_campaign
 from gcs_cli.campaign.plan import plan_flights
 from gcs_cli.campaign.rows import Row, row_of
-from gcs_cli.campaign.search import HALVINGS, Flown, search
+from gcs_cli.campaign.search import HALVINGS, Flown, box_ends, search
 from gcs_cli.campaign.seek import nominal_point
 from gcs_cli.scenarios.result import Result
 from tests.support.parsed_page import own_part
@@ -65,6 +65,14 @@ def test_each_input_alone_is_halved_to_its_boundary(inputs: int) -> None:
             low, high = ray.passes.point[index], ray.fails.point[index]
             assert low <= 0.7 < high
             assert high - low <= 0.5**HALVINGS
+
+
+@pytest.mark.parametrize("start", [(0.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5)])
+def test_search_flies_the_end_of_each_ray_once(start: tuple[float, float]) -> None:
+    corners = [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0)]
+    middles = [(0.0, start[1]), (1.0, start[1]), (start[0], 0.0), (start[0], 1.0)]
+    ends = [tuple(end) for end in box_ends(np.array(start))]
+    assert sorted(ends) == sorted({*corners, *middles} - {start})
 
 
 def test_search_is_the_same_each_time() -> None:

@@ -7,6 +7,7 @@ import math
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numba
@@ -244,6 +245,36 @@ def test_a_stored_kernel_for_other_types_is_not_used(tmp_path: Path) -> None:
     for path, content in zip(stored, reversed(contents), strict=True):
         path.write_bytes(content)
     assert printed() == "-1 0 0 0\n-1.0 0.0 0.0 0.0\n"
+
+
+@pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+@pytest.mark.parametrize(
+    "damage",
+    [lambda content: b"", lambda content: content[:200], lambda content: bytes(400)],
+    ids=["empty", "cut", "zero"],
+)
+def test_damaged_files_of_a_kernel_are_written_again(
+    tmp_path: Path, suffix: str, damage: Callable[[bytes], bytes]
+) -> None:
+    """After a power failure, a file may be empty, cut or zero."""
+    code = """if True:
+        from flightstack.core.geometry import Quaternion, quaternion_product
+        quaternion_product(Quaternion(1.0, 0.0, 0.0, 0.0), Quaternion(1.0, 0.0, 0.0, 0.0))
+        print(sum(quaternion_product.stats.cache_hits.values()))"""
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+    environment.pop("NUMBA_CACHE_DIR", None)
+
+    def hits() -> int:
+        command = [sys.executable, "-c", code]
+        return int(
+            subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+        )
+
+    assert hits() == 0
+    (stored,) = tmp_path.rglob(f"geometry.quaternion_product-*.{suffix}")
+    stored.write_bytes(damage(stored.read_bytes()))
+    assert [hits(), hits()] == [0, 1]
 
 
 def test_kernel_for_a_type_of_another_package_is_not_stored(tmp_path: Path) -> None:

@@ -50,3 +50,9 @@ def test_description_prints_a_repeated_text_once() -> None:
         "  Maximum distance",
         "  Takes effect immediately.",
     ]
+
+
+@pytest.mark.parametrize("details", ["Maximum distances from home", "... from home", ".5 m at least"])
+def test_description_prints_a_longer_text_as_it_is(details: str) -> None:
+    info = ParamInfo(help="Maximum distance", details=details)
+    assert details in description(PARAMETERS[0], info)

@@ -16,15 +16,12 @@ from textual.geometry import Region
 from textual.strip import Strip
 from textual.widget import Widget
 
-from gcs_cli.charts.canvas import Runs
+from gcs_cli.charts.canvas import Canvas, Runs
 from gcs_cli.tui.palette import Palette
 from gcs_cli.vehicle.view_types import VehicleView
 
 if TYPE_CHECKING:
     from gcs_cli.tui.app import WatchApp
-
-
-from gcs_cli.charts.canvas import Canvas
 
 Draw: TypeAlias = Callable[[VehicleView, float, int, int, Palette], Sequence[Text | Runs]]
 """Draws a vehicle's state as of a time [s] in a number of columns and rows."""
