@@ -29,8 +29,6 @@ from flightstack.estimation.sensor_samples import (
 _pack_imu = struct.Struct(f"={IMU_SIZE}d").pack_into
 _pack_mag, _pack_pair = struct.Struct("=4d").pack_into, struct.Struct("=2d").pack_into
 """A third of the time of an assignment to an array."""
-_MEASURED = slice(1, 5)
-"""Place and velocity in a sample of GNSS."""
 
 
 class Estimator:
@@ -118,8 +116,8 @@ class Estimator:
         A fix of a moving vehicle that equals the last one is an old measurement, and is dropped: the receiver is stuck,
         or sends more often than it measures. At rest the fixes of an ideal receiver are equal.
         """
-        repeats = sample[_MEASURED] == self._fix and any(sample.velocity_ned_m_s)
-        self._fix = sample[_MEASURED]
+        before, self._fix = self._fix, sample[1:5]  # place and velocity
+        repeats = self._fix == before and any(sample.velocity_ned_m_s)
         if repeats or sample.fix_type < GnssFix.FIX_3D or (self.frame is None and not self._is_good(sample)):
             return
         point = GeoPoint(sample.latitude_deg, sample.longitude_deg, sample.altitude_msl_m)
