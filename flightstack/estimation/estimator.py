@@ -54,6 +54,7 @@ class Estimator:
         self._gnss = np.zeros(GNSS_SIZE)
         self._mag = np.zeros(4)
         self._pair = np.zeros(2)
+        self._fix: tuple[Any, ...] = ()  # place and velocity of the last sample of GNSS
         self.imu_row = self._core.imu
         """Take a sample of the IMU in its array form, shape (8,)."""
         self._push = self._core.push
@@ -110,8 +111,14 @@ class Estimator:
             self._push(RANGE_RING, self._pair)
 
     def gnss(self, sample: GnssSample) -> None:
-        """Take a sample of the GNSS receiver. The first three-dimensional fix becomes the origin."""
-        if sample.fix_type < GnssFix.FIX_3D or (self.frame is None and not self._is_good(sample)):
+        """Take a sample of the GNSS receiver. The first three-dimensional fix becomes the origin.
+
+        A fix of a moving vehicle that equals the last one is an old measurement, and is dropped: the receiver is stuck,
+        or sends more often than it measures. At rest the fixes of an ideal receiver are equal.
+        """
+        before, self._fix = self._fix, sample[1:5]  # place and velocity
+        repeats = self._fix == before and any(sample.velocity_ned_m_s)
+        if repeats or sample.fix_type < GnssFix.FIX_3D or (self.frame is None and not self._is_good(sample)):
             return
         point = GeoPoint(sample.latitude_deg, sample.longitude_deg, sample.altitude_msl_m)
         if self.frame is None:

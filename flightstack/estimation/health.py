@@ -28,6 +28,8 @@ SMOOTHING = 0.1
 STUCK_SAMPLES = 100
 """Equal successive samples of the inertial sensor after which it is stuck; PX4's limit. Noise changes the last bits."""
 MISSING_FIX_S, STUCK_S = 1.0, 1.0
+CLIMBED_M = 0.3
+"""Change of the height in the air that must change the pressure, also of a barometer without noise."""
 NOISY = 40
 """Changes of the pressure in turn, 2 s at the interval of the health, that show the noise of a barometer; the rotors
 of a vehicle that has landed stop sooner."""
@@ -45,7 +47,7 @@ class EstimateHealth(NamedTuple):
     mag_age_s: float
     baro_age_s: float
     baro_is_stuck: bool
-    """True if the pressure has not changed for 1 s, in the air or after it had noise on the ground."""
+    """True if the pressure has not changed for 1 s, after it had noise on the ground or in a climb or descent."""
     fix_age_s: float
     """Time since the newest three-dimensional fix."""
     unaided_s: float
@@ -120,22 +122,37 @@ def health_kernel(memory: MemoryArray, summary: Summary) -> None:
 
 
 class PressureTrack(NamedTuple):
-    """The last pressure, the time since which it is equal, and the number of its changes in turn, up to ``NOISY``."""
+    """The last pressure, time and height at its change, and the number of its changes in turn, up to ``NOISY``.
+
+    The height is the present one on the ground, where only the estimate moves.
+    """
 
     pressure_hpa: float = math.nan
     equal_since_s: float = 0.0
+    height_m: float = 0.0
     changes: int = 0
+    is_ideal: bool = False
+    """True if the pressure has repeated itself on the ground: a simulator's ideal barometer does at rest."""
+
+    def is_stuck(self, landed: bool, height_m: float, time_s: float) -> bool:
+        """Return True if the pressure should have changed: by its noise, or in a climb or descent."""
+        if landed:
+            should_change = self.changes == NOISY
+        else:
+            should_change = not self.is_ideal or abs(height_m - self.height_m) > CLIMBED_M
+        return should_change and time_s - self.equal_since_s > STUCK_S
 
 
-def pressure_step(memory: PressureTrack, pressure_hpa: float, landed: bool, time_s: float) -> PressureTrack:
-    """Compare a pressure with the last one; changes count at rest, where those of a barometer are its noise.
-
-    A simulator's ideal barometer repeats its pressure at rest, and is not stuck.
-    """
+def pressure_step(
+    memory: PressureTrack, pressure_hpa: float, landed: bool, height_m: float, time_s: float
+) -> PressureTrack:
+    """Compare a pressure with the last one; changes count at rest, where those of a barometer are its noise."""
     if pressure_hpa != memory.pressure_hpa:
         changes = min(memory.changes + 1, NOISY) if landed else memory.changes
-        return PressureTrack(pressure_hpa, time_s, changes)
-    return memory if memory.changes == NOISY else memory._replace(changes=0)
+        return PressureTrack(pressure_hpa, time_s, height_m, changes, memory.is_ideal and changes < NOISY)
+    if not landed or memory.changes == NOISY:
+        return memory
+    return memory._replace(changes=0, height_m=height_m, is_ideal=True)
 
 
 class Accuracy(NamedTuple):
@@ -160,10 +177,11 @@ class HealthMonitor:
     def __init__(self, memory: RecordArray) -> None:
         """``memory`` is the estimator's, shape (1,)."""
         self._memory = memory
-        self._flags = memory["flags"][0]
+        self._flags, self._state = memory["flags"][0], memory["state"][0]
         self._summary = np.zeros(_SUMMARY_SIZE)
         self._accuracy = Accuracy()
         self._pressure = PressureTrack()
+        self._baro: BaroSample | None = None
         self._summarise = direct(health_kernel, memory, self._summary)
 
     def update(
@@ -193,10 +211,11 @@ class HealthMonitor:
     def _baro_is_stuck(self, baro: BaroSample | None, time_s: float) -> bool:
         if baro is None:
             return False
-        landed = bool(self._flags[LANDED])
-        self._pressure = pressure_step(self._pressure, baro.pressure_hpa, landed, time_s)
-        has_noise = not landed or self._pressure.changes == NOISY
-        return has_noise and time_s - self._pressure.equal_since_s > STUCK_S
+        landed, height_m = bool(self._flags[LANDED]), -float(self._state[2])
+        if baro is not self._baro:  # the health may be newer than the pressure
+            self._pressure = pressure_step(self._pressure, baro.pressure_hpa, landed, height_m, time_s)
+        self._baro = baro
+        return self._pressure.is_stuck(landed, height_m, time_s)
 
 
 def _fix_age_s(samples: NewestSamples, time_s: float) -> float:

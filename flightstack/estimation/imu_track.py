@@ -33,13 +33,22 @@ def _equals(a: FloatArray, b: FloatArray, at: int) -> bool:
 
 
 @compiled
+def _is_zero(a: FloatArray, at: int) -> bool:
+    return bool(a[at] == 0.0 and a[at + 1] == 0.0 and a[at + 2] == 0.0)
+
+
+@compiled
 def count_sample(rows: FloatArray, counters: Counters) -> None:
-    """Count the sample in the next row of the ring, and whether it repeats the one before."""
+    """Count the sample in the next row of the ring, and whether it repeats the one before.
+
+    An ideal sensor at rest repeats zero rates and a constant force, and is not stuck.
+    """
     count = counters[_COUNT]
     if count > 0:
         row, last = rows[count % WINDOW], rows[(count - 1) % WINDOW]
-        repeats = _equals(row, last, _RATE) or _equals(row, last, _FORCE)
-        counters[_REPEATS] = counters[_REPEATS] + 1 if repeats else 0
+        rates, forces = _equals(row, last, _RATE), _equals(row, last, _FORCE)
+        is_ideal = rates and forces and _is_zero(row, _RATE) and not _is_zero(row, _FORCE)
+        counters[_REPEATS] = counters[_REPEATS] + 1 if (rates or forces) and not is_ideal else 0
     counters[_COUNT] = count + 1
 
 

@@ -25,17 +25,17 @@ from flightstack.estimation.kalman import (
     Filter,
 )
 
-CHECKS_SIZE = 25
+CHECKS_SIZE = 26
 """Means of the innovations upwards (3); times until which the accelerometer and the barometer count as wrong; altitude
 of the barometer, and the time since which it is equal; time, position and velocity of the last GNSS measurement (7),
 drift of its position from its velocity (3), fault of each axis (3); time since which GNSS velocity contradicts the
 prediction alone, 0 if it does not; means of the innovations of GNSS velocity along north and east, and the time at
-which it contradicted the prediction last, with the sign of its error."""
+which it contradicted the prediction last, with the sign of its error (2); time of the last altitude."""
 Checks: TypeAlias = Annotated[FloatArray, CHECKS_SIZE]
 
 _SPEED, _HEIGHT, _PRESSURE, ACCEL_UNTIL_S, BARO_UNTIL_S = 0, 1, 2, 3, 4
 _ALTITUDE, _EQUAL_SINCE_S, _GNSS_S, _PLACE, _MOTION, _DRIFT = 5, 6, 7, 8, 11, 14
-GNSS_FAULT, _ALONE_SINCE_S, _SIDEWAYS, _ONSET_S = 17, 20, 21, 23
+GNSS_FAULT, _ALONE_SINCE_S, _SIDEWAYS, _ONSET_S, _ALTITUDE_S = 17, 20, 21, 23, 25
 CONSISTENT, POSITION_DRIFTS, VELOCITY_IS_WRONG = 0.0, 1.0, 2.0
 """Faults of GNSS along an axis."""
 
@@ -67,9 +67,10 @@ def _take(c: Checks, at: int, f: Filter, row: int, sign: float, dt_s: float) -> 
 
 
 @compiled
-def take_pressure_innovation(c: Checks, f: Filter, dt_s: float) -> None:
-    """Take the barometer's newest innovation, ``dt_s`` after the one before."""
-    _take(c, _PRESSURE, f, BARO, 1.0, dt_s)
+def take_pressure_innovation(c: Checks, f: Filter, measured_s: float) -> None:
+    """Take the barometer's newest innovation, of an altitude measured at ``measured_s``."""
+    _take(c, _PRESSURE, f, BARO, 1.0, max(0.0, measured_s - c[_ALTITUDE_S]))
+    c[_ALTITUDE_S] = measured_s
 
 
 @compiled

@@ -323,6 +323,15 @@ def mission_step(
 
 
 @compiled
+def mission_lands(m: Record, plan: RecordArray) -> bool:
+    """Return True if the vehicle descends to land at the current item."""
+    index = m["current"]
+    if m["finished"] or index >= plan.shape[0]:
+        return False
+    return bool(plan[index]["command"] == LAND and m["phase"] == STAY)
+
+
+@compiled
 def mission_goal(
     m: Record, plan: RecordArray, start_x: float, start_y: float, params: GuidanceParams
 ) -> Goal:
@@ -338,7 +347,7 @@ def mission_goal(
         elif m["phase"] == RISE:
             x, y, z = m["rise_x"], m["rise_y"], m["rise_z"]
             climb = params.takeoff_speed_m_s
-        elif command == LAND and m["phase"] == STAY:
+        elif mission_lands(m, plan):
             z = params.far_below_m
     descent, counted = params.descent_speed_m_s, 1.0 if m["yaw_is_counted"] else 0.0
     return Goal(x, y, z, m["yaw"], m["speed"], climb, descent, m["yaw_rate"], counted)

@@ -47,12 +47,18 @@ def advance_return(target: Record, state: VehicleState, params: GuidanceParams) 
 
 
 @compiled
+def lands(mode: int, target: Record) -> bool:
+    """Return True if the vehicle descends to land."""
+    return bool(mode == LAND or (mode == RETURN and target["phase"] == DESCENDING))
+
+
+@compiled
 def target_goal(mode: int, target: Record, params: GuidanceParams) -> Goal:
     """Return the goal of ``mode``."""
     z, climb, descent = target["z"], params.climb_speed_m_s, params.descent_speed_m_s
     speed = target["speed"] if target["speed"] > 0.0 else params.cruise_speed_m_s
     if mode == TAKEOFF:
         climb = params.takeoff_speed_m_s
-    elif mode == LAND or (mode == RETURN and target["phase"] == DESCENDING):
+    elif lands(mode, target):
         z = params.far_below_m
     return Goal(target["x"], target["y"], z, target["yaw"], speed, climb, descent, params.yaw_rate_rad_s, 0.0)

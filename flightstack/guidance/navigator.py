@@ -38,10 +38,11 @@ from flightstack.guidance.mission import (
     NAV_DELAY,
     PLAN_ITEM,
     MissionProgress,
+    mission_lands,
     mission_start,
 )
 from flightstack.guidance.mission import LAND as LAND_ITEM
-from flightstack.guidance.mode_target import CLIMBING, MODE_TARGET
+from flightstack.guidance.mode_target import CLIMBING, MODE_TARGET, lands
 from flightstack.guidance.offboard import wants_to_rise
 from flightstack.guidance.params import GuidanceParams, SpeedOverrides
 from flightstack.guidance.setpoints import (
@@ -254,12 +255,21 @@ class Navigator:
         self._mode_target["x"], self._mode_target["y"] = self._trajectory[:2]
         return True
 
-    def shift(self, position_m: Vector3, velocity_m_s: Vector3, yaw_rad: float) -> None:
-        """Shift the reference by a reset of the estimate, so that the vehicle does not move; goals keep their place."""
+    def shift(self, mode: Mode, position_m: Vector3, velocity_m_s: Vector3, yaw_rad: float) -> None:
+        """Shift the reference by a reset of the estimate, so that the vehicle does not move.
+
+        Goals keep their place, but for that of a descent to land: the vehicle would reach the ground on the way there.
+        """
         for x in (self._trajectory, self.setpoint):
             x[0:3] += position_m
             x[3:6] += velocity_m_s
             x[_YAW_AT] += yaw_rad
+        goal, is_landing = self._mode_target, lands(mode, self._mode_target[0])
+        if mode == Mode.MISSION:
+            goal, is_landing = self._mission, mission_lands(self._mission[0], self._plan)
+        if is_landing:
+            goal["x"] += position_m.x
+            goal["y"] += position_m.y
 
     def enter(self, mode: Mode, takeoff_altitude_m: float = 0.0) -> None:
         """Set the target of ``mode``, from the present reference."""

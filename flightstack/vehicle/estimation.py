@@ -218,7 +218,7 @@ class Estimation:
             for kind in (POSITION_RESET, VELOCITY_RESET)
         )
         yaw_rad = change[YAW_RESET_SUM]
-        users.navigator.shift(position_m, velocity_m_s, yaw_rad)
+        users.navigator.shift(self._now.status.mode, position_m, velocity_m_s, yaw_rad)
         if abs(yaw_rad) > _SMALL_TURN_RAD:  # the reference attitude of the loops has the old yaw
             self._reset_loops()
         step = f"{distance(*position_m):.1f} m, {distance(*velocity_m_s):.1f} m/s, {math.degrees(yaw_rad):.0f} degrees"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from flightstack.core.errors import ConfigError
 from flightstack.estimation.error_state import WIND, turn_between
 from flightstack.estimation.memory import MAG_FAULT
 from flightstack.mavlink.dialect import mavlink
+from flightstack.params import vehicle
 from flightstack.testing import World
 from tests.support.estimate_errors import Watch
 from tests.support.refusals import refused
@@ -31,6 +33,19 @@ def test_square_on_sensors_is_completed_within_the_limits_of_gnss() -> None:
     assert errors.horizontal_m < 0.7
     assert errors.vertical_m < 0.4
     assert errors.landing_m < 1.5
+
+
+def test_ideal_sensors_at_rest_and_in_hover_are_not_stuck(tmp_path: Path) -> None:
+    text = (Path(vehicle.__file__).parent / "vehicles" / "x_quad.toml").read_text()
+    path = tmp_path / "ideal_quad.toml"
+    path.write_text(text.replace('grade = "consumer"', 'grade = "ideal"'))
+    with World(vehicle=str(path), state="estimated") as world:
+        world.wait_until_ready()
+        world.takeoff(5.0)
+        world.run_for(40.0)
+        world.land()
+        world.run_until("not armed")
+        assert world.texts == ["Armed", "Takeoff detected", "Landing detected", "Disarmed"]
 
 
 def test_rotors_are_quiet_in_hover_on_sensors() -> None:

@@ -126,9 +126,13 @@ def test_position_without_a_limit_is_never_inaccurate() -> None:
 def test_pressure_that_changes_at_rest_has_noise(landed: bool, noise_hpa: float, is_noisy: bool) -> None:
     memory = PressureTrack()
     for step in range(2 * NOISY):
-        memory = pressure_step(memory, 955.0 + noise_hpa * (step % 3), landed, 0.05 * step)
+        memory = pressure_step(memory, 955.0 + noise_hpa * (step % 3), landed, 0.0, 0.05 * step)
     assert (memory.changes == NOISY) is is_noisy
     for step in range(10):
-        memory = pressure_step(memory, 950.0, landed, 10.0 + 0.05 * step)
+        memory = pressure_step(memory, 950.0, landed, 2.0, 10.0 + 0.05 * step)
     assert memory.equal_since_s == 10.0
     assert (memory.changes == NOISY) is is_noisy
+    assert memory.is_stuck(landed, 2.0, 11.5) is (is_noisy or not landed)
+    assert memory.is_stuck(False, 2.0, 11.5) is not (landed and not is_noisy)  # an ideal one may hover
+    assert memory.is_stuck(False, 2.5, 11.5)  # in the air a climb shows it
+    assert not memory.is_stuck(landed, 2.5, 10.5)

@@ -15,7 +15,7 @@ from flightstack.core.geometry import conjugate, quaternion_product, rotate
 from flightstack.estimation.error_state import POSITION, VELOCITY, turn_between
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits, tuning_of
-from flightstack.estimation.kalman import FUSED, GNSS_POSITION, GNSS_VELOCITY, MAG, RANGE, REFUSED
+from flightstack.estimation.kalman import FUSED, FUSED_S, GNSS_POSITION, GNSS_VELOCITY, MAG, RANGE, REFUSED
 from flightstack.estimation.memory import (
     GAP_S,
     GAPS,
@@ -230,6 +230,23 @@ def test_refused_fix_after_an_outage_is_not_reset_to() -> None:
     assert abs(resets(estimator, POSITION_RESET + 1)) < 10.0  # measured 1.7
     assert abs(resets(estimator, VELOCITY_RESET + 1)) < 2.0  # measured 0.3
     assert np.abs(estimator.state().position_ned_m - flown.position(26.0)).max() < 2.0  # measured 0.2
+
+
+def test_fix_that_repeats_itself_in_motion_is_dropped() -> None:
+    held: list[GnssSample] = []
+
+    def freeze(sample: Any) -> Any:
+        if not isinstance(sample, GnssSample) or sample.time_s < 20.0:
+            return sample
+        held.append(sample)
+        return held[0]._replace(time_s=sample.time_s)
+
+    estimator = fly(35.0, Faults(), freeze)
+    assert estimator.memory["observations"][0, GNSS_VELOCITY, FUSED_S] == pytest.approx(20.0, abs=0.2)
+    assert resets(estimator, POSITION_RESET) == 0.0
+    assert (
+        np.abs(estimator.state().position_ned_m - flown.position(35.0)).max() < 2.0
+    )  # 0.8; 84 if it is fused
 
 
 # ------------------------------------------------------------------ rates and gaps of samples

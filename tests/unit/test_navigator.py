@@ -153,12 +153,23 @@ def test_reset_of_the_estimate_shifts_the_reference_and_not_the_goal() -> None:
     step, speed = Vector3(3.0, -4.0, 1.0), Vector3(0.5, 0.25, -0.125)
     vehicle.state[:3] += step
     vehicle.state[3:6] += speed
-    vehicle.navigator.shift(step, speed, 0.25)
+    vehicle.navigator.shift(Mode.HOLD, step, speed, 0.25)
     assert vehicle.navigator.setpoint[:6] - vehicle.state[:6] == pytest.approx(error)
     vehicle.run(0.01)
     assert vehicle.navigator.setpoint[:6] - vehicle.state[:6] == pytest.approx(error, abs=0.05)
     vehicle.run(20.0)
     assert vehicle.position == pytest.approx([20.0, 0.0, -5.0], abs=0.05)
+
+
+def test_landing_goes_on_above_the_same_ground_after_a_reset_of_the_estimate() -> None:
+    vehicle = in_air(down=-10.0)
+    vehicle.enter(Mode.LAND)
+    vehicle.run(2.0)
+    step = Vector3(30.0, -20.0, 0.0)
+    vehicle.state[:3] += step
+    vehicle.navigator.shift(Mode.LAND, step, Vector3(0.0, 0.0, 0.0), 0.0)
+    vehicle.run(3.0)
+    assert vehicle.position[:2] == pytest.approx(step[:2], abs=1e-6)
 
 
 def test_landing_without_a_position_brakes_and_goes_down_where_it_is() -> None:

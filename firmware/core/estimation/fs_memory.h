@@ -38,7 +38,7 @@ typedef struct {
     fs_real yaw_models[5][32];
     fs_real yaw_fix[4];
     fs_real followed[1];
-    fs_real checks[25];
+    fs_real checks[26];
 } fs_estimator_memory;
 
 /* Set what is not zero at the start in a memory of zeros that has its parameters. memory.py:86 */

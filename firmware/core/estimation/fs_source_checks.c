@@ -26,6 +26,7 @@
 #define FS_MEAN_S FS_LIT(1.0)
 #define FS_PRESSURE 2
 #define FS_BARO 6
+#define FS_ALTITUDE_S 25
 #define FS_GNSS_S 7
 #define FS_LEAST_ACCURACY_M FS_LIT(0.5)
 #define FS_GNSS_FAULT 17
@@ -55,8 +56,8 @@
 #define FS_NOISE 4
 #define FS_SIDEWAYS 21
 
-/* source_checks.py:108 */
-void fs_add_fault_noise(const fs_real c[25], fs_filter *f, fs_real dt_s)
+/* source_checks.py:109 */
+void fs_add_fault_noise(const fs_real c[26], fs_filter *f, fs_real dt_s)
 {
     if (f->clock[0] < c[FS_ACCEL_UNTIL_S]) {
         f->covariance[FS_VELOCITY + 2][FS_VELOCITY + 2] += FS_ACCEL_DENSITY * dt_s;
@@ -67,8 +68,8 @@ void fs_add_fault_noise(const fs_real c[25], fs_filter *f, fs_real dt_s)
     }
 }
 
-/* source_checks.py:119 */
-bool fs_is_stuck(fs_real c[25], fs_real altitude_m, fs_real now_s)
+/* source_checks.py:120 */
+bool fs_is_stuck(fs_real c[26], fs_real altitude_m, fs_real now_s)
 {
     if (fs_abs(altitude_m - c[FS_ALTITUDE]) > FS_EQUAL_M) {
         c[FS_ALTITUDE] = altitude_m;
@@ -79,7 +80,7 @@ bool fs_is_stuck(fs_real c[25], fs_real altitude_m, fs_real now_s)
 }
 
 /* Add the newest innovation of a row to its mean, upwards. source_checks.py:61 */
-static void take(fs_real c[25], int32_t at, const fs_filter *f, int32_t row, fs_real sign, fs_real dt_s)
+static void take(fs_real c[26], int32_t at, const fs_filter *f, int32_t row, fs_real sign, fs_real dt_s)
 {
     /* 0 before the first fusion */
     const fs_real variance = fs_max(f->observations[row][FS_INNOVATION_VARIANCE], FS_LEAST_VARIANCE);
@@ -89,9 +90,10 @@ static void take(fs_real c[25], int32_t at, const fs_filter *f, int32_t row, fs_
 }
 
 /* source_checks.py:70 */
-void fs_take_pressure_innovation(fs_real c[25], const fs_filter *f, fs_real dt_s)
+void fs_take_pressure_innovation(fs_real c[26], const fs_filter *f, fs_real measured_s)
 {
-    take(c, FS_PRESSURE, f, FS_BARO, FS_LIT(1.0), dt_s);
+    take(c, FS_PRESSURE, f, FS_BARO, FS_LIT(1.0), fs_max(FS_LIT(0.0), measured_s - c[FS_ALTITUDE_S]));
+    c[FS_ALTITUDE_S] = measured_s;
 }
 
 /*
@@ -101,9 +103,9 @@ void fs_take_pressure_innovation(fs_real c[25], const fs_filter *f, fs_real dt_s
  * not. A wrong velocity has moved position and velocity of the filter by as much as the drift, and has noise from now
  * on.
  *
- * source_checks.py:157
+ * source_checks.py:158
  */
-static void start_fault(fs_real c[25], fs_filter *f, int32_t axis)
+static void start_fault(fs_real c[26], fs_filter *f, int32_t axis)
 {
     const fs_real drift_m = c[FS_DRIFT + axis];
     const fs_real onset_s = c[FS_ONSET_S + axis];
@@ -119,17 +121,17 @@ static void start_fault(fs_real c[25], fs_filter *f, int32_t axis)
 
 /*
  * Let the position become uncertain at the rate of the drift, for the velocity may be wrong instead.
- * source_checks.py:175
+ * source_checks.py:176
  */
-static void doubt_position(const fs_real c[25], fs_filter *f, int32_t axis, fs_real dt_s)
+static void doubt_position(const fs_real c[26], fs_filter *f, int32_t axis, fs_real dt_s)
 {
     const int32_t at = FS_POSITION + axis;
     const fs_real grown_m = fs_sqrt(f->covariance[at][at]) + fs_abs(c[FS_DRIFT + axis]) / FS_DRIFT_S * dt_s;
     f->covariance[at][at] = grown_m * grown_m;
 }
 
-/* source_checks.py:128 */
-void fs_follow_drift(fs_real c[25], fs_filter *f, const fs_real row[], fs_real eph_m)
+/* source_checks.py:129 */
+void fs_follow_drift(fs_real c[26], fs_filter *f, const fs_real row[], fs_real eph_m)
 {
     const fs_real dt_s = row[0] - c[FS_GNSS_S];
     const fs_real accuracy_m = fs_max(eph_m, FS_LEAST_ACCURACY_M);
@@ -163,8 +165,8 @@ void fs_follow_drift(fs_real c[25], fs_filter *f, const fs_real row[], fs_real e
     c[FS_GNSS_S] = row[0];
 }
 
-/* source_checks.py:85 */
-void fs_take_gnss_innovations(fs_real c[25], fs_filter *f, fs_real dt_s, bool has_baro)
+/* source_checks.py:86 */
+void fs_take_gnss_innovations(fs_real c[26], fs_filter *f, fs_real dt_s, bool has_baro)
 {
     take(c, FS_SPEED, f, FS_GNSS_VELOCITY + 2, FS_LIT(-1.0), dt_s);
     take(c, FS_HEIGHT, f, FS_GNSS_POSITION + 2, FS_LIT(-1.0), dt_s);
@@ -194,8 +196,8 @@ void fs_take_gnss_innovations(fs_real c[25], fs_filter *f, fs_real dt_s, bool ha
     }
 }
 
-/* source_checks.py:76 */
-void fs_take_horizontal_innovations(fs_real c[25], const fs_filter *f, fs_real dt_s)
+/* source_checks.py:77 */
+void fs_take_horizontal_innovations(fs_real c[26], const fs_filter *f, fs_real dt_s)
 {
     for (int32_t axis = 0; axis < 2; axis++) {
         take(c, FS_SIDEWAYS + axis, f, FS_GNSS_VELOCITY + axis, FS_LIT(1.0), dt_s);
@@ -205,8 +207,8 @@ void fs_take_horizontal_innovations(fs_real c[25], const fs_filter *f, fs_real d
     }
 }
 
-/* source_checks.py:183 */
-bool fs_position_drifts(const fs_real c[25])
+/* source_checks.py:184 */
+bool fs_position_drifts(const fs_real c[26])
 {
     const fs_real north = c[FS_GNSS_FAULT];
     const fs_real east = c[FS_GNSS_FAULT + 1];

@@ -11,18 +11,18 @@
 
 /*
  * Add the uncertainty of the sensors that count as wrong, so that the filter learns their error anew.
- * source_checks.py:108
+ * source_checks.py:109
  */
-void fs_add_fault_noise(const fs_real c[25], fs_filter *f, fs_real dt_s);
+void fs_add_fault_noise(const fs_real c[26], fs_filter *f, fs_real dt_s);
 
 /*
  * Return True if the barometer has repeated its altitude for 1 s; its noise changes each measurement.
- * source_checks.py:119
+ * source_checks.py:120
  */
-bool fs_is_stuck(fs_real c[25], fs_real altitude_m, fs_real now_s);
+bool fs_is_stuck(fs_real c[26], fs_real altitude_m, fs_real now_s);
 
-/* Take the barometer's newest innovation, dt_s after the one before. source_checks.py:70 */
-void fs_take_pressure_innovation(fs_real c[25], const fs_filter *f, fs_real dt_s);
+/* Take the barometer's newest innovation, of an altitude measured at measured_s. source_checks.py:70 */
+void fs_take_pressure_innovation(fs_real c[26], const fs_filter *f, fs_real measured_s);
 
 /*
  * Compare the changes of the position of a GNSS measurement with its velocity, over 20 s.
@@ -31,19 +31,19 @@ void fs_take_pressure_innovation(fs_real c[25], const fs_filter *f, fs_real dt_s
  * that. A jump counts as a change of one accuracy: the gate of the innovation refuses it. The barometer watches the
  * height.
  *
- * source_checks.py:128
+ * source_checks.py:129
  */
-void fs_follow_drift(fs_real c[25], fs_filter *f, const fs_real row[], fs_real eph_m);
+void fs_follow_drift(fs_real c[26], fs_filter *f, const fs_real row[], fs_real eph_m);
 
-/* Take the vertical innovations of GNSS, and decide which sensor is wrong. source_checks.py:85 */
-void fs_take_gnss_innovations(fs_real c[25], fs_filter *f, fs_real dt_s, bool has_baro);
+/* Take the vertical innovations of GNSS, and decide which sensor is wrong. source_checks.py:86 */
+void fs_take_gnss_innovations(fs_real c[26], fs_filter *f, fs_real dt_s, bool has_baro);
 
 /*
- * Take the horizontal innovations of GNSS velocity, and note when they contradict the prediction. source_checks.py:76
+ * Take the horizontal innovations of GNSS velocity, and note when they contradict the prediction. source_checks.py:77
  */
-void fs_take_horizontal_innovations(fs_real c[25], const fs_filter *f, fs_real dt_s);
+void fs_take_horizontal_innovations(fs_real c[26], const fs_filter *f, fs_real dt_s);
 
-/* Return True if the GNSS position drifts from its velocity along an axis. source_checks.py:183 */
-bool fs_position_drifts(const fs_real c[25]);
+/* Return True if the GNSS position drifts from its velocity along an axis. source_checks.py:184 */
+bool fs_position_drifts(const fs_real c[26]);
 
 #endif
