@@ -40,7 +40,8 @@ class LinkMonitor:
         self._due_s: float | None = None
         self._sent_s: deque[tuple[int, float]] = deque(maxlen=_WINDOW)
         self._past: deque[LinkCounts] = deque(maxlen=_WINDOW + 1)
-        self._round_trip_s: float | None = None
+        self.round_trip_s: float | None = None
+        """Time from the newest answered request to its answer [s]."""
         self._prompt_until_s = -math.inf
 
     @property
@@ -50,7 +51,7 @@ class LinkMonitor:
         past = self._past[0] if self._past else LinkCounts()
         received, lost = counts.received - past.received, counts.lost - past.lost
         loss = lost / (received + lost) if received + lost > 0 else None
-        return LinkQuality(counts.rate_hz, loss, self._round_trip_s)
+        return LinkQuality(counts.rate_hz, loss, self.round_trip_s)
 
     def receive(self, message: Message, now_s: float) -> None:
         """Process a message from the vehicle."""
@@ -58,7 +59,7 @@ class LinkMonitor:
             return
         for stamp, sent_s in self._sent_s:
             if stamp == message.ts1:
-                self._round_trip_s = now_s - sent_s
+                self.round_trip_s = now_s - sent_s
                 self._prompt_until_s = -math.inf
 
     def is_waiting(self, now_s: float) -> bool:

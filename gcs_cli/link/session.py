@@ -157,6 +157,13 @@ class Session:
         if not self._is_other_system(message):
             for service in self._services:
                 service.receive(message, now_s)
+            self._note_round_trip()
+
+    def _note_round_trip(self) -> None:
+        """Keep the newest round trip in the view, which the screens draw."""
+        link, round_trip_s = self.view.link, self._monitor.round_trip_s
+        if link.round_trip_s != round_trip_s:
+            self.view = self.view._replace(link=link._replace(round_trip_s=round_trip_s))
 
     def _is_vehicle(self, message: Message, peer: Address, now_s: float) -> bool:
         """Return True if the message is from our vehicle; without one, accept the first autopilot's heartbeat."""

@@ -29,8 +29,11 @@ class ShownKey(NamedTuple):
         return len(self.display) + len(self.title) + 3
 
 
-def fitting(keys: Sequence[ShownKey], width: int) -> list[ShownKey]:
-    """Return the keys that ``width`` holds: those of all screens, and the first ones of this screen."""
+def fitting(keys: Sequence[ShownKey], width: int) -> list[tuple[str, ShownKey]]:
+    """Return the keys that ``width`` holds, each with the mark before it of keys left out.
+
+    They are the keys of all screens, and before them the first ones of this screen.
+    """
     common = [key for key in keys if not key.is_own]
     room = width - sum(key.width for key in common)
     own = [key for key in keys if key.is_own]
@@ -38,7 +41,9 @@ def fitting(keys: Sequence[ShownKey], width: int) -> list[ShownKey]:
         room -= len(_MORE)
         while own and sum(key.width for key in own) > room:
             own.pop()
-    return own + common
+    shown = own + common
+    is_cut = len(shown) < len(keys)
+    return [(_MORE if is_cut and place == len(own) else "", key) for place, key in enumerate(shown)]
 
 
 class KeyBar(KeepsLines):
@@ -76,12 +81,8 @@ class KeyBar(KeepsLines):
 
     def _line(self, colours: Palette) -> Text:
         text = Text(no_wrap=True, overflow="crop", end="")
-        shown = fitting(self._keys, self.size.width)
-        is_cut = len(shown) < len(self._keys)
-        for key in shown:
-            if is_cut and not key.is_own:
-                text.append(_MORE, colours.muted)
-                is_cut = False
+        for more, key in fitting(self._keys, self.size.width):
+            text.append(more, colours.muted)
             text.append(f" {key.display}", f"bold {colours.accent}")
             text.append(f" {key.title} ", colours.text)
         return text
@@ -89,8 +90,8 @@ class KeyBar(KeepsLines):
     def on_click(self, event: Click) -> None:
         """Press the key under the mouse."""
         end = 0
-        for key in fitting(self._keys, self.size.width):
-            end += key.width
+        for more, key in fitting(self._keys, self.size.width):
+            end += len(more) + key.width
             if event.x < end:
                 self.app.simulate_key(key.key)
                 return

@@ -35,10 +35,10 @@ def status_line(
         left.append(f" COMMANDS TO ALL {vehicles} ", f"bold {colours.background} on {colours.target}")
     if view.in_failsafe:
         left.append(" FAILSAFE ", f"bold {colours.background} on {colours.warning}")
+    among = f" of {vehicles}" if vehicles > 1 else ""
     parts = [
         (f" {_LANDED.get(view.landed_state, '')}", colours.text),
-        (f"  {view.identity.kind} {view.identity.system_id}", colours.muted),
-        (f" of {vehicles}" if vehicles > 1 else "", colours.muted),
+        (f"  {view.identity.kind} {view.identity.system_id}{among}", colours.muted),
         (f"  t {clock_text(view.time_s)}", colours.text),
     ]
     if view.timing is not None and view.timing.real_time_factor is not None:

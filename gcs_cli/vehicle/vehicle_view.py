@@ -83,7 +83,9 @@ def _counted(link: LinkCounts, sequence: int, now_s: float) -> LinkCounts:
         start, count = now_s, 0  # read at once with the first message: a backlog has no rate
     elif now_s != last and last - start >= _RATE_WINDOW_S:  # messages read at one time belong to one window
         start, count, rate = last, 1, link.window_count / (last - start)
-    return LinkCounts(link.received + 1, link.lost + gap, sequence, now_s, rate, start, count)
+    return LinkCounts(
+        link.received + 1, link.lost + gap, sequence, now_s, rate, start, count, link.round_trip_s
+    )
 
 
 def _number(value: float) -> float | None:

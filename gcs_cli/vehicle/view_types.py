@@ -254,7 +254,7 @@ class LinkCounts(NamedTuple):
     window_start_s: float | None = None
     window_count: int = 0
     round_trip_s: float | None = None
-    """Time from a TIMESYNC to its answer; None if none was sent."""
+    """Time from the newest answered TIMESYNC to its answer; None without one."""
 
     @property
     def quality(self) -> float | None:

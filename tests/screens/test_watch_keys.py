@@ -89,3 +89,16 @@ def test_keys_of_all_screens_are_shown_at_any_width(width: int) -> None:
         assert app.screen.query("HelpPanel")
 
     play(story, size=(width, 24))
+
+
+def test_click_on_the_end_of_a_key_presses_that_key(monkeypatch: pytest.MonkeyPatch) -> None:
+    pressed: list[str] = []
+
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await pilot.press("3")
+        await pilot.pause()
+        monkeypatch.setattr(app, "simulate_key", pressed.append)
+        await pilot.click("KeyBar", offset=(shown(app)[-1].index("  q Quit") - 1, 0))
+
+    play(story)
+    assert pressed == ["ctrl+p"]

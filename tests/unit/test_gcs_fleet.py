@@ -160,6 +160,7 @@ def test_round_trip_and_loss_are_measured() -> None:
     quality = fleet.selected.quality
     assert not fleet.selected.awaits_round_trip(0.04)
     assert quality.round_trip_s == pytest.approx(0.03)
+    assert fleet.selected.view.link.round_trip_s == quality.round_trip_s  # later messages keep it
     received, lost = fleet.selected.view.link.received, fleet.selected.view.link.lost
     assert lost > 0
     assert quality.loss == pytest.approx(lost / (received + lost), abs=0.2)

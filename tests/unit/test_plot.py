@@ -257,3 +257,9 @@ def test_curves_of_received_and_missing_fields():
     assert choices["ATTITUDE.roll"].note() == "11.46 deg"
     assert choices["ATTITUDE.yaw"].colour is None
     assert choices["VFR_HUD.alt"].note() == "not received"
+
+
+def test_search_tries_each_start_of_a_word_once() -> None:
+    name = "ab" * 100
+    assert search("ab" * 30 + "c", [name]) == []  # with one try per choice of letters it would not end
+    assert search("ab" * 30, [name])[0].positions == tuple(range(60))

@@ -221,3 +221,10 @@ def test_a_small_window_says_that_no_mission_is_loaded_and_shows_no_negative_zer
     text = drawn(compact, view, 40, 10)
     assert "altitude 0.0 m" in text
     assert "mission  none loaded" in text
+
+
+@pytest.mark.parametrize("width", range(30, 100))
+def test_number_of_vehicles_is_shown_with_the_vehicle_only(width: int) -> None:
+    assert FULL.identity is not None
+    (line,) = status_line(FULL, 0.0, width, 1, DARK, vehicles=3, commands_all=True)
+    assert (" of 3" in line.plain) == (f"{FULL.identity.kind} {FULL.identity.system_id} of 3" in line.plain)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from functools import lru_cache
 from typing import NamedTuple
@@ -41,18 +40,28 @@ def _match(words: tuple[str, ...], name: str) -> Match | None:
 def _best(word: str, name: str) -> tuple[float, tuple[int, ...]] | None:
     """Return score and positions of the shortest stretch of ``name`` with the letters of ``word`` in order."""
     best: tuple[float, tuple[int, ...]] | None = None
-    for match in _pattern(word).finditer(name):
-        positions = tuple(match.start(group) for group in range(1, len(word) + 1))
-        gaps = positions[-1] - positions[0] + 1 - len(word)
-        score = (_WHOLE if not gaps else 50.0 - gaps) - positions[0] * 0.01
-        if positions[0] == 0 or name[positions[0] - 1] in _BOUNDARIES:
+    start = name.find(word[0])
+    while start >= 0 and (positions := _positions(word, name, start)) is not None:
+        gaps = positions[-1] - start + 1 - len(word)
+        score = (_WHOLE if not gaps else 50.0 - gaps) - start * 0.01
+        if start == 0 or name[start - 1] in _BOUNDARIES:
             score += _BOUNDARY
         if best is None or score > best[0]:
             best = (score, positions)
+        start = name.find(word[0], start + 1)
     return best
 
 
-@lru_cache(maxsize=64)
-def _pattern(word: str) -> re.Pattern[str]:
-    letters = ".*?".join(f"({re.escape(letter)})" for letter in word)
-    return re.compile(f"(?={letters})")
+def _positions(word: str, name: str, start: int) -> tuple[int, ...] | None:
+    """Return where each letter of ``word`` comes next in ``name`` from ``start`` on; None if one does not.
+
+    The nearest letters leave the most of the name to the next ones, so no other choice has to be tried.
+    """
+    positions = []
+    for letter in word:
+        start = name.find(letter, start)
+        if start < 0:
+            return None
+        positions.append(start)
+        start += 1
+    return tuple(positions)
