@@ -16,6 +16,7 @@ from tests.fuzz.clients import SERVICES
 from tests.fuzz.inputs import KINDS
 from tests.fuzz.memory_logs import MemoryLogs
 from tests.fuzz.script import Style, of_frames, restyled, written
+from tests.support.tools import NIGHTLY
 from tests.support.truth import World
 
 _HERE = ("192.0.2.1", 18570)
@@ -43,11 +44,16 @@ def conversation(make: Callable[[], Service]) -> tuple[list[bytes], list[bytes]]
 
 
 def every_message() -> list[bytes]:
-    """Return a script for each message: zeros for everyone, then ones."""
-    return [
+    """Return scripts of all messages, each with zeros for everyone, then with ones.
+
+    Eight messages share a script, for which a vehicle is made; with NIGHTLY=1 each has its own.
+    """
+    messages = [
         bytes((Style.FRAME, number, 1, 0, Style.FRAME, number, 255)) + b"\1" * 255
         for number in range(len(KINDS))
     ]
+    together = 1 if NIGHTLY else 8
+    return [b"".join(messages[at : at + together]) for at in range(0, len(messages), together)]
 
 
 def commands() -> list[bytes]:

@@ -16,6 +16,7 @@ from flightstack.services.routing.peer import PeerAddress
 from tests.fuzz.inputs import KINDS, Inputs
 from tests.fuzz.measure import calls, held
 from tests.support.plan_items import item
+from tests.support.tools import NIGHTLY
 from tests.support.truth import World
 
 MESSAGES = 8_000
@@ -158,7 +159,7 @@ def test_mutated_sessions_of_a_real_client() -> None:
         mavlink.MAVLink_log_request_list_message(1, 1, 0, 65535),
     ]
     inputs = Inputs(seed=41)
-    for story in range(300):
+    for story in range(300 if NIGHTLY else 100):
         frames = [link.encode(message) for message in messages]
         for frame in inputs.mutated(frames):
             world.engine.stack.ground.receive(address(story % 3), frame, world.time_s)

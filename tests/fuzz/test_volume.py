@@ -1,4 +1,4 @@
-"""Tens of thousands of seeded inputs on the vehicle's ground links: plain, signed and as a stream over TCP.
+"""Seeded inputs on the vehicle's ground links, 10,000 by day: plain, signed and as a stream over TCP.
 
 A guard stands behind every single one: see ``tests.fuzz.guard``. The vehicle has logs to be asked for.
 """
@@ -31,9 +31,9 @@ from tests.support.truth import World
 INPUTS = (
     {"plain": 80_000, "signed": 60_000, "stream": 60_000}
     if NIGHTLY
-    else dict.fromkeys(("plain", "signed", "stream"), 20_000)
+    else dict.fromkeys(("plain", "signed", "stream"), 10_000)
 )
-A_WORLD = 10_000
+A_WORLD = 10_000 if NIGHTLY else 5_000
 """Inputs until the vehicle is a new one: it may have been told to erase its logs, or to end its flight."""
 A_TICK = 100
 PEERS = [PeerAddress(GROUND, "192.0.2.7", number) for number in range(12)]

@@ -3,11 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
 from tests.interop.client import Client
 from tests.interop.stack import RealVehicle
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the tests of a file at one speed side by side, the slowest first: each change costs vehicle and clients."""
+    files = {path: number for number, path in enumerate(dict.fromkeys(item.path for item in items))}
+    items.sort(key=lambda item: (files[item.path], speed_of(item)))
+
+
+def speed_of(item: pytest.Item) -> float:
+    """Return the speed of the client of a test, 0 if it has none."""
+    callspec = getattr(item, "callspec", None)
+    client = callspec.params.get("client") if callspec else None
+    return float(client[0]) if client and item.path.parent == Path(__file__).parent else 0.0
 
 
 class Fleet:
@@ -73,8 +87,11 @@ def client(request: pytest.FixtureRequest, fleet: Fleet) -> Iterator[Client]:
 
 
 @pytest.fixture(scope="module")
-def station_vehicle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealVehicle]:
-    """A vehicle at ten times real time for ground stations that bind its UDP ports themselves."""
-    vehicle = RealVehicle(tmp_path_factory.mktemp("station-vehicle"), 10.0)
+def station_vehicle(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[RealVehicle]:
+    """A vehicle at ``SPEED`` of the file, else ten times real time; ground stations bind its UDP ports themselves."""
+    speed = getattr(request.module, "SPEED", 10.0)
+    vehicle = RealVehicle(tmp_path_factory.mktemp("station-vehicle"), speed)
     yield vehicle
     vehicle.stop()

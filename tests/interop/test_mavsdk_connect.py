@@ -11,7 +11,7 @@ from tests.interop.drone import Drone
 LINKS = (API, GROUND, TCP)
 
 
-@story(links=LINKS)
+@story(speeds=(1,), links=LINKS)
 async def test_the_vehicle_is_found_and_says_what_it_is(drone: Drone) -> None:
     assert await drone.system.is_connected()
     assert (await drone.system.autopilot_type()).name == "PX4"

@@ -45,7 +45,7 @@ fetch_log.story = fetch_log  # type: ignore[attr-defined]  # run by the test bel
 
 @pytest.mark.parametrize(
     ("client", "flies"),
-    [((10.0, API), True), ((10.0, TCP), False)],
+    [((10.0, API), True), ((1.0, TCP), False)],
     indirect=("client",),
     ids=("a flight over UDP", "armed only over TCP"),
 )
@@ -73,7 +73,7 @@ async def fetch_from_a_day(drone: Drone, directory: str) -> None:
 fetch_from_a_day.story = fetch_from_a_day  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize("client", [(10.0, TCP)], indirect=True, ids=(TCP,))
+@pytest.mark.parametrize("client", [(1.0, TCP)], indirect=True, ids=(TCP,))
 def test_logs_lie_where_px4_keeps_them(client: Client, tmp_path: Path) -> None:
     """It stands behind the tests that leave logs."""
     client.run(fetch_from_a_day, directory=str(tmp_path))
@@ -92,7 +92,7 @@ async def fetch_metadata(drone: Drone, directory: str) -> None:
 fetch_metadata.story = fetch_metadata  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize("client", [(10.0, API), (10.0, TCP)], indirect=True, ids=(API, TCP))
+@pytest.mark.parametrize("client", [(1.0, API), (1.0, TCP)], indirect=True, ids=(API, TCP))
 def test_the_vehicles_metadata_is_read_as_a_file(client: Client, tmp_path: Path) -> None:
     client.run(fetch_metadata, directory=str(tmp_path))
     plain, burst = ((tmp_path / folder / Path(GENERAL).name).read_bytes() for folder in ("False", "True"))
@@ -114,6 +114,6 @@ async def miss_and_write(drone: Drone, directory: str) -> None:
 miss_and_write.story = miss_and_write  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize("client", [(10.0, API)], indirect=True, ids=(API,))
+@pytest.mark.parametrize("client", [(1.0, API)], indirect=True, ids=(API,))
 def test_what_is_not_there_and_what_would_change_a_file_is_refused(client: Client, tmp_path: Path) -> None:
     client.run(miss_and_write, directory=str(tmp_path))

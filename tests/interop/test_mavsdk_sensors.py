@@ -13,6 +13,9 @@ from tests.interop.conftest import Fleet
 from tests.interop.drone import Drone
 from tests.interop.stack import RealVehicle
 
+SPEED = 4.0
+"""Some ten seconds of simulated time pass until the sensors are healthy; most tests wait for MAVSDK."""
+
 
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
@@ -36,13 +39,13 @@ def is_all_ok(health: Health) -> bool:
     )
 
 
-@story(links=(API,))
+@story(speeds=(SPEED,), links=(API,))
 async def test_every_sensor_becomes_healthy(drone: Drone) -> None:
     await drone.until("health", drone.telemetry.subscribe_health(), is_all_ok)
     await drone.until("health all ok", drone.telemetry.subscribe_health_all_ok(), bool)
 
 
-@story(links=(API,))
+@story(speeds=(SPEED,), links=(API,))
 async def test_sensors_of_a_standing_vehicle_are_measured(drone: Drone) -> None:
     def has_all(imu: Imu) -> bool:
         return imu.magnetic_field_frd.down_gauss != 0.0 and imu.temperature_degc != 0.0
@@ -57,7 +60,7 @@ async def test_sensors_of_a_standing_vehicle_are_measured(drone: Drone) -> None:
     assert pressure.absolute_pressure_hpa == pytest.approx(956.0, abs=5.0), pressure  # at 488 m
 
 
-@story(links=(API,))
+@story(speeds=(SPEED,), links=(API,))
 async def test_receiver_has_a_fix_with_accuracies(drone: Drone) -> None:
     gps = await drone.until("gps", drone.telemetry.subscribe_gps_info())
     assert gps.fix_type.value >= 3, gps
@@ -72,7 +75,7 @@ async def test_receiver_has_a_fix_with_accuracies(drone: Drone) -> None:
     assert all(covariance[at] > 0.0 for at in (0, 6, 11, 15, 18, 20)), covariance
 
 
-@story(links=(API,))
+@story(speeds=(SPEED,), links=(API,))
 async def test_rates_of_sensors_may_be_set(drone: Drone) -> None:
     for name in ("imu", "scaled_imu", "gps_info"):
         drone.step(name)

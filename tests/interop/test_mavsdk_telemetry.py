@@ -50,7 +50,7 @@ async def test_a_fast_simulation_does_not_flood_the_client(drone: Drone) -> None
     assert took_s >= 0.5 * (COUNTED - 1) / 20.0, took_s
 
 
-@story()
+@story(speeds=(1,))
 async def test_every_rate_may_be_set(drone: Drone) -> None:
     for name in (
         "position", "home", "in_air", "landed_state", "attitude_quaternion", "attitude_euler", "velocity_ned",
@@ -61,14 +61,14 @@ async def test_every_rate_may_be_set(drone: Drone) -> None:
         await getattr(drone.telemetry, f"set_rate_{name}")(5.0)
 
 
-@story()
+@story(speeds=(1,))
 async def test_a_rate_of_what_the_vehicle_has_not_is_refused(drone: Drone) -> None:
     with pytest.raises(TelemetryError) as refused:
         await drone.telemetry.set_rate_distance_sensor(5.0)
     assert refused.value.result.name in ("UNSUPPORTED", "COMMAND_DENIED")
 
 
-@story(links=(API, TCP))
+@story(speeds=(1,), links=(API, TCP))
 async def test_the_vehicle_tells_its_state(drone: Drone) -> None:
     telemetry = drone.telemetry
     battery = await drone.until("battery", telemetry.subscribe_battery())
@@ -97,7 +97,7 @@ async def test_the_vehicle_tells_its_state(drone: Drone) -> None:
     assert origin.latitude_deg == pytest.approx(position.latitude_deg, abs=0.01)
 
 
-@story()
+@story(speeds=(1,))
 async def test_reasons_arrive_as_texts(drone: Drone) -> None:
     texts = drone.telemetry.subscribe_status_text()
     waiting = drone.later("a text", texts, lambda text: "Armed" in text.text)

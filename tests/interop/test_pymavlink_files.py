@@ -16,6 +16,8 @@ from tests.interop.witness import Witness
 from tests.support.process import BOUND_S
 
 LOG_DATA_SIZE = 90
+SPEED = 1.0
+"""None of the tests flies."""
 
 
 @pytest.fixture
@@ -23,6 +25,20 @@ def script(station_vehicle: RealVehicle) -> Iterator[Witness]:
     script = Witness(f"tcp:{HOST}:{station_vehicle.tcp_port}", 1 + station_vehicle.instance)
     yield script
     script.close()
+
+
+class WaitingLink:
+    """The connection, on which pymavlink's client waits: it polls, which takes a core for seconds."""
+
+    def __init__(self, connection: Any) -> None:
+        self._connection = connection
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._connection, name)
+
+    def recv_match(self, **options: Any) -> Any:
+        """Return the next message that fits, or None after ``timeout``."""
+        return self._connection.recv_match(**{"blocking": "timeout" in options, **options})
 
 
 class PatientFtp(MAVFTP):  # type: ignore[misc]
@@ -35,7 +51,7 @@ class PatientFtp(MAVFTP):  # type: ignore[misc]
 @pytest.fixture
 def files(script: Witness) -> MAVFTP:
     """It counts as idle when it has sent nothing for a while, also in a burst: its own 3.7 s may be too short."""
-    files = PatientFtp(script.connection, script.system, 1)
+    files = PatientFtp(WaitingLink(script.connection), script.system, 1)
     files.ftp_settings.idle_detection_time = BOUND_S / 2
     return files
 
@@ -70,7 +86,7 @@ def test_parameters_come_in_one_file_with_their_defaults(files: MAVFTP, tmp_path
 
 
 def test_nothing_is_written_and_nothing_found_that_is_not_there(script: Witness, tmp_path: Path) -> None:
-    files = MAVFTP(script.connection, script.system, 1)  # a refusal ends when the client is idle
+    files = MAVFTP(WaitingLink(script.connection), script.system, 1)  # a refusal ends when the client is idle
     assert files.cmd_rm([GENERAL]).error_code == FtpError.FileProtected
     assert files.cmd_mkdir(["/somewhere"]).error_code == FtpError.FileProtected
     files.cmd_get(["/no/such/file", str(tmp_path / "nothing")])

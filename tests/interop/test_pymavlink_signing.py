@@ -22,7 +22,7 @@ def signed_vehicle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealVeh
     path = directory / "key"
     with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT, 0o600), "w") as file:
         file.write(KEY.hex())
-    vehicle = RealVehicle(directory, 10.0, "--signing-key", str(path))
+    vehicle = RealVehicle(directory, 1.0, "--signing-key", str(path))
     yield vehicle
     vehicle.stop()
 

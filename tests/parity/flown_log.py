@@ -47,8 +47,11 @@ def log_digest(plan: str, controller: str) -> str:
     return digest([world.flight().log.content])
 
 
+def digests(plan: str) -> dict[str, str]:
+    """Digests of the libraries and of each controller's log."""
+    return library_digests() | {law: log_digest(plan, law) for law in CONTROLLERS}
+
+
 if __name__ == "__main__":
-    for library, made in library_digests().items():
-        print(library, made)
-    for law in CONTROLLERS:
-        print(law, log_digest(sys.argv[1], law))
+    for name, made in digests(sys.argv[1]).items():
+        print(name, made)

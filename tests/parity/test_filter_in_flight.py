@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,12 @@ def flight(**options: Any) -> np.ndarray:
     return np.array(states)
 
 
+@functools.cache
+def flight_in_c() -> np.ndarray:
+    """Fly with filter and loops in C in this process."""
+    return flight(loops="c")
+
+
 def test_flight_on_the_filter_in_c_in_double_has_the_bits_of_python(monkeypatch: pytest.MonkeyPatch) -> None:
     here = flight()
     monkeypatch.setattr(assembly, "make_filter", lambda loops: HostFilter("double"))
@@ -36,6 +43,6 @@ def test_flight_on_the_filter_in_c_in_double_has_the_bits_of_python(monkeypatch:
 
 @pytest.mark.parametrize("loops", ["host", "emulated"])
 def test_flight_on_a_target_has_the_bits_of_c_in_this_process(loops: str) -> None:
-    here, there = flight(loops="c"), flight(loops=loops)
+    here, there = flight_in_c(), flight(loops=loops)
     assert np.array_equal(here, there)
     assert here[-1, 2] < -1.5

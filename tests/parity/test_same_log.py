@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.parity import flown_log
 from tests.parity.flown_log import CONTROLLERS
 from tests.support.tools import NIGHTLY
 
@@ -37,10 +38,15 @@ SETTINGS = {
 }
 
 
+PLAN = "square.plan"
+
+
 @functools.cache
 def digests(*libraries: str) -> dict[str, str]:
-    """Digests of libraries and logs in a process with the settings of these libraries."""
-    command = [sys.executable, "-m", "tests.parity.flown_log", "square.plan"]
+    """Digests of libraries and logs in a process with the settings of these libraries; without any, in this one."""
+    if not libraries:
+        return flown_log.digests(PLAN)
+    command = [sys.executable, "-m", "tests.parity.flown_log", PLAN]
     environment = {
         **os.environ,
         **{name: value for one in libraries for name, value in SETTINGS[one].items()},

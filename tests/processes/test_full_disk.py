@@ -17,7 +17,7 @@ ROOM = 60_000
 
 
 def test_a_disk_full_in_flight_is_told_once_and_the_flight_goes_on(tmp_path: Path) -> None:
-    with vehicle(tmp_path, "--log", "flight.ulg", "--params", "none") as there:
+    with vehicle(tmp_path, "--log", "flight.ulg", "--params", "none", speed=10) as there:
         limits = resource.prlimit(there.stack.pid, resource.RLIMIT_FSIZE, (ROOM, resource.RLIM_INFINITY))
         link = ("--connect", there.link, "--timeout", "60")
         watch = Process("gcs_cli", *link, "watch")
@@ -51,7 +51,7 @@ def test_a_disk_full_in_flight_is_told_once_and_the_flight_goes_on(tmp_path: Pat
 
 
 def test_a_log_that_cannot_be_begun_is_told_once(tmp_path: Path) -> None:
-    with vehicle(tmp_path, "--log", "/dev/full", "--params", "none") as there:
+    with vehicle(tmp_path, "--log", "/dev/full", "--params", "none", speed=10) as there:
         link = ("--connect", there.link, "--timeout", "60")
         there.wait_until_healthy()
         assert gcs(*link, "takeoff", "--alt", 3).returncode == 0

@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 import os
 import signal
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from tests.support.commands import gcs
-from tests.support.process import Process, children_of
+from tests.support.process import Process, children_of, wait_until
+from tests.support.warm_children import warm_children
 
 SCENARIO = """\
 plan = "hop"
@@ -19,7 +21,7 @@ vehicle = "x_quad"
 state = "truth"
 [campaign]
 method = "latin-hypercube"
-flights = 6
+flights = 4
 [vary]
 wind.gust_m_s = { uniform = [0, 2] }
 simulated.body.mass_kg = { uniform = [1.3, 1.7] }
@@ -27,6 +29,13 @@ simulated.body.mass_kg = { uniform = [1.3, 1.7] }
 max_error_m = 0.6
 """
 WORKER = "gcs_cli.scenarios.worker"
+
+
+@pytest.fixture(autouse=True)
+def _warm() -> Iterator[None]:
+    """Fork the workers of campaigns in this process from the warm server; those of ``Process`` are new interpreters."""
+    with warm_children():
+        yield
 
 
 @pytest.fixture
@@ -45,32 +54,30 @@ def results(folder: Path) -> dict[str, bytes]:
     return {name: (folder / name).read_bytes() for name in ("flights.parquet", "flights.csv", "report.html")}
 
 
-def test_tables_are_the_same_with_one_worker_two_or_after_sigkill(folder: Path) -> None:
+def test_tables_are_the_same_with_one_worker_or_two_after_sigkill(folder: Path) -> None:
     whole = gcs("campaign", "c.toml", "--workers", 1, "--out", "one", "--csv", "--json")
     assert (whole.returncode, whole.stderr.count("gcs:")) == (0, 0)
     (summary,) = events(whole.stdout, "campaign")
-    assert (summary["flights"], summary["passed"]) == (6, 6)
-    assert gcs("campaign", "c.toml", "--workers", 2, "--out", "two", "--csv").returncode == 0
-    run = Process("gcs_cli", "campaign", "c.toml", "--workers", "2", "--out", "three", "--csv", "--json")
+    assert (summary["flights"], summary["passed"]) == (4, 4)
+    run = Process("gcs_cli", "campaign", "c.toml", "--workers", "2", "--out", "two", "--csv", "--json")
     run.wait_for('"event": "flight"')
     run.kill()
-    before = [json.loads(line)["flight"] for line in Path("three/flights.jsonl").read_text().splitlines()]
+    before = [json.loads(line)["flight"] for line in Path("two/flights.jsonl").read_text().splitlines()]
     assert before
-    rest = gcs("campaign", "c.toml", "--workers", 2, "--out", "three", "--csv", "--json")
+    rest = gcs("campaign", "c.toml", "--workers", 2, "--out", "two", "--csv", "--json")
     flown = [event["flight"] for event in events(rest.stdout, "flight")]
-    assert sorted(before + flown) == [1, 2, 3, 4, 5, 6]  # nothing twice
-    reports: list[dict[str, bytes]] = [results(folder / name) for name in ("one", "two", "three")]
-    for other in reports[1:]:
-        assert {**other, "report.html": b""} == {**reports[0], "report.html": b""}
+    assert sorted(before + flown) == [1, 2, 3, 4]  # nothing twice
+    one, two = results(folder / "one"), results(folder / "two")
+    assert {**two, "report.html": b""} == {**one, "report.html": b""}
 
 
 def test_a_campaign_that_is_over_flies_nothing_and_a_changed_one_is_refused(folder: Path) -> None:
-    (folder / "c.toml").write_text(SCENARIO.replace("= 6", "= 2"))
+    (folder / "c.toml").write_text(SCENARIO.replace("= 4", "= 2"))
     assert gcs("campaign", "c.toml", "-j", 1).returncode == 0
     written = Path("runs/campaign-c/flights.parquet").read_bytes()
     again = gcs("campaign", "c.toml", "-j", 1, "--json")
     assert (again.returncode, events(again.stdout, "flight")) == (0, [])
-    (folder / "c.toml").write_text(SCENARIO.replace("= 6", "= 2").replace("0.6", "0.5"))
+    (folder / "c.toml").write_text(SCENARIO.replace("= 4", "= 2").replace("0.6", "0.5"))
     refused = gcs("campaign", "c.toml", "-j", 1)
     assert refused.returncode == 2
     assert refused.stderr == (
@@ -81,7 +88,7 @@ def test_a_campaign_that_is_over_flies_nothing_and_a_changed_one_is_refused(fold
 
 
 def test_a_failed_flight_exits_with_1_and_flies_alone(folder: Path) -> None:
-    (folder / "c.toml").write_text(SCENARIO.replace("= 6", "= 2").replace("0.6", "0.0001"))
+    (folder / "c.toml").write_text(SCENARIO.replace("= 4", "= 2").replace("0.6", "0.0001"))
     ended = gcs("campaign", "c.toml", "-j", 1, "--out", "bad")
     assert ended.returncode == 1
     assert "FAIL  flight 1: max_error_m ≤ 0.0001; wind.gust_m_s " in ended.stdout
@@ -101,7 +108,7 @@ def test_a_failed_flight_exits_with_1_and_flies_alone(folder: Path) -> None:
     ids=["first", "overwrite"],
 )
 def test_ctrl_c_keeps_finished_flights(folder: Path, options: tuple[str, ...], command: str) -> None:
-    (folder / "c.toml").write_text(SCENARIO.replace("= 6", "= 500"))
+    (folder / "c.toml").write_text(SCENARIO.replace("= 4", "= 500"))
     run = Process("gcs_cli", "campaign", "c.toml", "--workers", "1", "--json", *options)
     run.wait_for('"event": "flight"')
     run.interrupt()
@@ -112,14 +119,11 @@ def test_ctrl_c_keeps_finished_flights(folder: Path, options: tuple[str, ...], c
 
 def test_a_killed_worker_leaves_its_flight_to_the_next_run(folder: Path) -> None:
     (folder / "c.toml").write_text(
-        SCENARIO.replace('plan = "hop"', "duration_s = 100000").replace("= 6", "= 1")
+        SCENARIO.replace('plan = "hop"', "duration_s = 100000").replace("= 4", "= 1")
     )
     run = Process("gcs_cli", "campaign", "c.toml", "--workers", "1")
-    while WORKER not in (children := children_of(run.popen.pid)):
-        assert run.is_running
-    while not Path("runs/campaign-c/campaign.json").exists():
-        assert run.is_running
-    os.kill(children[WORKER], signal.SIGKILL)
+    wait_until(lambda: Path("runs/campaign-c/campaign.json").exists() or not run.is_running)
+    os.kill(children_of(run.popen.pid)[WORKER], signal.SIGKILL)
     assert run.end() == 1
     ended = "the process that flew it was killed by signal 9; the same command flies it again"
     assert f"gcs: flight 1: {ended}" in run.lines
@@ -171,11 +175,12 @@ def test_a_search_continues_and_its_flights_fly_alone(folder: Path) -> None:
     table = Path("found/flights.parquet").read_bytes()
     journal = Path("found/flights.jsonl").read_bytes().splitlines(keepends=True)
     Path("found/flights.jsonl").write_bytes(b"".join(journal[:-3]))  # as after SIGKILL
-    again = gcs(*arguments)
+    again = gcs(*arguments, "--workers", 1)  # the first run had as many as processors
     assert len(events(again.stdout, "flight")) == 3
     assert Path("found/flights.parquet").read_bytes() == table
     alone = gcs(
-        "campaign", "s.toml", "--seek", "worst", "--out", "found", "--only", found["smallest"], "--json"
+        *("campaign", "s.toml", "--seek", "worst", "--out", "found"),
+        *("--only", found["smallest"], "--json"),
     )
     (flown,) = events(alone.stdout, "flight")
     assert flown["log_sha256"] == smallest["log_sha256"]

@@ -72,7 +72,7 @@ STEPS = [
 
 @pytest.fixture(scope="module")
 def flying(tmp_path_factory: pytest.TempPathFactory) -> Iterator[VehicleProcesses]:
-    with vehicle(tmp_path_factory.mktemp("walk"), "--param", "SYS_FAILURE_EN=1") as processes:
+    with vehicle(tmp_path_factory.mktemp("walk"), "--param", "SYS_FAILURE_EN=1", speed=10) as processes:
         processes.wait_until_healthy()
         yield processes
 

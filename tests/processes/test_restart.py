@@ -17,6 +17,7 @@ from flightstack.process.state_directory import StateDirectory
 from flightstack.transports.udp import UdpSocket
 from gcs_cli.clients.mission_client import Done, MissionClient
 from tests.support.commands import gcs
+from tests.support.process import wait_until
 from tests.support.vehicle_processes import LONG_S, VehicleProcesses, vehicle
 from tests.support.warm_children import warm_children
 
@@ -49,8 +50,7 @@ def as_uploaded(name: str) -> tuple[list[MissionItem], ...]:
 
 def wait_for_file(path: Path, text: str) -> None:
     """Wait until the file has been saved; a hang guard ends the test if it never is."""
-    while not path.exists() or text not in path.read_text():
-        pass
+    wait_until(lambda: path.exists() and text in path.read_text())
 
 
 def test_plans_home_and_parameters_survive_a_kill(tmp_path: Path) -> None:

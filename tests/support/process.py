@@ -12,7 +12,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from queue import Empty, Queue
 from typing import Any
@@ -63,6 +63,12 @@ def await_output(process: subprocess.Popen[Any], text: str) -> None:
         if not (more := os.read(process.stdout.fileno(), 4096)):
             return
         seen += more
+
+
+def wait_until(holds: Callable[[], object]) -> None:
+    """Wait until ``holds``, asked every 20 ms: a loop without a pause takes the processor from what it waits for."""
+    while not holds():
+        select.select([], [], [], 0.02)
 
 
 @contextlib.contextmanager

@@ -63,13 +63,14 @@ def wait_until_healthy(link: str) -> None:
 def vehicle(
     folder: Path,
     *arguments: object,
-    speed: object = 10,
+    speed: object = 1,
     with_simulator: bool = True,
     instance: int | None = None,
 ) -> Iterator[VehicleProcesses]:
     """Run both and end them at exit; ``arguments`` are those of the flight stack. Without ``instance``, a free one.
 
-    The vehicle flies on the true state: links and commands are tested, and sensors would cost a third of a core.
+    The vehicle flies on the true state: links and commands are tested, and sensors would cost a third of a core. One
+    that waits takes half of a core at ten times real time, so that a test gives a ``speed`` only if it flies.
     """
     instance = free_instance() if instance is None else instance
     with contextlib.ExitStack() as ends:

@@ -53,7 +53,7 @@ def test_vehicle_follows_its_setpoints_in_gusts(flown):
 
 
 def test_point_beyond_the_fence_ends_the_inspection(sitl_server):
-    server = sitl_server(vehicle="x_quad", speed=SPEED, params={"GF_MAX_HOR_DIST": 20.0})
+    server = sitl_server(vehicle="x_quad", state="truth", speed=SPEED, params={"GF_MAX_HOR_DIST": 20.0})
     flown = fly(server, [FACADE[0], FAR])
     assert flown.report == Report(photos=1, problem="point 1: COMMAND_DENIED")
     flown.flight.always("distance_to_home_m < 21")
@@ -64,7 +64,7 @@ def test_application_obeys_the_battery_failsafe(sitl_server):
     """10 % of the charge last 12 s in flight and minutes on the ground: it acts on the way to the far point."""
     params = {"BAT_LOW_THR": 0.31, "BAT_CRIT_THR": 0.3, "COM_LOW_BAT_ACT": 3, "RTL_RETURN_ALT": 5}
     battery = {"battery_percent": 40.0, "battery_drain": 10.0}
-    server = sitl_server(vehicle="x_quad", speed=SPEED, params=params, **battery)
+    server = sitl_server(vehicle="x_quad", state="truth", speed=SPEED, params=params, **battery)
     flown = fly(server, [FACADE[0], FAR])
     assert flown.report == Report(photos=1, problem="the vehicle changed to RETURN_TO_LAUNCH")
     flown.flight.eventually("landed and distance_to_home_m < 1.5 after mode_RETURN")
