@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import gc
 import re
 import statistics
 from collections import defaultdict
@@ -26,17 +27,33 @@ COLUMNS = (
 )
 LIBRARY_NAMES = {"_replace", "_fields", "_asdict", "_header", "_pack", "_timestamp", "_link", "_time"}
 """Private by their form: of named tuples, of messages of pymavlink, and a module of Textual."""
+_KINDS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 INDEX = re.compile(r"[A-Z]+_[A-Z0-9_]+$")
 
 
 @cache
 def sources(program: str) -> dict[str, ast.Module]:
-    """Return the modules of a program by name; packages are named without ``__init__``."""
+    """Return the modules of a program by name; packages are named without ``__init__``.
+
+    Without garbage collection, which finds nothing and would take two thirds of the time.
+    """
     found = {}
-    for path in sorted((ROOT / program).rglob("*.py")):
-        parts = path.relative_to(ROOT).with_suffix("").parts
-        found[".".join(parts).removesuffix(".__init__")] = ast.parse(path.read_text())
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        for path in sorted((ROOT / program).rglob("*.py")):
+            parts = path.relative_to(ROOT).with_suffix("").parts
+            found[".".join(parts).removesuffix(".__init__")] = ast.parse(path.read_text())
+    finally:
+        if collects:
+            gc.enable()
     return found
+
+
+@cache
+def nodes(program: str) -> dict[str, list[ast.AST]]:
+    """Return all nodes of each module of a program: most figures look at each of them."""
+    return {name: list(ast.walk(tree)) for name, tree in sources(program).items()}
 
 
 def lines(program: str) -> list[int]:
@@ -62,8 +79,7 @@ def has_one_small_definition(tree: ast.Module) -> bool:
 
 
 def _definitions(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef]:
-    kinds = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
-    return [node for node in tree.body if isinstance(node, kinds) and node.name != "__getattr__"]
+    return [node for node in tree.body if isinstance(node, _KINDS) and node.name != "__getattr__"]
 
 
 def is_own_module(tree: ast.Module) -> bool:
@@ -81,31 +97,33 @@ def long_functions(modules: dict[str, ast.Module]) -> Iterator[str]:
                     yield f"{name}.{node.name}: {length} lines"
 
 
-def private_names(modules: Iterable[ast.Module]) -> set[str]:
-    """Return the names with one underscore that modules define: functions, classes, constants and attributes."""
+def private_names(module: Iterable[ast.AST]) -> set[str]:
+    """Return the names with one underscore that a module defines: functions, classes, constants and attributes."""
     found = set()
-    for node in (node for tree in modules for node in ast.walk(tree)):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+    for node in module:
+        if isinstance(node, _KINDS):
             found.add(node.name)
-        elif isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store):
+        elif isinstance(node, (ast.Name, ast.Attribute)) and isinstance(node.ctx, ast.Store):
             found.add(node.id if isinstance(node, ast.Name) else node.attr)
     return {name for name in found if name.startswith("_") and not name.startswith("__")}
 
 
-def private_uses(modules: dict[str, ast.Module]) -> Iterator[str]:
-    """Yield each use of a private name of the programs in other ``modules``, with its place.
+def private_uses(modules: dict[str, list[ast.AST]]) -> Iterator[str]:
+    """Yield each use of a private name of the programs in the nodes of other ``modules``, with its place.
 
     Uses are attributes, imports, and texts of ``setattr`` and ``getattr``. Attributes of ``self`` count if no class of
     these modules has them; those of named tuples and of the libraries ``LIBRARY_NAMES`` do not.
     """
-    programs = (tree for program in PROGRAMS for tree in sources(program).values())
-    names = private_names(programs) - LIBRARY_NAMES
-    owned = {module: private_names([tree]) for module, tree in modules.items()}
+    defined = (private_names(module) for program in PROGRAMS for module in nodes(program).values())
+    names = set[str]().union(*defined) - LIBRARY_NAMES
+    owned = {name: private_names(module) for name, module in modules.items()}
     own = set[str]().union(*owned.values())
-    for module, tree in modules.items():
+    for module, found in modules.items():
         others = names - owned[module]
-        for node in ast.walk(tree):
-            yield from (f"{module}:{node.lineno}: {name}" for name in _used(node, own) if name in others)
+        for node in found:
+            for name in _used(node, own):
+                if name in others:
+                    yield f"{module}:{node.lineno}: {name}"  # type: ignore[attr-defined]  # those with names have one
 
 
 def _used(node: ast.AST, own: set[str]) -> list[str]:
@@ -138,6 +156,17 @@ def index_constants(tree: ast.Module) -> int:
     return sum(isinstance(part, ast.Name) and bool(INDEX.match(part.id)) for part in parts)
 
 
+def imported(module: Iterable[ast.AST]) -> set[str]:
+    """Return the names of the modules and members that a module imports."""
+    found: set[str] = set()
+    for node in module:
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
 def imports(name: str, tree: ast.Module, known: set[str]) -> Iterator[tuple[str, str]]:
     """Yield the packages of a module and of what it imports, where they differ."""
     for node in ast.walk(tree):
@@ -153,8 +182,9 @@ def imports(name: str, tree: ast.Module, known: set[str]) -> Iterator[tuple[str,
 def cycles(modules: dict[str, ast.Module]) -> list[str]:
     """Return the packages that reach themselves over their imports."""
     edges: dict[str, set[str]] = defaultdict(set)
+    known = set(modules)
     for name, tree in modules.items():
-        for ours, theirs in imports(name, tree, set(modules)):
+        for ours, theirs in imports(name, tree, known):
             edges[ours].add(theirs)
 
     def reaches(start: str) -> bool:

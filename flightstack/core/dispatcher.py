@@ -9,6 +9,7 @@ from types import FunctionType
 from typing import Any, ClassVar
 
 import numba
+import numpy as np
 from numba.core.caching import FunctionCache
 from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
@@ -29,6 +30,25 @@ else:
     from flightstack.core.compiled_builtins import register
 
     register(PartCompiler)  # type: ignore[arg-type]  # of no type
+
+
+_array_types: dict[tuple[Any, ...], numba.types.Type] = {}
+"""Types of arrays by what Numba derives them from."""
+
+
+def _type_of(example: Any) -> numba.types.Type:
+    """Return Numba's type of ``example``; that of an array of records takes Numba a millisecond, so it is kept."""
+    if type(example) is not np.ndarray:
+        return numba.typeof(example)
+    dtype, flags = example.dtype, example.flags
+    key = (
+        dtype, dtype.isalignedstruct, example.ndim,
+        flags.c_contiguous, flags.f_contiguous, flags.writeable, flags.aligned,
+    )  # fmt: skip
+    found = _array_types.get(key)
+    if found is None:
+        found = _array_types[key] = numba.typeof(example)
+    return found
 
 
 def _enable_cache(dispatcher: CPUDispatcher, modules: frozenset[str], cache: type[FunctionCache]) -> None:
@@ -80,6 +100,7 @@ class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]  # Numba has no typ
 
     def compiled_for(self, *examples: Any) -> Callable[..., Any]:
         """Return the compiled function for the types of ``examples``, which it does not check."""
-        types = tuple(numba.typeof(example) for example in examples)
-        self.compile(types)
+        types = tuple(map(_type_of, examples))
+        if types not in self.overloads:
+            self.compile(types)
         return self.get_overload(types)  # type: ignore[no-any-return]

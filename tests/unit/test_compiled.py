@@ -63,6 +63,16 @@ def test_a_kernel_called_directly_does_the_same_and_refuses_numbers_of_another_s
             kernel(numbers.astype(np.float32), 2.0)
 
 
+def test_direct_kernel_follows_the_layout_of_its_examples() -> None:
+    @compiled
+    def second(numbers: np.ndarray) -> float:  # type: ignore[type-arg]
+        return numbers[1]  # type: ignore[no-any-return]
+
+    dense, spread = np.array([3.0, 4.0]), np.array([3.0, 5.0, 4.0, 6.0])[::2]
+    assert direct(second, dense)(dense) == direct(second, spread)(spread) == 4.0
+    assert direct(second, np.zeros(2)) is direct(second, dense)
+
+
 def test_without_compilation_a_direct_kernel_is_the_function() -> None:
     def plain(x: float) -> float:
         return x

@@ -13,6 +13,7 @@ from flightstack.mavlink.link import Link
 from flightstack.mavlink.packed import Packing
 from flightstack.services.telemetry import motion, sensors
 from flightstack.services.telemetry.streams import GROUND_RATES_HZ
+from tests.support.tools import NIGHTLY
 
 PACKINGS = (*motion.PACKINGS, *sensors.PACKINGS)
 SINGLES = st.floats(width=32) | st.sampled_from([0.0, -0.0, math.nan, math.inf, -math.inf])
@@ -20,6 +21,9 @@ BEYOND = st.one_of(
     st.integers(-(2**70), 2**70), st.floats(), st.sampled_from([3.5e38, -1e300, math.nan, math.inf])
 )
 """Values of any field, most of them out of its range."""
+
+EXAMPLES = 60 if NIGHTLY else 15
+"""For each of 17 messages, whose fields have a few types: 255 examples by day."""
 
 
 def in_range(code: str) -> st.SearchStrategy[float]:
@@ -36,7 +40,7 @@ def assert_equals_pymavlink(packing: Packing, values: list[float]) -> None:
 
 
 @pytest.mark.parametrize("packing", PACKINGS, ids=lambda packing: packing.name)
-@settings(max_examples=60)
+@settings(max_examples=EXAMPLES)
 @given(data=st.data())
 def test_packed_message_has_pymavlinks_bytes(packing: Packing, data: st.DataObject) -> None:
     values = data.draw(st.tuples(*map(in_range, packing.codes)))
@@ -44,7 +48,7 @@ def test_packed_message_has_pymavlinks_bytes(packing: Packing, data: st.DataObje
 
 
 @pytest.mark.parametrize("packing", PACKINGS, ids=lambda packing: packing.name)
-@settings(max_examples=30)
+@settings(max_examples=EXAMPLES)
 @given(data=st.data())
 def test_packed_message_fits_values_out_of_range(packing: Packing, data: st.DataObject) -> None:
     size = len(packing.codes)

@@ -9,8 +9,10 @@ from tools.structure import (
     cycles,
     has_one_definition,
     has_one_small_definition,
+    imported,
     lines,
     long_functions,
+    nodes,
     private_uses,
     sources,
 )
@@ -48,4 +50,19 @@ def test_functions_of_more_than_40_lines_do_not_grow_in_number(program: str) -> 
 
 
 def test_tests_use_no_private_names_of_the_programs() -> None:
-    assert list(private_uses(sources("tests"))) == []
+    assert list(private_uses(nodes("tests"))) == []
+
+
+def test_no_module_imports_a_test_module() -> None:
+    """Tests share helpers by modules that hold no tests; tests/mutation calls tests on changed programs."""
+    modules = nodes("tests")
+    tests = {name for name in modules if name.rpartition(".")[2].startswith("test_")}
+    assert "tests.unit.test_structure" in tests
+    wrong = [
+        f"{module} imports {name}"
+        for module, found in modules.items()
+        if not module.startswith("tests.mutation.")
+        for name in sorted(imported(found))
+        if name in tests or name.rpartition(".")[0] in tests
+    ]
+    assert not wrong, "\n".join(wrong)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import lzma
 from collections.abc import Callable
+from functools import lru_cache
 
 from flightstack.mavlink import text_file
 from flightstack.mavlink.dialect import mavlink
@@ -68,8 +69,9 @@ class ComponentMetadata:
         return component_metadata_message(boot_ms, self._crc, f"mftp:///{GENERAL}.xz")
 
 
+@lru_cache(maxsize=4)
 def _compressed(content: bytes) -> bytes:
-    """Return ``content`` as .xz with CRC32, the checksum that every decoder supports."""
+    """Return ``content`` as .xz with CRC32, the checksum that every decoder supports. Kept: it takes milliseconds."""
     return lzma.compress(content, check=lzma.CHECK_CRC32, preset=1)
 
 
