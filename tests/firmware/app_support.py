@@ -52,15 +52,18 @@ def host_sources() -> list[Path]:
     return [*sources(*PORTABLE, *SENSING), *own]
 
 
-def build(output: Path, *flags: str, cc: Sequence[str] = (), program: bool = False) -> Path:
-    """Compile library or program into ``output``; the compiler's words are the failure."""
+def words(*flags: str, program: bool = False) -> list[str]:
+    """Return the arguments of a compiler for the library or the program, without the output."""
     folders = [f"-I{FIRMWARE / folder}" for folder in (*PORTABLE, *SENSING, "laws", "ports/host")]
     kind = [] if program else ["-shared", "-fPIC"]
     files = [*host_sources(), *([FIRMWARE / "ports/host" / PROGRAM] if program else [])]
-    command = [*(cc or compiler()), *WARNINGS, *flags, "-fno-math-errno", *kind, *folders, *map(str, files)]
-    done = subprocess.run(
-        [*command, "-lm", "-o", str(output)], capture_output=True, text=True, check=False, cwd=output.parent
-    )
+    return [*WARNINGS, *flags, "-fno-math-errno", *kind, *folders, *map(str, files), "-lm"]
+
+
+def build(output: Path, *flags: str, cc: Sequence[str] = (), program: bool = False) -> Path:
+    """Compile library or program into ``output``; a failure shows the compiler's messages."""
+    command = [*(cc or compiler()), *words(*flags, program=program), "-o", str(output)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=output.parent)
     assert done.returncode == 0, done.stderr
     return output
 

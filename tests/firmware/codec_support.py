@@ -240,6 +240,7 @@ def damaged(rng: random.Random, frame: bytes) -> bytes:
     return bytes(data)
 
 
+@functools.cache
 def stream(seed: int, parts: int) -> bytes:
     """Return frames, damaged frames and noise."""
     rng = random.Random(seed)

@@ -6,13 +6,13 @@ import ctypes
 import functools
 import os
 import shutil
-import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from flightstack.mavlink.dialect import mavlink
-from tests.firmware.codec_support import ROOT, WARNINGS, compile_c
+from tests.firmware.codec_support import ROOT, WARNINGS, compiler
+from tests.firmware.kept_builds import kept_build
 
 FIRMWARE = ROOT / "firmware"
 PORT = FIRMWARE / "ports" / "f28377s"
@@ -38,16 +38,14 @@ PORT_SOURCES = [RING, *sorted(file for file in PORT.glob("*.c") if file.name != 
 FLAGS = ["-fPIC", "-O2", *WARNINGS, *INCLUDE]
 
 
-@functools.cache
-def workshop() -> tempfile.TemporaryDirectory[str]:
-    """Return a folder for what is built; it goes away with the process."""
-    return tempfile.TemporaryDirectory(prefix="flightstack-f28377s-")
+def compiled(name: str, *words: str | Path) -> Path:
+    """Compile with the host's compiler."""
+    return kept_build(name, tuple(compiler()), *words)
 
 
-@functools.cache
 def portable() -> Path:
-    """Compile what all targets have in common into one object, once per run of the tests."""
-    return compile_c(Path(workshop().name) / "portable.o", PORTABLE, "-r", *FLAGS)
+    """Return what all targets have in common as one object."""
+    return compiled("portable.o", "-r", *FLAGS, *PORTABLE)
 
 
 def ti_folders(family: str = "f2837xs") -> list[Path] | None:
@@ -73,28 +71,24 @@ def chip_flags() -> list[str]:
     return [f"-I{FAKE}", *(["-DTI_REGISTERS", *ti_flags()] if ti_folders() else [f"-I{OWN_DRIVERLIB}"])]
 
 
-@functools.cache
 def chip() -> Path:
-    """Compile the simulated chip and driverlib into one object, once per run of the tests."""
+    """Return the simulated chip and driverlib as one object."""
     folders = ti_folders()
     names = ("sci.c", "interrupt.c", "gpio.c")
     library = [OWN_DRIVERLIB / "vectors.c"] if folders is None else [folders[0] / name for name in names]
     objects = [
-        compile_c(Path(workshop().name) / f"{path.stem}.o", [path], "-c", "-fPIC", "-O2", "-w", *chip_flags())
-        for path in library
+        compiled(f"{path.stem}.o", "-c", "-fPIC", "-O2", "-w", *chip_flags(), path) for path in library
     ]
     model = [*sorted(FAKE.glob("fake_*.c")), *objects]
-    flags = [*FLAGS, "-fno-strict-aliasing", *chip_flags()]
-    return compile_c(Path(workshop().name) / "chip.o", model, "-r", *flags)
+    return compiled("chip.o", "-r", *FLAGS, "-fno-strict-aliasing", *chip_flags(), *model)
 
 
 @functools.cache
 def built(*options: str) -> Path:
-    """Link the port with driverlib and the simulated chip into a library, once per set of options; main is left out."""
-    folder = Path(tempfile.mkdtemp(dir=workshop().name))
+    """Return a library of the port, driverlib and the simulated chip for a set of options; main is left out."""
     sources = [portable(), chip(), *PORT_SOURCES, FAKE / "bench.c"]
     here = [*chip_flags(), '-DF28_BOARD="simulated chip"', *options]
-    return compile_c(folder / "port.so", sources, "-shared", *FLAGS, *here)
+    return compiled("port.so", "-shared", *FLAGS, *here, *sources)
 
 
 class Board:

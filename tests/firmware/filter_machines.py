@@ -14,7 +14,7 @@ from flightstack.firmware.c_filter import FOLDERS, filter_sources
 from flightstack.firmware.emulator import MAX_RECEIVED, Emulator
 from flightstack.firmware.toolchain.build import EXACT, cached, host_compiler, includes
 from flightstack.firmware.toolchain.cortex_m4 import emulated_image, instruction_counter
-from tests.firmware.step_machines import hashes, run, tool
+from tests.firmware.step_machines import avr_program, hashes, run, run_avr
 from tests.support.filter_events import Event
 
 C = Path(__file__).parent / "c"
@@ -81,14 +81,5 @@ def on_cortex_m4(stream: bytes) -> tuple[np.ndarray, FilterCosts]:
 
 def on_avr(stream: bytes, folder: Path) -> np.ndarray:
     """Return the hashes of a simulated ATmega1284P, whose 128 KiB of flash hold the filter compiled for size."""
-    compiler, _ = tool("avr-gcc", "gcc-avr avr-libc"), tool("simavr", "simavr libsimavr-dev")
-    if not Path("/usr/include/simavr/sim_avr.h").exists():
-        tool("libsimavr-dev", "libsimavr-dev")
-    elf, simulator = folder / "filter_avr.elf", folder / "avr_simulator"
-    size = ["-mmcu=atmega1284p", "-Os", "-ffunction-sections", "-Wl,--gc-sections", *_SMALL]
-    flags = [*(flag for flag in EXACT if flag != "-O2"), *INCLUDES]
-    run([compiler, *size, *flags, *_sources("filter_avr.c"), "-o", elf])
-    run([*host_compiler().command, "-O2", C / "avr_simulator.c", "-lsimavr", "-o", simulator])
-    (folder / "events").write_bytes(stream)
-    run([simulator, elf, folder / "events", folder / "avr"])
-    return hashes((folder / "avr").read_bytes())
+    flags = ["-Os", *_SMALL, *(flag for flag in EXACT if flag != "-O2"), *INCLUDES]
+    return run_avr(avr_program("filter_avr.elf", *flags, *_sources("filter_avr.c")), stream, folder)

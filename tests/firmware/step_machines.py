@@ -16,6 +16,7 @@ from flightstack.firmware.emulator import MAX_RECEIVED, Emulator
 from flightstack.firmware.sources import c_files, firmware_root
 from flightstack.firmware.toolchain.build import EXACT, cached, host_compiler, includes
 from flightstack.firmware.toolchain.cortex_m4 import emulated_image, instruction_counter
+from tests.firmware.kept_builds import kept_build
 from tests.support.tools import missing
 
 C = Path(__file__).parent / "c"
@@ -76,10 +77,10 @@ def zig_image() -> Path:
     return emulated_image("steps.elf", sources, flags=[f"-I{C}", state_flag(*sources)])
 
 
-def gcc_image(folder: Path) -> Path:
+def gcc_image() -> Path:
     """Return the steps for the emulator, compiled by gcc file by file."""
     compiler = tool("arm-none-eabi-gcc", "gcc-arm-none-eabi")
-    port, image = firmware_root() / "ports" / "cortex_m4", folder / "steps_gcc.elf"
+    port = firmware_root() / "ports" / "cortex_m4"
     cpu = [
         "-mthumb",
         "-mcpu=cortex-m4",
@@ -91,8 +92,7 @@ def gcc_image(folder: Path) -> Path:
     link = [f"-Wl,-T,{port / 'emulated.ld'}", "-Wl,-e,fs_emulated_exchange", "-ffunction-sections"]
     own = [port / "emulated_start.c", port / "support.c", C / "steps_cortex_m4.c"]
     flags = [*cpu, *link, *EXACT, *INCLUDES, f"-I{port}"]
-    run([compiler, *flags, *LOOPS, *STEPS, *own, "-lgcc", "-o", image])
-    return image
+    return kept_build("steps_gcc.elf", (compiler,), *flags, *LOOPS, *STEPS, *own, "-lgcc")
 
 
 def on_cortex_m4(stream: bytes, image: Path) -> tuple[np.ndarray, Costs]:
@@ -111,29 +111,41 @@ def on_cortex_m4(stream: bytes, image: Path) -> tuple[np.ndarray, Costs]:
     )
 
 
-def on_avr(stream: bytes, folder: Path) -> np.ndarray:
-    """Run the steps on a simulated ATmega1284P, whose int has 16 bits and whose float arithmetic is a library."""
-    compiler, _ = tool("avr-gcc", "gcc-avr avr-libc"), tool("simavr", "simavr libsimavr-dev")
+def avr_program(name: str, *words: str | Path) -> Path:
+    """Return a program for a simulated ATmega1284P."""
+    compiler = tool("avr-gcc", "gcc-avr avr-libc")
+    return kept_build(
+        name, (compiler, "-mmcu=atmega1284p"), "-ffunction-sections", "-Wl,--gc-sections", *words
+    )
+
+
+def run_avr(program: Path, stream: bytes, folder: Path) -> np.ndarray:
+    """Give octets to a program on a simulated ATmega1284P; return the hashes."""
+    tool("simavr", "simavr libsimavr-dev")
     if not Path("/usr/include/simavr/sim_avr.h").exists():
         tool("libsimavr-dev", "libsimavr-dev")
-    elf, simulator = folder / "steps_avr.elf", folder / "avr_simulator"
-    size = ["-mmcu=atmega1284p", "-ffunction-sections", "-Wl,--gc-sections"]
-    run([compiler, *size, *EXACT, *INCLUDES, *LOOPS, *STEPS, C / "steps_avr.c", "-o", elf])
-    run([*host_compiler().command, "-O2", C / "avr_simulator.c", "-lsimavr", "-o", simulator])
-    (folder / "steps").write_bytes(stream)
-    run([simulator, elf, folder / "steps", folder / "avr"])
+    simulator = kept_build("avr_simulator", host_compiler().command, "-O2", C / "avr_simulator.c", "-lsimavr")
+    (folder / "stream").write_bytes(stream)
+    run([simulator, program, folder / "stream", folder / "avr"])
     return hashes((folder / "avr").read_bytes())
 
 
-def aarch64() -> list[str]:
-    """Return the command that compiles a program for aarch64, with its libraries in it."""
-    return [tool("aarch64-linux-gnu-gcc", "gcc-aarch64-linux-gnu libc6-dev-arm64-cross"), "-static"]
+def on_avr(stream: bytes, folder: Path) -> np.ndarray:
+    """Run the steps on a simulated ATmega1284P, whose int has 16 bits and whose float arithmetic is a library."""
+    program = avr_program("steps_avr.elf", *EXACT, *INCLUDES, *LOOPS, *STEPS, C / "steps_avr.c")
+    return run_avr(program, stream, folder)
+
+
+def aarch64_program(name: str, *words: str | Path) -> Path:
+    """Return a program for aarch64, with its libraries in it."""
+    compiler = tool("aarch64-linux-gnu-gcc", "gcc-aarch64-linux-gnu libc6-dev-arm64-cross")
+    return kept_build(name, (compiler, "-static"), *words)
 
 
 def on_aarch64(stream: bytes, folder: Path, contract: str = "off") -> np.ndarray:
     """Run the steps on aarch64 in QEMU; ``contract``: the value of -ffp-contract."""
-    elf, flags = folder / "steps_aarch64", [*EXACT, f"-ffp-contract={contract}", *INCLUDES]
-    run([*aarch64(), *flags, *LOOPS, *STEPS, C / "steps_host.c", "-o", elf])
+    flags = [*EXACT, f"-ffp-contract={contract}", *INCLUDES]
+    elf = aarch64_program("steps_aarch64", *flags, *LOOPS, *STEPS, C / "steps_host.c")
     (folder / "steps").write_bytes(stream)
     run([tool("qemu-aarch64", "qemu-user"), elf, folder / "steps", folder / "aarch64"])
     return hashes((folder / "aarch64").read_bytes())

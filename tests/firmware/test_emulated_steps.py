@@ -29,7 +29,7 @@ from tests.firmware.step_machines import (
 from tests.firmware.step_streams import flown_steps, parameter_frame, random_steps
 from tests.support.tools import NIGHTLY
 
-RANDOM_STEPS = 100_000 if NIGHTLY else 20_000
+RANDOM_STEPS = 100_000 if NIGHTLY else 6_000
 CALM_PLAN = "square.plan" if NIGHTLY else "hop.plan"
 COMPILERS = ["zig", "gcc"] if NIGHTLY else ["zig"]
 """Of the missions; the random steps, which run both laws, are compiled by both."""
@@ -62,15 +62,9 @@ def random_stream() -> bytes:
 
 
 @pytest.fixture(scope="module")
-def images(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """Return a function that gives the steps for the emulator, by compiler."""
-    return cache(lambda name: zig_image() if name == "zig" else gcc_image(tmp_path_factory.mktemp("gcc")))
-
-
-@pytest.fixture(scope="module")
-def emulated(images: Callable[[str], Path]) -> Emulated:
+def emulated() -> Emulated:
     """Return a function that runs each stream once on the emulator, by compiler: bits and costs are of one run."""
-    return cache(lambda stream, name: on_cortex_m4(stream, images(name)))
+    return cache(lambda stream, name: on_cortex_m4(stream, zig_image() if name == "zig" else gcc_image()))
 
 
 @pytest.mark.parametrize("name", ["zig", "gcc"])

@@ -91,39 +91,41 @@ def test_every_source_is_compiled_as_the_core_demands(tmp_path: Path) -> None:
         ):
             assert option in call
         assert "-D_LAUNCHXL_F28377S" in call
+    assert_linked(calls, "flash", 1536)
     (run,) = [call for call in calls if "/f28_run.c " in call]
     assert hash_in(Path(re.findall(r"--preinclude=(\S+)", run)[0])) == source_hash()
 
 
-def test_the_f28379d_is_built_with_its_own_files_of_ti(tmp_path: Path) -> None:
-    calls = commands(tmp_path, "-DF28_LAUNCHPAD=F28379D")
+def assert_linked(calls: list[str], memory: str, stack_words: int) -> None:
+    """Memory and stack are those of the linker; the painted stack is the linked one."""
+    *compiled, link = calls
+    assert "--run_linker" in link
+    assert f"linker/{memory}.cmd" in link
+    assert f"--stack_size={stack_words}" in link
+    own = [call for call in compiled if "/f28_" in call]
+    assert own
+    assert all(f"-DF28_STACK_WORDS={stack_words}U" in call for call in own)
+    assert all(("-D_FLASH" in call) == (memory == "flash") for call in own)
+
+
+def test_every_option_of_the_build_has_its_effect(tmp_path: Path) -> None:
+    """The other launchpad with its own files of TI, loops from RAM, the TMU, linked into RAM with another stack."""
+    options = ("LAUNCHPAD=F28379D", "RAMFUNCS=ON", "MATH=relaxed", "MEMORY=ram", "STACK_WORDS=1024")
+    calls = commands(tmp_path, *(f"-DF28_{option}" for option in options))
     own = [call for call in calls if "/f28_" in call and "--c_file=" in call]
     assert own
     assert all("-D_LAUNCHXL_F28379D" in call for call in own)
     assert not [call for call in calls if "2837xs" in call.lower()]
     assert any("/F2837xD_CodeStartBranch.asm" in call for call in calls)
-
-
-def test_loops_from_ram_and_the_tmu_are_options_of_the_build(tmp_path: Path) -> None:
-    calls = [
-        call for call in commands(tmp_path, "-DF28_RAMFUNCS=ON", "-DF28_MATH=relaxed") if "--c_file=" in call
-    ]
+    assert_linked(calls, "ram", 1024)
+    compiled = [call for call in calls if "--c_file=" in call]
     in_ram = {
-        Path(re.findall(r"--c_file=(\S+)", call)[0]).parent.name for call in calls if "--ramfunc=on" in call
+        Path(re.findall(r"--c_file=(\S+)", call)[0]).parent.name
+        for call in compiled
+        if "--ramfunc=on" in call
     }
     assert in_ram == {"core"}
-    assert all("--fp_mode=relaxed" in call for call in calls if "/core/" in call)
-
-
-@pytest.mark.parametrize("memory", ["flash", "ram"])
-def test_the_memory_that_was_chosen_is_linked(memory: str, tmp_path: Path) -> None:
-    *compiled, link = commands(tmp_path, f"-DF28_MEMORY={memory}", "-DF28_STACK_WORDS=1024")
-    assert "--run_linker" in link
-    assert f"linker/{memory}.cmd" in link
-    assert "--stack_size=1024" in link
-    own = [call for call in compiled if "/f28_" in call]
-    assert all("-DF28_STACK_WORDS=1024U" in call for call in own)  # the painted stack is the linked one
-    assert all(("-D_FLASH" in call) == (memory == "flash") for call in own)
+    assert all("--fp_mode=relaxed" in call for call in compiled if "/core/" in call)
 
 
 @pytest.mark.parametrize(

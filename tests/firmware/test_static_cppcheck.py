@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import sys
 import tomllib
 from fnmatch import fnmatch
 from pathlib import Path
@@ -30,7 +31,10 @@ BUILD = [
     *("-D__TMS320C28XX__", "-DCPU1", "-D_LAUNCHXL_F28377S", "-U__GNUC__", "-UFS_DOUBLE", "-U__cplusplus"),
 ]
 """As cl2000 would see the sources; a -D also keeps cppcheck from trying other configurations."""
-CHECKS = ["--enable=warning,style,performance,portability", f"--template={TEMPLATE}", "--quiet", "-j2"]
+CHECKS = [
+    *("--enable=warning,style,performance,portability", f"--template={TEMPLATE}", "--quiet", "-j2"),
+    f"--addon-python={sys.executable}",  # else it starts python3 twice for each file, to find out whether there is one
+]
 MISRA = "misra-c2012-"
 
 
