@@ -13,6 +13,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ JOURNAL, RECORD = "flights.jsonl", "campaign.json"
 RESULTS = PARQUET, CSV, REPORT = "flights.parquet", "flights.csv", "report.html"
 _FORM = 1
 """Version of the directory's form."""
+_SOURCES = frozenset((".py", ".toml", ".xml", ".c", ".h"))
 
 
 def record_of(kind: str, files: Mapping[str, bytes], flights: Sequence[PlannedFlight]) -> dict[str, Any]:
@@ -36,9 +38,27 @@ def record_of(kind: str, files: Mapping[str, bytes], flights: Sequence[PlannedFl
         "form": _FORM,
         "kind": kind,
         "version": __version__,
+        "sources": _sources_digest(),
         "flights": hashlib.sha256(inputs.encode()).hexdigest(),
         "files": {name: hashlib.sha256(content).hexdigest() for name, content in sorted(files.items())},
     }
+
+
+def _package(name: str) -> Path:
+    spec = find_spec(name)
+    assert spec is not None
+    assert spec.origin is not None
+    return Path(spec.origin).parent
+
+
+def _sources_digest() -> str:
+    """Return a digest of the programs that fly: an edit of a law of this project changes flights too."""
+    result = hashlib.sha256()
+    for package in map(_package, ("flightstack", "sim_bridge")):
+        for path in sorted(path for path in package.rglob("*") if path.suffix in _SOURCES):
+            result.update(str(path.relative_to(package)).encode())
+            result.update(path.read_bytes())
+    return result.hexdigest()
 
 
 class Journal:
@@ -172,6 +192,7 @@ def _difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
         "kind": "the kind of the campaign has changed",
         "version": f"flightstack has changed from {before['version']} to {now['version']}",
         "form": "the form of the directory has changed",
+        "sources": "the source code of flightstack has changed",
         "flights": "the plan of the flights has changed",
     }
     return next((text for name, text in words.items() if before[name] != now[name]), "")

@@ -128,6 +128,7 @@ def test_each_row_is_synced_before_add_returns(tmp_path: Path, monkeypatch: pyte
             "the kind of the campaign has changed",
         ),
         ({**RECORD_1, "version": "9.9"}, f"flightstack has changed from {RECORD_1['version']} to 9.9"),
+        ({**RECORD_1, "sources": "0"}, "the source code of flightstack has changed"),
     ],
 )
 def test_a_changed_campaign_is_refused_and_its_rows_stay(
