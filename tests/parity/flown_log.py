@@ -1,7 +1,8 @@
 """Fly missions and print digests of their logs: run as a process under the settings of another processor.
 
 ``python -m tests.parity.flown_log PLAN`` prints a line for each library, the digest of what it computes here, which
-shows whether the settings act; then one for each controller, the SHA-256 of its log.
+shows whether the settings act; then one for each controller, the SHA-256 of its log. With NIGHTLY=1 it flies on the
+estimated state too, whose kernels take half a minute to compile anew.
 """
 
 from __future__ import annotations
@@ -13,9 +14,16 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from tests.support.truth import World
+from flightstack.params.config import ESTIMATED, TRUTH
+from flightstack.testing import World
+from tests.support.tools import NIGHTLY
 
-CONTROLLERS = ("pid", "backstepping")
+FLIGHTS = [
+    (controller, state)
+    for state in ((TRUTH, ESTIMATED) if NIGHTLY else (TRUTH,))
+    for controller in ("pid", "backstepping")
+]
+"""Controllers, and the states that they get."""
 
 
 def digest(parts: Iterable[bytes]) -> str:
@@ -35,10 +43,16 @@ def library_digests() -> dict[str, str]:
     }
 
 
-def log_digest(plan: str, controller: str) -> str:
+def log_digest(plan: str, controller: str, state: str) -> str:
     """Digest of the log of a mission in wind, with gusts of wind and torque."""
     world = World(
-        vehicle="x_quad", controller=controller, wind=(3.0, -1.0, 0.0), gust=1.0, torque_gust=0.002, seed=7
+        vehicle="x_quad",
+        controller=controller,
+        state=state,
+        wind=(3.0, -1.0, 0.0),
+        gust=1.0,
+        torque_gust=0.002,
+        seed=7,
     )
     world.upload(plan)
     world.arm()
@@ -48,8 +62,8 @@ def log_digest(plan: str, controller: str) -> str:
 
 
 def digests(plan: str) -> dict[str, str]:
-    """Digests of the libraries and of each controller's log."""
-    return library_digests() | {law: log_digest(plan, law) for law in CONTROLLERS}
+    """Digests of the libraries and of each log, named ``controller-state``."""
+    return library_digests() | {"-".join(flight): log_digest(plan, *flight) for flight in FLIGHTS}
 
 
 if __name__ == "__main__":
