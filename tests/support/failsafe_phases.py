@@ -21,11 +21,11 @@ QUICK = {
     "MPC_LAND_SPEED": 1.5,
     "MPC_LAND_ALT2": 2,
     "MPC_TKO_SPEED": 3,
-    "RTL_RETURN_ALT": 4,
+    "RTL_RETURN_ALT": 8,
     "RTL_MIN_DIST": 1,
     "COM_FAIL_ACT_T": 0.5,
 }
-HEIGHT = 3.0
+HEIGHT = 6.0
 
 
 def select_mode(world: World, mode: Mode) -> None:
@@ -35,8 +35,8 @@ def select_mode(world: World, mode: Mode) -> None:
 
 
 def _hover(world: World) -> None:
-    """Hover at ``HEIGHT``, 4 m north of home."""
-    world.upload([item(22, z=HEIGHT), item(16, north=4.0, z=HEIGHT)])
+    """Hover at ``HEIGHT``, 8 m north of home."""
+    world.upload([item(22, z=HEIGHT), item(16, north=8.0, z=HEIGHT)])
     world.arm()
     world.start_mission()
     world.run_until("mode == 'HOLD'", 30.0)
