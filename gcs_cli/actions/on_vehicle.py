@@ -12,6 +12,8 @@ from gcs_cli.vehicle.view_types import GeoPosition, VehicleView
 HOME_TOLERANCE_M = 3.0
 """Largest distance of a home that was set to the present position; both come from the same estimator."""
 REBOOT_LIMIT_S = 60.0
+UP_S = 2.0
+"""Least time since boot for a reboot: its first message after the restart has a smaller one."""
 
 
 def arm() -> Action:
@@ -178,7 +180,14 @@ def reboot() -> Action:
             ),
         )
 
-    return Action("reboot", plan, "rebooting", "rebooted")
+    return Action(
+        "reboot",
+        plan,
+        "rebooting",
+        "rebooted",
+        needs=lambda view: not view.time_s or view.time_s >= UP_S,
+        needs_text=f"it booted less than {UP_S:g} s ago, so that its restart would not be seen: repeat the command",
+    )
 
 
 def set_message_rate(message_id: int, name: str, rate_hz: float | None) -> Action:

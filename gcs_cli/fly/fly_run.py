@@ -84,7 +84,7 @@ def fly(
             children.start(
                 STACK, "flightstack", stack_arguments(options, home, folder, connection.local_port)
             )
-            _run(flight, connection, children, interruption, display)
+            run_flight(flight, connection, children, interruption, display)
             if flight.shut_down_accepted:
                 children.wait(_END_TIMEOUT_S)
             _show_notices(children, display)
@@ -111,9 +111,10 @@ def _recording(connection: Connection, folder: Path) -> Iterator[None]:
                 complain(f"gcs: the telemetry log {folder / TLOG_NAME} ends early: {reason}")
 
 
-def _run(
+def run_flight(
     flight: Flight, connection: Connection, children: Children, interruption: Interruption, display: Display
 ) -> None:
+    """Exchange messages, watch the children and draw until the flight is over."""
     # 0.2 s, which is long for the vehicle in simulated time: heartbeats continue
     importer = threading.Thread(target=importlib.import_module, args=(_RESULTS,), daemon=True)
     while not flight.is_over:

@@ -52,6 +52,8 @@ class FakeArduCopter:
         self._out: list[Any] = []
         self._target = (0.0, 0.0, 0.0)
         self._time_s = self._booted_s = 0.0
+        self.streams_after_boot = False
+        """True to send streams 1.2 s after a reboot without a request, as PX4 and our vehicle."""
         self._heartbeat_due_s = 0.0
         self._streams_due_s = math.inf
         self.home_m = HOME_M
@@ -227,7 +229,8 @@ class FakeArduCopter:
         return ACCEPTED
 
     def _reboot(self, _params: list[float], _frame: int) -> int:
-        self._booted_s, self.mode, self._streams_due_s = self._time_s, STABILIZE, math.inf
+        self._booted_s, self.mode = self._time_s, STABILIZE
+        self._streams_due_s = self._time_s + 1.2 if self.streams_after_boot else math.inf
         return ACCEPTED
 
     # -- sending

@@ -20,11 +20,11 @@ STEP_S, LIMIT_S = 0.05, 200.0
 class Rig:
     """A session and the vehicle in memory, in simulated time."""
 
-    def __init__(self, vehicle: FakeArduCopter | None = None) -> None:
+    def __init__(self, vehicle: FakeArduCopter | None = None, boot_s: float = 2.0) -> None:
         self.vehicle = vehicle or FakeArduCopter()
         self.session = Session()
         self.now_s = 0.0
-        self.run_for(2.0)
+        self.run_for(boot_s)
 
     @property
     def view(self) -> VehicleView:
@@ -224,6 +224,13 @@ def test_modes_are_named_by_arducopters_names(rig: Rig) -> None:
     assert rig.view.mode == "STABILIZE"
     assert rig.perform(on_vehicle.select_mode("alt-hold"))[:2] == (Outcome.DONE, "mode alt-hold")
     assert rig.view.mode == "ALT_HOLD"
+
+
+def test_reboot_soon_after_boot_waits_until_its_restart_can_be_seen() -> None:
+    """Its first message after the restart came at 1.2 s, later than the last one before: no restart was seen."""
+    rig = Rig(boot_s=0.8)
+    rig.vehicle.streams_after_boot = True
+    assert rig.perform(on_vehicle.reboot())[:2] == (Outcome.DONE, "rebooted")
 
 
 def test_reboot_without_an_answer_is_sent_once(rig: Rig) -> None:

@@ -39,7 +39,7 @@ def test_results_are_imported_once_beside_the_exchange_of_messages(monkeypatch: 
     )
     children = SimpleNamespace(ended=list, notices=list)
     monkeypatch.setattr(fly_run, "importlib", SimpleNamespace(import_module=import_module))
-    fly_run._run(
+    fly_run.run_flight(
         flight,
         Connection(),
         children,
