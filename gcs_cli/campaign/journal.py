@@ -20,6 +20,7 @@ from typing import Any
 from flightstack import __version__
 from flightstack.core.atomic_file import write_text_atomically
 from flightstack.core.errors import ConfigError
+from flightstack.firmware.sources import source_hash
 from gcs_cli.campaign.plan import PlannedFlight
 from gcs_cli.campaign.rows import Row
 from gcs_cli.errors import USAGE, CliError
@@ -28,7 +29,7 @@ JOURNAL, RECORD = "flights.jsonl", "campaign.json"
 RESULTS = PARQUET, CSV, REPORT = "flights.parquet", "flights.csv", "report.html"
 _FORM = 1
 """Version of the directory's form."""
-_SOURCES = frozenset((".py", ".toml", ".xml", ".c", ".h"))
+_SOURCES = frozenset((".py", ".toml", ".xml"))
 
 
 def record_of(kind: str, files: Mapping[str, bytes], flights: Sequence[PlannedFlight]) -> dict[str, Any]:
@@ -53,7 +54,7 @@ def _package(name: str) -> Path:
 
 def _sources_digest() -> str:
     """Return a digest of the programs that fly: an edit of a law of this project changes flights too."""
-    result = hashlib.sha256()
+    result = hashlib.sha256(source_hash())  # of the loops in C
     for package in map(_package, ("flightstack", "sim_bridge")):
         for path in sorted(path for path in package.rglob("*") if path.suffix in _SOURCES):
             result.update(str(path.relative_to(package)).encode())
