@@ -49,6 +49,23 @@ def test_while_vehicle_time_stands_each_is_sent_once() -> None:
     assert count(Streams(GROUND_RATES_HZ), 10.0, 0.0) == dict.fromkeys(GROUND_RATES_HZ, 1)
 
 
+@pytest.mark.parametrize("late_s", [0.02, 0.04, 0.45])
+def test_a_vehicle_that_catches_up_sends_what_was_due_in_each_tick(late_s: float) -> None:
+    """A loaded machine wakes it every ``late_s`` only; it then runs the ticks since at once."""
+    streams, tick_s = Streams({ATTITUDE: 100.0}), 0.01
+    times_us = [
+        tick * 10_000
+        for tick in range(1000)
+        if list(
+            streams.due(
+                telemetry(status(time_us=tick * 10_000)),
+                100.0 + math.ceil(tick * tick_s / late_s) * late_s,
+            )
+        )
+    ]
+    assert len(times_us) == pytest.approx(1000, abs=1)
+
+
 def test_after_a_gap_nothing_is_made_up_for() -> None:
     streams = Streams({ATTITUDE: 10.0})
     count(streams, 1.0, 1.0)

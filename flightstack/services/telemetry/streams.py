@@ -1,7 +1,8 @@
 """Telemetry streams of one link and their rates. Pure.
 
 Rates count simulated time and are limited to the same rate on the link clock: at 50 times real time a client gets 50
-ATTITUDE messages per second of wall time, not 2500. At real time, and on an in-memory link, both clocks agree.
+ATTITUDE messages per second of wall time, not 2500. At real time, and on an in-memory link, both clocks agree. A
+vehicle that was late and runs several ticks at once sends what was due in each of them.
 """
 
 from __future__ import annotations
@@ -17,6 +18,10 @@ M = mavlink
 
 LONGEST_INTERVAL_US = 2**31 - 1
 """Range of the field in MESSAGE_INTERVAL."""
+CATCH_UP_S = 0.5
+"""How far a stream may be behind on the link clock and still make up for it: as long as the simulator catches up."""
+ROUNDING_S = 0.5e-6
+"""Above the rounding of an hour's sum of intervals, below the resolution of the vehicle clock."""
 
 # PX4's default rates on its two links in simulation, for the messages that this vehicle has. Messages that pymavlink's
 # releases lack (ESC_STATUS, CURRENT_MODE, AVAILABLE_MODES_MONITOR, the project's dialect) are sent on request only:
@@ -129,8 +134,11 @@ class _Stream:
         """Compute the next due times. Keep the phase, unless a whole interval was missed."""
         interval_s = self.interval_s
         upcoming_s = self.vehicle_s + interval_s
-        self.vehicle_s = upcoming_s if upcoming_s > now_s else now_s + interval_s
-        self.link_s = max(self.link_s + interval_s, link_now_s + 0.5 * interval_s)
+        self.vehicle_s = upcoming_s if upcoming_s > now_s + ROUNDING_S else now_s + interval_s
+        if self.link_s == -math.inf:  # half an interval: the two clocks are read at different instants
+            self.link_s = link_now_s + 0.5 * interval_s
+        else:
+            self.link_s = max(self.link_s + interval_s, link_now_s - CATCH_UP_S)
 
 
 class Streams:
@@ -178,13 +186,14 @@ class Streams:
     def due(self, telemetry: Telemetry, link_now_s: float) -> list[Message]:
         """Return the messages that are due on both the vehicle clock and the link clock."""
         now_s = telemetry.time_us * 1e-6
+        until_s = now_s + ROUNDING_S
         due: list[Message] = []
-        if now_s < self._soonest_s:
+        if until_s < self._soonest_s:
             return due
         soonest_s = math.inf
         for stream in self._streams.values():
             vehicle_s = stream.vehicle_s
-            if now_s >= vehicle_s and link_now_s >= stream.link_s:
+            if until_s >= vehicle_s and link_now_s >= stream.link_s:
                 stream.sent(now_s, link_now_s)
                 vehicle_s = stream.vehicle_s
                 due += telemetry.messages(stream.message_id)
