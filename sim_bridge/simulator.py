@@ -263,6 +263,18 @@ class Simulator:
             self.sensors.measure(self.time_us)
 
     @property
+    def steps(self) -> int:
+        """Steps of the plant in an interval."""
+        return self._steps
+
+    def pass_by(self, count: int, result: int) -> None:
+        """Count quiet intervals that the plant's kernel advanced, with the bits of the last one; raise as ``apply``."""
+        self.time_us += count * self._interval_us
+        self._set_flags(result)
+        if self.sensors is not None:
+            self.sensors.pass_by(count)
+
+    @property
     def sends_state_alone(self) -> bool:
         """True if ``outgoing`` has the true state and, with sensors, messages of sensors, but nothing else."""
         return self._sent is None and self.time_us < self._battery_due_us

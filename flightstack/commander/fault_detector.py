@@ -286,22 +286,23 @@ class FaultDetector:
         self._state = state
         self._dt_s = 1.0 / outer_hz
         self._detectors: RecordArray = np.zeros(1, DETECTORS)
-        self._rotors: RecordArray = np.zeros(1, ROTOR_SPEEDS)
+        self.rotors: RecordArray = np.zeros(1, ROTOR_SPEEDS)
+        """Expected and measured speeds of the rotors, for ``follow_rotors``, as ``lags``."""
         self._no_error_setpoint = np.zeros(SETPOINT_SIZE)
-        self._lags = rotor_lags(vehicle, self._dt_s / divisor)
-        self._thrust_n = self._rotors["thrust"].data  # read ten times as fast as the field
+        self.lags = rotor_lags(vehicle, self._dt_s / divisor)
+        self._thrust_n = self.rotors["thrust"].data  # read ten times as fast as the field
         self._unmeasured: set[int] = set()
         self.found = 0
         """Bits of ``detect`` from the last update."""
         self.set_behaviour(behaviour)
         row = np.zeros(LoopRow.SIZE)
-        self._follow = direct(follow_rotors, row, self._rotors, self._lags)
+        self._follow = direct(follow_rotors, row, self.rotors, self.lags)
         self._detect = direct(
             detect,
             state,
             self._no_error_setpoint,
             row,
-            self._rotors,
+            self.rotors,
             self._detectors,
             self._limits,
             False,
@@ -315,13 +316,13 @@ class FaultDetector:
     def begin(self) -> None:
         """Reset all detectors at the start of a flight."""
         self._detectors[:] = np.zeros(1, DETECTORS)
-        self._rotors[:] = np.zeros(1, ROTOR_SPEEDS)
+        self.rotors[:] = np.zeros(1, ROTOR_SPEEDS)
         self._unmeasured.clear()
         self.found = 0
 
     def follow_rotors(self, row: FloatArray) -> None:
         """Take the newest row of the inner loop, shape (48,), once per inner tick."""
-        self._follow(row, self._rotors, self._lags)
+        self._follow(row, self.rotors, self.lags)
 
     def update(
         self, setpoint: FloatArray, row: FloatArray, position_is_controlled: bool, on_ground: bool
@@ -335,7 +336,7 @@ class FaultDetector:
             self._no_error_setpoint[:3] = self._state[:3]
             setpoint = self._no_error_setpoint
         self.found = self._detect(
-            self._state, setpoint, row, self._rotors, self._detectors, self._limits, on_ground, self._dt_s
+            self._state, setpoint, row, self.rotors, self._detectors, self._limits, on_ground, self._dt_s
         )
         return self.found
 
@@ -359,7 +360,7 @@ class FaultDetector:
         """Return the rotors, from 1, whose speed is no longer measured; each one once per flight."""
         if not self.found & UNMEASURED:
             return []
-        missing_s = self._rotors["missing"][0, : len(self._vehicle.rotors)]
+        missing_s = self.rotors["missing"][0, : len(self._vehicle.rotors)]
         fresh = {int(i) + 1 for i in np.flatnonzero(missing_s >= UNMEASURED_AFTER_S)} - self._unmeasured
         self._unmeasured |= fresh
         return sorted(fresh)

@@ -87,7 +87,7 @@ class PythonLoops:
         max_tilt_rad: float,
     ) -> None:
         self.version = f"Python, Numba {compiler_version()}"
-        self._outer_dt_s, self._fraction_step = 1.0 / outer_hz, outer_hz / inner_hz
+        self._outer_dt_s, self.fraction_step = 1.0 / outer_hz, outer_hz / inner_hz
         self.fraction = 0.0
         """Share of the way from the last attitude target to the present one."""
         controller = controller_of(controller)
@@ -111,11 +111,11 @@ class PythonLoops:
         self._reference_memory: FloatArray = record["reference"]
         self._last: FloatArray = record["last"]
         self._idle = IdleRow(vehicle)
-        self._kernel = bound_to(inner_kernel, {role: laws[role] for role in (ATTITUDE, MIXER)})
+        self.kernel = bound_to(inner_kernel, {role: laws[role] for role in (ATTITUDE, MIXER)})
         self._outer_kernel = outer_kernel_of(controller)
         self._last_arrays: tuple[FloatArray, FloatArray] | None = None
         self._bound: tuple[FloatArray, FloatArray] | None = None
-        self._inner, self._outer = self._kernel, self._outer_kernel
+        self._inner, self._outer = self.kernel, self._outer_kernel
         self._compile(controller.name)
 
     def _compile(self, name: str) -> None:
@@ -184,15 +184,15 @@ class PythonLoops:
                 self._outer_dt_s,
                 self.attitude_target,
             )
-        self.fraction += self._fraction_step
+        self.fraction += self.fraction_step
         self._inner(state, self.fraction, rotor_speed_rad_s, self.memory, row)
 
     def _bind(self, state: FloatArray, speeds: FloatArray, setpoint: FloatArray, row: FloatArray) -> None:
         """Select the generic kernels for new arrays, or bind direct calls when the same arrays come a second time."""
-        self._inner, self._outer = self._kernel, self._outer_kernel
+        self._inner, self._outer = self.kernel, self._outer_kernel
         self._bound = None
         if self._last_arrays is not None and state is self._last_arrays[0] and speeds is self._last_arrays[1]:
-            self._inner = direct(self._kernel, state, 1.0, speeds, self.memory, row)
+            self._inner = direct(self.kernel, state, 1.0, speeds, self.memory, row)
             self._outer = direct(
                 self._outer_kernel, state, setpoint, self.outer_memory, self._outer_params, self._last,
                 self._outer_dt_s, self.attitude_target,

@@ -98,9 +98,13 @@ class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]  # Numba has no typ
             if collects:
                 gc.enable()
 
-    def compiled_for(self, *examples: Any) -> Callable[..., Any]:
-        """Return the compiled function for the types of ``examples``, which it does not check."""
+    def result_for(self, *examples: Any) -> Any:
+        """Return Numba's result of the compilation for the types of ``examples``."""
         types = tuple(map(_type_of, examples))
         if types not in self.overloads:
             self.compile(types)
-        return self.get_overload(types)  # type: ignore[no-any-return]
+        return self.overloads[types]
+
+    def compiled_for(self, *examples: Any) -> Callable[..., Any]:
+        """Return the compiled function for the types of ``examples``, which it does not check."""
+        return self.result_for(*examples).entry_point  # type: ignore[no-any-return]

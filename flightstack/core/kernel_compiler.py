@@ -150,12 +150,13 @@ class _CacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
 
 class _KernelCacheImpl(_CacheImpl):
     def reduce(self, result: CompileResult) -> Any:
-        """Return the result to store, with the name of the function that Python calls in place of all LLVM code.
+        """Return the result to store, with the names of the functions that are called in place of all LLVM code.
 
-        Numba keeps the LLVM code for callers: they include the part.
+        Python calls the one, ``kernel_calls`` the other. Numba keeps the LLVM code for callers: they include the part.
         """
         (name, kind, (machine_code, _)), *rest = super().reduce(result)
-        names = parse_assembly(f'define void @"{result.fndesc.llvm_cpython_wrapper_name}"() {{ ret void }}')
+        called = result.fndesc.llvm_cpython_wrapper_name, result.fndesc.llvm_func_name
+        names = parse_assembly("\n".join(f'define void @"{each}"() {{ ret void }}' for each in called))
         return ((name, kind, (machine_code, names.as_bitcode())), *rest)
 
 

@@ -41,11 +41,12 @@ class Estimator:
         core: FilterCore | None = None,
     ) -> None:
         """``core`` runs the filter, by default in this process, compiled from Python."""
-        self._core: FilterCore = core or PythonCore()
-        self.memory: RecordArray = self._core.memory
+        self.core: FilterCore = core or PythonCore()
+        """Runs the filter."""
+        self.memory: RecordArray = self.core.memory
         self.params = params or EstimatorParams()
         self.limits = limits or GnssLimits()
-        self._core.start(self.params)
+        self.core.start(self.params)
         record: Any = self.memory[0]
         self.frame: LocalFrame | None = None
         self._state = record["state"]
@@ -55,18 +56,18 @@ class Estimator:
         self._mag = np.zeros(4)
         self._pair = np.zeros(2)
         self._fix: tuple[Any, ...] = ()  # place and velocity of the last sample of GNSS
-        self.imu_row = self._core.imu
+        self.imu_row = self.core.imu
         """Take a sample of the IMU in its array form, shape (8,)."""
-        self._push = self._core.push
+        self._push = self.core.push
 
     def set_params(self, params: EstimatorParams, limits: GnssLimits) -> None:
         """Set the parameters; those of the initial uncertainty have no effect after the alignment."""
         self.params, self.limits = params, limits
-        self._core.set_params(params)
+        self.core.set_params(params)
 
     def refresh(self) -> None:
         """Bring the whole ``memory`` up to date: a filter elsewhere keeps only state, flags and resets so."""
-        self._core.refresh()
+        self.core.refresh()
 
     @property
     def aligned(self) -> bool:
@@ -75,17 +76,17 @@ class Estimator:
 
     def set_landed(self, landed: bool) -> None:
         """Tell the filter whether the vehicle stands on the ground."""
-        self._core.set_landed(landed)
+        self.core.set_landed(landed)
 
     def set_declination(self, declination_rad: float) -> None:
         """Set the magnetic declination, which holds until the Earth's field is known."""
         self.refresh()
-        self._core.set_earth(np.array([*self.memory["earth"][0, :3], declination_rad]), False)
+        self.core.set_earth(np.array([*self.memory["earth"][0, :3], declination_rad]), False)
 
     def set_earth_field(self, field_ned_gauss: Vector3) -> None:
         """Set the Earth's magnetic field at the place of the vehicle, from the World Magnetic Model; also in flight."""
         declination_rad = atan2(field_ned_gauss.y, field_ned_gauss.x)
-        self._core.set_earth(np.array([*field_ned_gauss, declination_rad]), True)
+        self.core.set_earth(np.array([*field_ned_gauss, declination_rad]), True)
 
     def imu(self, sample: ImuSample) -> None:
         """Take a sample of the IMU."""

@@ -93,10 +93,12 @@ class ImuTrack:
     """A ring of rows, and the number of samples that repeated the one before."""
 
     def __init__(self) -> None:
-        self._rows = np.zeros((WINDOW, IMU_SIZE))
-        self._each = [(row, row.data) for row in self._rows]
-        self._counters: Counters = np.zeros(_COUNTERS, np.int64)
-        self._numbers = self._counters.data  # a number of an array takes four times as long to read
+        self.ring = np.zeros((WINDOW, IMU_SIZE))
+        """The samples, of which the next one follows the newest, as ``take_wire`` counts them."""
+        self._each = [(row, row.data) for row in self.ring]
+        self.counters: Counters = np.zeros(_COUNTERS, np.int64)
+        """Samples so far, and repeats."""
+        self._numbers = self.counters.data  # a number of an array takes four times as long to read
         self._take_wire: Any = None
         self._mean_since: Any = None
         self._mean: FloatArray = np.zeros(6)
@@ -112,22 +114,22 @@ class ImuTrack:
         """Store a sample, as ``ImuSample``; return its row, shape (8,), valid until 99 more were taken."""
         row, memory = self._each[self._numbers[_COUNT] % WINDOW]
         _pack(memory, 0, time_s, dt_s, *rates, *forces)  # a third of the time of an assignment
-        count_sample(self._rows, self._counters)
+        count_sample(self.ring, self.counters)
         return row
 
     def take_wire(self, time_s: float, step_us: int, wire: SingleArray, record: FloatArray) -> FloatArray:
         """Store a sample from the values of HIL_SENSOR, and in ``record``, shape (7,); return its row as ``take``."""
         if self._take_wire is None:
-            self._take_wire = direct(take_wire, self._rows, self._counters, wire, time_s, step_us, record)
+            self._take_wire = direct(take_wire, self.ring, self.counters, wire, time_s, step_us, record)
         row = self._each[self._numbers[_COUNT] % WINDOW][0]
-        self._take_wire(self._rows, self._counters, wire, time_s, step_us, record)
+        self._take_wire(self.ring, self.counters, wire, time_s, step_us, record)
         return row
 
     def mean_since(self, time_s: float) -> tuple[Vector3, Vector3] | None:
         """Return the mean rates and specific force of the samples after ``time_s``, the last 100 at most, or None."""
         if self._mean_since is None:
-            self._mean_since = direct(mean_since, self._rows, self._counters, time_s, self._mean)
-        if not self._mean_since(self._rows, self._counters, time_s, self._mean):
+            self._mean_since = direct(mean_since, self.ring, self.counters, time_s, self._mean)
+        if not self._mean_since(self.ring, self.counters, time_s, self._mean):
             return None
         values = self._mean.tolist()
         return Vector3(*values[:3]), Vector3(*values[3:])
@@ -138,7 +140,7 @@ class ImuTrack:
         count = self._numbers[_COUNT]
         if not count:
             return None
-        time_s, dt_s, *values = self._rows[(count - 1) % WINDOW].tolist()
+        time_s, dt_s, *values = self.ring[(count - 1) % WINDOW].tolist()
         return ImuSample(time_s, dt_s, Vector3(*values[:3]), Vector3(*values[3:]))
 
     @property
@@ -146,5 +148,5 @@ class ImuTrack:
         """The last samples, oldest first, shape (n, 8)."""
         count = self._numbers[_COUNT]
         if count <= WINDOW:
-            return self._rows[:count]
-        return np.roll(self._rows, -(count % WINDOW), axis=0)
+            return self.ring[:count]
+        return np.roll(self.ring, -(count % WINDOW), axis=0)

@@ -231,6 +231,16 @@ class SensorFeed:
             lane.estimator.imu_row(lane.newest.imu_track.take_wire(time_s, step_us, wire, record))
         self._write_state()
 
+    def pass_by(self, time_us: int, step_us: int) -> None:
+        """Count a measurement of each inertial sensor at ``time_us`` as taken."""
+        for lane in self.lanes:
+            lane.measured_us, lane.step_us = time_us, step_us
+
+    @property
+    def selected(self) -> int:
+        """Number of the lane that writes the state."""
+        return self.lanes.index(self._selected)
+
     def _write_state(self) -> bool:
         estimator = self._selected.estimator
         if not estimator.aligned:

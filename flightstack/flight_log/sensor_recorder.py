@@ -21,7 +21,7 @@ from flightstack.flight_log.estimator_topics import (
     fill_selector,
     fill_wind,
 )
-from flightstack.flight_log.flight_log import FlightLog
+from flightstack.flight_log.flight_log import FlightLog, Trace
 from flightstack.flight_log.local_position import fill_local_position
 from flightstack.flight_log.recorder import FlightRecorder
 from flightstack.flight_log.sensor_topics import (
@@ -85,6 +85,11 @@ class SensorRecorder:
     def imu_row(self, time_us: int) -> FloatArray:
         """Return the row of ``IMU_GROUP`` for a sample that the estimator takes; without a log a scratch row."""
         return self._imu_row(time_us)
+
+    @property
+    def imu_trace(self) -> Trace | None:
+        """Rows of ``imu_row`` in the open log; None without one."""
+        return None if self._log is None else self._log.sampled[IMU_GROUP.name]
 
     @property
     def due_us(self) -> int:

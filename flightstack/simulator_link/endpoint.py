@@ -185,12 +185,16 @@ class SimulatorEndpoint:
             self.sensors.take_measurements(time_us, sensors)
             self._take_clock(self.sensors)
 
-    def take_next(self, frame: PlantStateFrame) -> None:
-        """Take a state as ``take`` does, one interval after the last one, whose sensors are read directly."""
-        self._plant.frame[:] = frame.frame
-        self._state_us += self._interval_us
-        self.time_us += self._interval_us
+    def pass_by(self, count: int) -> None:
+        """Count states, which were written to ``frame`` one interval after another, as taken."""
+        self._state_us += count * self._interval_us
+        self.time_us += count * self._interval_us
         self.has_arrived = True
+
+    @property
+    def frame(self) -> memoryview:
+        """The frame of the newest state."""
+        return self._plant.frame
 
     def flags(self, armed: bool) -> int:
         """Return the flags of an answer with FS_ACTUATORS."""

@@ -93,10 +93,10 @@ class Engine:
         self._interval_us, self._divisor = self.stack.rates.interval_us, self.stack.rates.divisor
         self.lockstep = Lockstep(self._endpoint, self.stack.autopilot, self._interval_us)
         """Ticks of the vehicle on the simulator's clock."""
-        self._quiet = QuietTicks(self.stack, self.lockstep)
         self._missed_us = self._next_timing_us = self._ticks = 0
         if self.stack.estimation is not None:
             self.simulator.start_sensors(self.config.home)
+        self._quiet = QuietTicks(self.stack, self.lockstep, self.simulator, self.actuators)
         self._endpoint.receive(memoryview(self.states()))
         self._now.has_state = self.was_ready = self.stack.estimation is None
 
@@ -166,7 +166,7 @@ class Engine:
         count = min(most - 1, -self._ticks % self._divisor, self._quiet.count(self.simulator))
         if count <= 0:
             return 1, False
-        self._quiet.run(self.simulator, self.actuators, count)
+        count = self._quiet.run(self.simulator, self.actuators, count)
         self._ticks += count
         self.machine_ns += count * self._interval_us * 1000
         return 1 + count, self._ends_period()

@@ -91,6 +91,14 @@ class Autopilot:
         """Number of the next ticks that run no outer loop, and do not hold the rotors."""
         return 0 if self._failsafes.states.holds_rotors else -self._tick % self._divisor
 
+    def pass_by(self, count: int, time_us: int, row: FloatArray) -> None:
+        """Count inner ticks without an outer one, whose kernels ran up to ``row`` at ``time_us``."""
+        now = self.now
+        self._tick += count
+        now.time_us, now.row = time_us, row
+        if now.flying and not now.rests:
+            now.loops_reset = False
+
     def _guide(self) -> None:
         """Advance guidance, and reset the loops at ground contact. Hold both while the state is stale."""
         now, navigator = self.now, self._navigator

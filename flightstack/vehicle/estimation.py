@@ -31,6 +31,7 @@ from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed
 from flightstack.estimation.sensor_samples import BaroSample, ImuSample
 from flightstack.estimation.snapshot import snapshot
+from flightstack.flight_log.flight_log import Trace
 from flightstack.flight_log.sensor_recorder import SensorRecorder
 from flightstack.guidance.navigator import Navigator
 from flightstack.params.estimator import ESTIMATOR_SPECS, MULTI_IMU
@@ -180,6 +181,27 @@ class Estimation:
         if finds_origin or now.landed is not self._landed or not self._sensors.is_quiet:
             return 0
         return min(self._health_due_us, self._recorder.due_us)
+
+    def pass_by(self, time_us: int, step_us: int) -> None:
+        """Follow the measurements up to ``time_us`` that the kernels of sensors and filters took."""
+        self._time_us = time_us
+        self._feed.pass_by(time_us, step_us)
+        self._check_resets(time_us)
+
+    @property
+    def feed(self) -> SensorFeed:
+        """Feeds the estimators."""
+        return self._feed
+
+    @property
+    def estimators(self) -> tuple[Estimator, ...]:
+        """Those of the feed, by the number of their inertial sensor."""
+        return self._lanes.estimators
+
+    @property
+    def imu_trace(self) -> Trace | None:
+        """Rows of the selected inertial sensor in the open log; None without one."""
+        return self._recorder.imu_trace
 
     def update_imus(self, time_us: int, step_us: int, wires: Sequence[SingleArray]) -> None:
         """Take a measurement of each inertial sensor, the only messages of a tick before ``quiet_until_us``.

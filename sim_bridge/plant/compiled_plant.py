@@ -21,7 +21,9 @@ class CompiledPlant(RecordPlant):
     def __init__(self, vehicle: Vehicle, name: str, options: PlantOptions) -> None:
         super().__init__(vehicle, options)
         self._paper = name == "paper"
-        self._kernel = self._call = advance_kernel(name)
+        self.kernel = advance_kernel(name)
+        """Kernel of ``advance``: memory, commands, flags, steps and output."""
+        self._call = self.kernel
         self._last_command: FloatArray | None = None
         self._bound: FloatArray | None = None
         self._slope = slope_kernel(name)
@@ -68,15 +70,15 @@ class CompiledPlant(RecordPlant):
 
     def _bind(self, command_rad_s: FloatArray) -> None:
         """Call the kernel through its dispatcher, and directly from the second use of the same array on."""
-        self._call, self._bound = self._kernel, None
+        self._call, self._bound = self.kernel, None
         if command_rad_s is self._last_command:
-            self._call = direct(self._kernel, self.memory, command_rad_s, 0, 1, self.output)
+            self._call = direct(self.kernel, self.memory, command_rad_s, 0, 1, self.output)
             self._bound = command_rad_s
         self._last_command = command_rad_s
 
     def show(self) -> int:
         """Write the present state to ``output``; return the bits of ``advance``."""
-        result = self._kernel(self.memory, self.memory[0]["command"], 0, 0, self.output)
+        result = self.kernel(self.memory, self.memory[0]["command"], 0, 0, self.output)
         self._add_boat()
         return result
 

@@ -14,7 +14,7 @@ from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
 from sim_bridge.plant.battery import BatteryState, battery_state, set_battery, set_pack
 from sim_bridge.plant.dimensions import foot_z_m, propeller_radius_m
 from sim_bridge.plant.faults.effects import PlantFaults, RotorFault
-from sim_bridge.plant.layout import MEMORY, OUTPUT
+from sim_bridge.plant.layout import MEMORY, NOISE_ROWS, OUTPUT
 from sim_bridge.plant.loading import AS_BUILT, Body, Loading, inverse, loaded
 from sim_bridge.plant.near_ground import airspeed
 from sim_bridge.plant.plant import PlantOptions
@@ -227,6 +227,14 @@ class RecordPlant(ABC):
             self._boat_m += self._boat * (count * float(self.memory[0]["step_s"]))
         self._add_boat()
         return result
+
+    def quiet_steps(self) -> int:
+        """Return for how many of the next steps, at most 1024, ``advance`` does nothing but call its kernel."""
+        if self._is_plain:
+            return NOISE_ROWS
+        if self._dead_time.is_active or self._is_on_boat:
+            return 0
+        return self._turbulence.rows_left()
 
     def _add_boat(self) -> None:
         """Add the motion of the boat to ``output``: the equations are those of a frame that moves with it."""

@@ -172,7 +172,8 @@ class ImuSet:
             write_numbers(record, numbers)
             _set_errors(record, stream)
         self._set_motion(vehicle, state)
-        self._noise: FloatArray = np.zeros((_ROWS, count, IMU_NOISE))
+        self.noise: FloatArray = np.zeros((_ROWS, count, IMU_NOISE))
+        """Deviates of the next measurements, for ``measure_imu``."""
         self._left = 0  # rows of noise
         self._call = measure_imu
 
@@ -209,17 +210,28 @@ class ImuSet:
         if self._left == 0:
             self._refill(state, rotor_speed, wires)
         self._left -= 1
-        self._call(self.motion, self.records, state, rotor_speed, self._noise, wires)
+        self._call(self.motion, self.records, state, rotor_speed, self.noise, wires)
+
+    def rows_left(self) -> int:
+        """Return for how many of the next measurements there is noise, at least for one; draw new noise if for none."""
+        if self._left == 0:
+            self._draw()
+        return self._left
+
+    def take_rows(self, count: int) -> None:
+        """Count measurements that ``measure_imu`` made, at most ``rows_left``."""
+        self._left -= count
+
+    def _draw(self) -> None:
+        for index, stream in enumerate(self._streams):
+            self.noise[:, index] = stream.rows(_ROWS)
+        self._left, self.motion[0]["row"] = _ROWS, 0
 
     def _refill(self, *arrays: Any) -> None:
-        for index, stream in enumerate(self._streams):
-            self._noise[:, index] = stream.rows(_ROWS)
-        self._left, self.motion[0]["row"] = _ROWS, 0
+        self._draw()
         if self._call is measure_imu:
             state, rotor_speed, wires = arrays
-            self._call = direct(
-                measure_imu, self.motion, self.records, state, rotor_speed, self._noise, wires
-            )
+            self._call = direct(measure_imu, self.motion, self.records, state, rotor_speed, self.noise, wires)
 
 
 def _set_errors(imu: Record, stream: NormalStream) -> None:

@@ -203,6 +203,16 @@ class SensorSuite:
             self._measure_slow(time_us)
 
     @property
+    def wires(self) -> SingleArray:
+        """``imu_wires`` as one array, shape (sensors, 6)."""
+        return self._wires
+
+    def pass_by(self, count: int) -> None:
+        """Count quiet measurements that the kernel of the inertial sensors made."""
+        self.imus.take_rows(count)
+        self._fields[:] = self._all_imus
+
+    @property
     def is_quiet(self) -> bool:
         """True while ``measure`` before ``next_us`` changes ``imu_wires`` alone: there are no faults."""
         return not (self._has_faults or self._is_apart or self._messages)

@@ -6,10 +6,13 @@ import pytest
 
 from flightstack.testing import World
 from flightstack.testing.engine import Engine
+from flightstack.testing.quiet_block import QuietBlock
 from tests.support.inertial_sensors import x_quad_with_imus
 
 CONDITIONS = (
     {"state": "truth", "loops": "c"},
+    {"state": "truth", "controller": "backstepping", "plant": "paper"},
+    {"state": "truth", "vehicle": "x_quad", "gust": 1.0, "torque_gust": 0.01, "inner_hz": 1000.0},
     {"state": "estimated", "vehicle": "x_quad", "wind": (3.0, -1.0), "gust": 1.0, "seed": 3},
 )
 
@@ -37,7 +40,9 @@ def flown(world: World) -> tuple[bytes, list[str], int]:
     return world.engine.newest_log().replace(version, b""), world.texts, sum(world.gcs.counts.values())
 
 
-@pytest.mark.parametrize("conditions", CONDITIONS, ids=lambda conditions: conditions["state"])
+@pytest.mark.parametrize(
+    "conditions", CONDITIONS, ids=lambda conditions: "-".join(map(str, conditions.values()))
+)
 def test_quiet_ticks_fly_as_ticks_with_bytes(conditions: dict) -> None:
     with World(**conditions) as quiet, World(make_engine=BytesEngine, **conditions) as exchanged:
         assert flown(quiet) == flown(exchanged)
@@ -47,6 +52,33 @@ def test_quiet_ticks_of_two_inertial_sensors_fly_as_ticks_with_bytes(tmp_path: P
     conditions = {"state": "estimated", "vehicle": x_quad_with_imus(tmp_path), "seed": 2}
     with World(**conditions) as quiet, World(make_engine=BytesEngine, **conditions) as exchanged:
         assert flown(quiet) == flown(exchanged)
+
+
+def test_a_reset_of_the_estimate_ends_a_compiled_call(monkeypatch: pytest.MonkeyPatch) -> None:
+    """GNSS jumps and, much later, back, when no fault acts. Guidance follows a reset before the loops run."""
+    shorter: list[int] = []
+    run = QuietBlock.run
+
+    def counted(block: QuietBlock, count: int) -> int:
+        done = run(block, count)
+        shorter.append(count - done)
+        return done
+
+    monkeypatch.setattr(QuietBlock, "run", counted)
+
+    def jump(world: World) -> tuple[bytes, list[str]]:
+        world.wait_until_ready()
+        world.takeoff(2.0)
+        world.fault("sensor:gnss:bias=30,0,0", for_s=15.0)
+        world.run_until(lambda _: sum("Estimate reset" in text for text in world.texts) == 2, 60.0)
+        world.run_for(0.5)
+        return world.engine.newest_log(), world.texts
+
+    conditions = {"state": "estimated", "seed": 4}
+    with World(**conditions) as quiet, World(make_engine=BytesEngine, **conditions) as exchanged:
+        flights = [jump(quiet), jump(exchanged)]
+    assert flights[0] == flights[1]
+    assert any(shorter)
 
 
 @pytest.mark.parametrize("state", ["truth", "estimated"])

@@ -1,0 +1,213 @@
+"""Hands the arrays of a vehicle and its simulator to the kernel of quiet ticks, and counts what it did.
+
+A module of its own, because it imports Numba.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from flightstack.commander.fault_detector import follow_rotors
+from flightstack.control.loops import PythonLoops
+from flightstack.core.compiled import IS_DISABLED, direct
+from flightstack.core.contract import STATE_SIZE, FloatArray, LoopRow
+from flightstack.core.kernel_calls import address_of
+from flightstack.estimation.delayed_filter import imu_kernel
+from flightstack.estimation.estimator import Estimator
+from flightstack.estimation.filter_core import PythonCore
+from flightstack.estimation.imu_track import RECORD_SIZE, take_wire
+from flightstack.estimation.memory import ALIGNED, FLAGS, POSITION_RESET, RESETS, VELOCITY_RESET, YAW_RESET
+from flightstack.flight_log.flight_log import DEFAULT_CAPACITY, Trace
+from flightstack.process.assembly import Stack
+from flightstack.simulator_link.hot_frames import ActuatorsFrame
+from flightstack.vehicle.quiet_kernel import (
+    ADVANCE,
+    CALLS,
+    CONTROL,
+    COUNTERS,
+    ESTIMATE,
+    FOLLOW,
+    MEASURE,
+    TAKE,
+    fly_quiet_ticks,
+)
+from sim_bridge.plant.compiled_plant import CompiledPlant
+from sim_bridge.plant.layout import CONTACT
+from sim_bridge.sensors.imu import measure_imu
+from sim_bridge.sensors.layout import IMU, MOTION
+from sim_bridge.simulator import Simulator
+
+_RESET_COUNTS = np.array([POSITION_RESET, VELOCITY_RESET, YAW_RESET])
+
+
+_Arguments: TypeAlias = tuple[Any, ...]
+"""Arguments of the kernel for one part."""
+
+
+def _estimators(stack: Stack) -> tuple[Estimator, ...]:
+    return () if stack.estimation is None else stack.estimation.estimators
+
+
+def compiles(stack: Stack, simulator: Simulator) -> bool:
+    """Return True if all parts of a quiet tick are compiled Python in this process."""
+    parts: list[tuple[Any, type]] = [(stack.loops, PythonLoops), (simulator.plant, CompiledPlant)]
+    parts += [(estimator.core, PythonCore) for estimator in _estimators(stack)]
+    measures = simulator.sensors is not None and len(simulator.sensors.imu_wires) == len(_estimators(stack))
+    return (
+        not IS_DISABLED
+        and all(type(part) is kind for part, kind in parts)
+        and (measures or (stack.estimation is None and simulator.sensors is None))
+    )
+
+
+def _bytes(record: Any) -> Any:
+    """Return the bytes of records or of a frame."""
+    return np.frombuffer(record, np.uint8)
+
+
+def _sensing(stack: Stack, simulator: Simulator) -> _Arguments:
+    sensors, truth = simulator.sensors, simulator.frame
+    if sensors is None or stack.estimation is None:  # nothing happens on the true state
+        return (
+            np.zeros(1, MOTION), np.zeros(0, IMU), truth.state, truth.rotor_speed_rad_s, np.zeros((0, 0, 0)),
+            np.zeros((0, 0), np.float32), (np.zeros((0, 0)),), (np.zeros(0, np.int64),), (np.zeros(0, np.uint8),),
+            np.zeros(RECORD_SIZE),
+        )  # fmt: skip
+    imus, tracks = sensors.imus, [lane.newest.imu_track for lane in stack.estimation.feed.lanes]
+    return (
+        imus.motion, imus.records, truth.state, truth.rotor_speed_rad_s, imus.noise, sensors.wires,
+        tuple(track.ring for track in tracks), tuple(track.counters for track in tracks),
+        tuple(_bytes(estimator.memory) for estimator in stack.estimation.estimators), np.zeros(RECORD_SIZE),
+    )  # fmt: skip
+
+
+def _estimates(stack: Stack) -> list[_Arguments]:
+    """Return what the filter of each inertial sensor writes."""
+    found: list[_Arguments] = []
+    for number, estimator in enumerate(_estimators(stack)):
+        record = estimator.memory[0]
+        found.append((number, record["state"], record["flags"][ALIGNED:], record["resets"], _RESET_COUNTS))
+    nothing = np.zeros(STATE_SIZE), np.zeros(FLAGS, np.int64), np.zeros(RESETS)
+    return found or [(0, *nothing, _RESET_COUNTS)]
+
+
+class QuietBlock:
+    """Runs quiet ticks of a vehicle and a simulator for which ``compiles`` is True."""
+
+    def __init__(self, stack: Stack, simulator: Simulator, actuators: ActuatorsFrame) -> None:
+        loops, plant = stack.loops, simulator.plant
+        assert isinstance(loops, PythonLoops)
+        assert isinstance(plant, CompiledPlant)
+        self._stack, self._simulator, self._actuators = stack, simulator, actuators
+        self._loops, self._plant = loops, plant
+        self._sensors, self._estimation = simulator.sensors, stack.estimation
+        self._estimates = _estimates(stack)
+        self._interval_us = simulator.interval_us
+        self._counters = np.zeros(COUNTERS, np.int64)
+        self._fraction, self._idle = np.zeros(1), np.zeros(LoopRow.SIZE)
+        self._no_log = Trace(DEFAULT_CAPACITY, LoopRow.SIZE, lambda: None)
+        self._no_imu_log = Trace(DEFAULT_CAPACITY, RECORD_SIZE, lambda: None)
+        sensing = _sensing(stack, simulator)
+        constant = self._constant(self._addresses(sensing), sensing)
+        changing = self._changing(0, self._no_log, self._no_imu_log)
+        self._fly = partial(direct(fly_quiet_ticks, *constant, *changing), *constant)
+
+    def _addresses(self, sensing: _Arguments) -> Any:
+        """Return the addresses of the kernels."""
+        now, faults, commands = (
+            self._stack.now,
+            self._stack.parts.failsafes.faults,
+            self._actuators.rotor_speed_rad_s,
+        )
+        row, plant, loops = self._no_log.rows[0], self._plant, self._loops
+        calls = np.zeros(CALLS, np.int64)
+        calls[ADVANCE] = address_of(plant.kernel, plant.memory, commands, 0, 1, plant.output)
+        calls[CONTROL] = address_of(loops.kernel, now.state, 1.0, now.rotor_speed, loops.memory, row)
+        calls[FOLLOW] = address_of(follow_rotors, row, faults.rotors, faults.lags)
+        if self._estimation is not None:
+            track, record = self._estimation.feed.lanes[0].newest.imu_track, self._no_imu_log.rows[0]
+            calls[MEASURE] = address_of(measure_imu, *sensing[:6])
+            calls[TAKE] = address_of(take_wire, track.ring, track.counters, sensing[5][0], 0.0, 1, record)
+            calls[ESTIMATE] = address_of(imu_kernel, self._estimation.estimators[0].memory, track.ring[0])
+        return calls
+
+    def _constant(self, calls: Any, sensing: _Arguments) -> _Arguments:
+        """Return the arguments of the kernel that stay."""
+        stack, simulator, loops = self._stack, self._simulator, self._loops
+        now, faults, plant = stack.now, stack.parts.failsafes.faults, self._plant
+        plant_part = (
+            _bytes(plant.memory), self._actuators.rotor_speed_rad_s, simulator.steps, _bytes(plant.output), CONTACT,
+            _bytes(simulator.frame.frame), _bytes(stack.simulator.frame),
+        )  # fmt: skip
+        control = (
+            now.state, now.rotor_speed, _bytes(loops.memory), self._fraction, loops.fraction_step, self._idle,
+            _bytes(faults.rotors), _bytes(faults.lags),
+        )  # fmt: skip
+        return calls, self._counters, self._interval_us, plant_part, sensing, control
+
+    def _changing(self, count: int, log: Trace, imu_log: Trace) -> _Arguments:
+        """Return the other arguments of the kernel."""
+        now, estimation = self._stack.now, self._estimation
+        return (
+            count, now.time_us, self._actuators.flags, self._flies,
+            self._estimates[0 if estimation is None else estimation.feed.selected],
+            (log.rows, log.times_us, log.n), (imu_log.rows, imu_log.times_us, imu_log.n),
+        )  # fmt: skip
+
+    @property
+    def _flies(self) -> bool:
+        return self._stack.now.flying and not self._stack.now.rests
+
+    def fits(self, simulator: Simulator, actuators: ActuatorsFrame) -> bool:
+        """Return True if this block flies with these parts, and the simulator has its sensors as at the start."""
+        return (
+            actuators is self._actuators
+            and simulator is self._simulator
+            and simulator.sensors is self._sensors
+        )
+
+    def run(self, count: int) -> int:
+        """Run ``count`` ticks, or fewer, at least one unless a log is full or a fault acts between steps.
+
+        Return their number. Raise PlantDivergedError.
+        """
+        stack, sensors, estimation = self._stack, self._sensors, self._estimation
+        recorded = stack.recorder.log
+        log = self._no_log if recorded is None else recorded.inner
+        imu_log = (None if estimation is None else estimation.imu_trace) or self._no_imu_log
+        room = min(log.capacity - log.n, imu_log.capacity - imu_log.n)
+        count = min(count, room, self._plant.quiet_steps() // self._simulator.steps)
+        if sensors is not None:
+            count = min(count, sensors.imus.rows_left())
+        if count <= 0:
+            return 0
+        now, flies = stack.now, self._flies
+        self._fraction[0] = self._loops.fraction
+        if not flies:
+            self._loops.idle(now.state, now.rotor_speed, now.status.armed, self._idle)
+        self._fly(*self._changing(count, log, imu_log))
+        ticks, flown, result = self._counters.tolist()
+        self._loops.fraction = float(self._fraction[0])
+        row_at = log.n + ticks - 1
+        if recorded is not None:
+            log.n += ticks
+        if imu_log is not self._no_imu_log:
+            imu_log.n += flown
+        self._count(ticks, flown, result, log.rows[row_at])
+        return int(flown)
+
+    def _count(self, ticks: int, flown: int, result: int, row: FloatArray) -> None:
+        """Bring all parts to the time of the kernel, and end a tick that waits after a reset of the estimate."""
+        stack, interval_us, began_us = self._stack, self._interval_us, self._stack.now.time_us
+        time_us = began_us + flown * interval_us
+        stack.simulator.pass_by(flown)
+        if ticks:
+            stack.parts.autopilot.pass_by(ticks, began_us + ticks * interval_us, row)
+        self._simulator.pass_by(flown, result)
+        if self._estimation is not None:
+            self._estimation.pass_by(time_us, interval_us)
+        if flown > ticks:
+            self._actuators.rotor_speed_rad_s[:] = stack.parts.autopilot.tick(time_us)
