@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from typing import Any, Protocol
 
@@ -13,7 +12,7 @@ from flightstack.core.contract import FloatArray, RecordArray
 from flightstack.estimation.delayed_filter import field_kernel, imu_kernel, push_kernel
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.imu_track import IMU_SIZE
-from flightstack.estimation.memory import LANDED, MEMORY
+from flightstack.estimation.memory import LANDED, MEMORY, start_memory
 from flightstack.estimation.rings import MAG_RING
 
 EARTH_SIZE = 4
@@ -59,13 +58,10 @@ class PythonCore:
         self.push = partial(direct(push_kernel, self.memory, MAG_RING, np.zeros(4)), self.memory)
 
     def start(self, params: EstimatorParams) -> None:
-        """Start with an empty memory, as ``start_memory`` does in C."""
+        """Start with an empty memory."""
         self.memory[:] = 0
         self.set_params(params)
-        record = self._record
-        record["sums"][1] = 1.0
-        record["clock"][1] = params.imu_noise_share
-        record["earth"][3] = math.nan
+        getattr(start_memory, "py_func", start_memory)(self.memory)  # once: not worth its compilation
 
     def set_params(self, params: EstimatorParams) -> None:
         """Set the parameters."""

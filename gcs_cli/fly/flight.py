@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import Enum
+from pathlib import Path
+from typing import NamedTuple
 
 from flightstack.plan import Plan
 from gcs_cli.errors import FAILED, NO_ANSWER
@@ -39,6 +41,16 @@ class Phase(Enum):
     CONFIRM = "requesting the result of the mission"
     SHUT_DOWN = "shutting the vehicle down"
     OVER = "flight completed"
+
+
+class Flown(NamedTuple):
+    """A completed or aborted flight."""
+
+    folder: Path
+    outcome: Outcome
+    wall_time_s: float | None
+    overruns: int | None
+    returned_by_us: bool
 
 
 class Flight:

@@ -11,9 +11,9 @@ from flightstack.core.errors import ConfigError
 from flightstack.params.vehicle import NO_DRAG_PLANT
 from flightstack.plan import Plan
 from gcs_cli.errors import CliError
+from gcs_cli.fly.flight import Flown
 from gcs_cli.fly.fly_flags import FlyOptions
 from gcs_cli.fly.fly_options import flown_vehicle, outer_rate_hz
-from gcs_cli.fly.fly_run import Flown
 from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.conditions import conditions
 from gcs_cli.report.flight_data import Flight as FlightData

@@ -10,13 +10,12 @@ import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
 
 from flightstack.core.port_numbers import vehicle_ground_port
 from flightstack.plan import Plan
 from flightstack.process.console import complain
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
-from gcs_cli.fly.flight import Flight, Phase
+from gcs_cli.fly.flight import Flight, Flown, Phase
 from gcs_cli.fly.flight_watch import STALL_S
 from gcs_cli.fly.fly_display import Display, FlyConsole, make_display
 from gcs_cli.fly.fly_flags import FlyOptions, RunOptions
@@ -45,16 +44,6 @@ from gcs_cli.vehicle_link import open_signing
 _STEP_S = 0.1
 _END_TIMEOUT_S = 10.0
 _RESULTS = "gcs_cli.fly.fly_results"
-
-
-class Flown(NamedTuple):
-    """A completed or aborted flight."""
-
-    folder: Path
-    outcome: Outcome
-    wall_time_s: float | None
-    overruns: int | None
-    returned_by_us: bool
 
 
 def fly(
@@ -161,7 +150,7 @@ def run_fly(options: FlyOptions, run: RunOptions, out: Path | None) -> None:
         flown = fly(options, items, out, display, run.overwrite)
     finally:
         display.close()
-    results = importlib.import_module(_RESULTS)  # late: it imports this module
+    results = importlib.import_module(_RESULTS)  # late: see run_flight
     summary, outcome = results.write_results(options, items, flown)
     if run.as_json:
         print(json.dumps({**summary, "directory": str(flown.folder)}), flush=True)
