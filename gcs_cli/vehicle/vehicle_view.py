@@ -31,6 +31,10 @@ _IGNORE_POSITION, _IGNORE_VELOCITY, _IGNORE_YAW = 0b111, 0b111000, 1 << 10  # PO
 _IGNORE_ATTITUDE = 128  # ATTITUDE_TARGET_TYPEMASK
 _PREARM_CHECK = 1 << 28  # MAV_SYS_STATUS_PREARM_CHECK: no sensor
 _RATE_WINDOW_S = 1.0
+_MOST_LATE = 8
+"""Messages that may overtake another one: PX4 sends from several threads."""
+_LARGEST_GAP = 128
+"""Of lost messages; larger gaps in the sequence are a sender that began anew."""
 _MOST_ROTORS = 16
 _STANDARD = "MAV_STANDARD_MODE_"
 _NOT_SELECTABLE = 2  # MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
@@ -74,18 +78,28 @@ def _restarted(before_s: float | None, view: VehicleView) -> VehicleView:
     return view._replace(restarts=view.restarts + 1)
 
 
+def _missing(link: LinkCounts, sequence: int) -> tuple[int, int]:
+    """Return the number of messages lost until now, and the newest sequence number."""
+    if link.last_sequence is None:
+        return link.lost, sequence
+    late = (link.last_sequence - sequence) % 256
+    if late == 0:  # repeated
+        return link.lost, sequence
+    if late <= _MOST_LATE:  # overtaken by later ones, which counted it as lost
+        return max(0, link.lost - 1), link.last_sequence
+    gap = (sequence - link.last_sequence - 1) % 256
+    return link.lost + (gap if gap <= _LARGEST_GAP else 0), sequence
+
+
 def _counted(link: LinkCounts, sequence: int, now_s: float) -> LinkCounts:
-    gap = 0 if link.last_sequence is None else (sequence - link.last_sequence - 1) % 256
-    if gap > 128:  # out of order or repeated, not a gap of more than half the range
-        gap = 0
+    lost, newest = _missing(link, sequence)
     start, count, rate, last = link.window_start_s, link.window_count + 1, link.rate_hz, link.last_received_s
     if start is None or last is None or (rate is None and now_s == start):
         start, count = now_s, 0  # read at once with the first message: a backlog has no rate
     elif now_s != last and last - start >= _RATE_WINDOW_S:  # messages read at one time belong to one window
         start, count, rate = last, 1, link.window_count / (last - start)
-    return LinkCounts(
-        link.received + 1, link.lost + gap, sequence, now_s, rate, start, count, link.round_trip_s
-    )
+    received, trip_s, loss = link.received + 1, link.round_trip_s, link.recent_loss
+    return LinkCounts(received, lost, newest, now_s, rate, start, count, trip_s, loss)
 
 
 def _number(value: float) -> float | None:

@@ -255,10 +255,14 @@ class LinkCounts(NamedTuple):
     window_count: int = 0
     round_trip_s: float | None = None
     """Time from the newest answered TIMESYNC to its answer; None without one."""
+    recent_loss: float | None = None
+    """Share of the messages that were lost in the last 10 s, 0 to 1; None if it is not measured."""
 
     @property
     def quality(self) -> float | None:
-        """Share of the vehicle's messages that arrived, 0 to 1."""
+        """Share of the vehicle's messages that arrived in the last 10 s, else in all, 0 to 1."""
+        if self.recent_loss is not None:
+            return 1.0 - self.recent_loss
         total = self.received + self.lost
         return self.received / total if total else None
 
