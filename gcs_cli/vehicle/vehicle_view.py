@@ -31,7 +31,7 @@ _IGNORE_POSITION, _IGNORE_VELOCITY, _IGNORE_YAW = 0b111, 0b111000, 1 << 10  # PO
 _IGNORE_ATTITUDE = 128  # ATTITUDE_TARGET_TYPEMASK
 _PREARM_CHECK = 1 << 28  # MAV_SYS_STATUS_PREARM_CHECK: no sensor
 _RATE_WINDOW_S = 1.0
-_MOST_LATE = 8
+_MOST_LATE = 32
 """Messages that may overtake another one: PX4 sends from several threads."""
 _LARGEST_GAP = 128
 """Of lost messages; larger gaps in the sequence are a sender that began anew."""

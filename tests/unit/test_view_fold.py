@@ -233,7 +233,7 @@ def test_a_message_that_others_overtook_is_not_lost(vehicle: Vehicle) -> None:
 
 
 def test_a_sequence_that_begins_anew_counts_no_loss(vehicle: Vehicle) -> None:
-    for _ in range(30):
+    for _ in range(100):
         vehicle.send(heartbeat())
     vehicle.link = Link(1, 1)
     for _ in range(3):
