@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
-from gcs_cli.vehicle.view_types import LinkCounts
+from gcs_cli.vehicle.link_counts import LinkCounts
 
 PERIOD_S = 1.0
 PROMPT_S = 0.1

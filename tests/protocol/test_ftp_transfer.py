@@ -161,14 +161,20 @@ class RepeatingServer(FtpServer):
     """Takes a request with the number of the last one for its repetition, as PX4's mavlink_ftp.cpp does."""
 
     last: Message = None
+    repeated: tuple[tuple[Hashable, Message], ...] = ()
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
         sequence = next_sequence(read_packet(message).sequence)
         if self.last is not None and read_packet(self.last).sequence == sequence:
-            self._outbox.append((peer, self.last))
+            self.repeated = ((peer, self.last),)
         else:
             super().receive(message, peer, now_s)
-            self.last = self._outbox[-1][1] if self._outbox else None
+
+    def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
+        answers = super().poll(now_s)
+        self.last = answers[-1][1] if answers else self.last
+        repeated, self.repeated = self.repeated, ()
+        return [*repeated, *answers]
 
 
 @pytest.mark.parametrize("first", [0, 65_535])
