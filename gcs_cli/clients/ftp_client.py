@@ -163,10 +163,8 @@ class FtpClient:
         if packet.sequence != next_sequence(request.sequence):
             return
         if packet.request != request.opcode:
-            if (
-                packet.request != Opcode.BURST_READ_FILE
-            ):  # the answer to an earlier client: use another number
-                self._ask(Opcode(request.opcode))
+            if packet.request != Opcode.BURST_READ_FILE:
+                self._ask(Opcode(request.opcode))  # it answers an earlier client: use another number
             return
         self._progress_s = now_s
         if self._sent_s is not None:
