@@ -310,8 +310,8 @@ class World:
         self.request("goto", self.goto_command(north_m, east_m, alt_m))
 
     def takeoff_command(self, alt_m: float = math.nan) -> calls.Command:
-        """Return the command to take off to an altitude above home."""
-        return calls.takeoff_command(self.engine.stack.area.home.altitude_m + alt_m)
+        """Return the command to take off to an altitude above home, to where it moves if the vehicle arms now."""
+        return calls.takeoff_command(self.engine.stack.parts.takeoff.home_altitude_m + alt_m)
 
     def goto_command(self, north_m: float, east_m: float, alt_m: float = math.nan) -> calls.Command:
         """Return the command to fly to a position relative to home at the start."""

@@ -34,7 +34,10 @@ _NO_POSITION = "the vehicle does not send its position"
 
 
 def takeoff(altitude_m: float | None = None) -> Action:
-    """Take off to an altitude above home, and arm for it; None: the vehicle's own altitude."""
+    """Take off to an altitude above home, and arm for it; None: the vehicle's own altitude.
+
+    Above mean sea level it is counted from the ground below the vehicle, to which home moves as the vehicle arms.
+    """
 
     def plan(view: VehicleView) -> tuple[Step, ...]:
         if view.armed and view.on_ground is False:
@@ -74,7 +77,7 @@ def _climbed(view: VehicleView, altitude_m: float | None) -> Condition:
         mode = view.autopilot.roles.get(Role.TAKEOFF)
         return lambda view: view.armed and view.on_ground is False and view.mode not in (None, mode)
     is_relative = view.autopilot.takeoff_frame is not None
-    least_m = (altitude_m if is_relative else _amsl_m(view, altitude_m)) - ALTITUDE_TOLERANCE_M
+    least_m = (altitude_m if is_relative else _takeoff_amsl_m(view, altitude_m)) - ALTITUDE_TOLERANCE_M
 
     def is_there(view: VehicleView) -> bool:
         if view.geo is None or view.on_ground:  # the ground may be above home
@@ -88,6 +91,12 @@ def _amsl_m(view: VehicleView, altitude_m: float) -> float:
     home_m = view.home_altitude_m
     assert home_m is not None  # needed by the action
     return home_m + altitude_m
+
+
+def _takeoff_amsl_m(view: VehicleView, altitude_m: float) -> float:
+    """Return the altitude above mean sea level of one above the ground on which the vehicle stands."""
+    assert view.geo is not None  # needed by the action
+    return view.geo.altitude_m + altitude_m
 
 
 def _phase_step(view: VehicleView, phase: Phase, altitude_m: float | None) -> Step | None:
@@ -106,7 +115,7 @@ def _phase_step(view: VehicleView, phase: Phase, altitude_m: float | None) -> St
     frame = autopilot.takeoff_frame
     if altitude_m is None:
         return Step("takeoff", common_commands.takeoff(frame, math.nan), None)
-    altitude = _amsl_m(view, altitude_m) if frame is None else altitude_m
+    altitude = _takeoff_amsl_m(view, altitude_m) if frame is None else altitude_m
     return Step("takeoff", common_commands.takeoff(frame, altitude), None)
 
 

@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import math
+import random
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -58,13 +59,19 @@ class FtpFailed(NamedTuple):
 
 
 class FtpClient:
-    """One operation at a time with one vehicle; a new one replaces the current one."""
+    """One operation at a time with one vehicle; a new one replaces the current one.
 
-    def __init__(self, vehicle: Address, own: Address) -> None:
+    An operation fails after ``silence_s`` without progress.
+    """
+
+    def __init__(self, vehicle: Address, own: Address, silence_s: float = SILENCE_S) -> None:
         self.vehicle = vehicle
         self.own = own
+        self._silence_s = silence_s
         self.result: FtpDone | FtpFailed | None = None
-        self._sequence = 0
+        self._sequence = random.randrange(2 * _HALF)
+        """Next sequence number. The first one is random: PX4 takes a request with the number of the last one, from
+        any client, for a repetition, and repeats its answer."""
         self._outbox: list[Packet] = []
         self._request: Packet | None = None
         """The pending open or list request."""
@@ -120,7 +127,7 @@ class FtpClient:
         """Return the messages to send now."""
         if self.result is None and self._retry_s is not None and now_s >= self._retry_s:
             self._progress_s = min(self._progress_s, now_s)  # counted from the first poll
-            if now_s - self._progress_s >= SILENCE_S:
+            if now_s - self._progress_s >= self._silence_s:
                 self._end(FtpFailed(f"the vehicle (system {self.vehicle.system}) does not answer"))
             elif self._request is not None:
                 self._outbox.append(self._request)
@@ -153,8 +160,11 @@ class FtpClient:
         self._retry_s = -math.inf
 
     def _on_answer(self, request: Packet, packet: Packet, now_s: float) -> None:
-        is_ours = packet.request == request.opcode and packet.sequence == next_sequence(request.sequence)
-        if not is_ours:
+        if packet.sequence != next_sequence(request.sequence):
+            return
+        if packet.request != request.opcode:
+            if packet.request != Opcode.BURST_READ_FILE:
+                self._ask(Opcode(request.opcode))  # it answers an earlier client: use another number
             return
         self._progress_s = now_s
         if self._sent_s is not None:

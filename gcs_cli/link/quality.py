@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
-from gcs_cli.vehicle.view_types import LinkCounts
+from gcs_cli.vehicle.link_counts import LinkCounts
 
 PERIOD_S = 1.0
 PROMPT_S = 0.1
@@ -42,16 +42,20 @@ class LinkMonitor:
         self._past: deque[LinkCounts] = deque(maxlen=_WINDOW + 1)
         self.round_trip_s: float | None = None
         """Time from the newest answered request to its answer [s]."""
+        self.loss: float | None = None
+        """Share of the messages that were lost in the last 10 s, 0 to 1, at the newest request."""
         self._prompt_until_s = -math.inf
 
     @property
     def quality(self) -> LinkQuality:
         """The quality now."""
         counts = self._counts()
+        return LinkQuality(counts.rate_hz, self._loss(counts), self.round_trip_s)
+
+    def _loss(self, counts: LinkCounts) -> float | None:
         past = self._past[0] if self._past else LinkCounts()
-        received, lost = counts.received - past.received, counts.lost - past.lost
-        loss = lost / (received + lost) if received + lost > 0 else None
-        return LinkQuality(counts.rate_hz, loss, self.round_trip_s)
+        received, lost = counts.received - past.received, max(0, counts.lost - past.lost)
+        return lost / (received + lost) if received + lost > 0 else None
 
     def receive(self, message: Message, now_s: float) -> None:
         """Process a message from the vehicle."""
@@ -72,7 +76,9 @@ class LinkMonitor:
             return []
         self._due_s = now_s + PERIOD_S
         self._prompt_until_s = now_s + PROMPT_S
-        self._past.append(self._counts())
+        counts = self._counts()
+        self.loss = self._loss(counts)
+        self._past.append(counts)
         stamp = max(1, round(now_s * 1e9))
         self._sent_s.append((stamp, now_s))
         return [mavlink.MAVLink_timesync_message(0, stamp)]

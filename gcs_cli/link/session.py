@@ -157,13 +157,14 @@ class Session:
         if not self._is_other_system(message):
             for service in self._services:
                 service.receive(message, now_s)
-            self._note_round_trip()
+            self._note_quality()
 
-    def _note_round_trip(self) -> None:
-        """Keep the newest round trip in the view, which the screens draw."""
-        link, round_trip_s = self.view.link, self._monitor.round_trip_s
-        if link.round_trip_s != round_trip_s:
-            self.view = self.view._replace(link=link._replace(round_trip_s=round_trip_s))
+    def _note_quality(self) -> None:
+        """Keep the newest round trip and loss in the view, which the screens draw."""
+        link, monitor = self.view.link, self._monitor
+        if link.round_trip_s != monitor.round_trip_s or link.recent_loss != monitor.loss:
+            noted = link._replace(round_trip_s=monitor.round_trip_s, recent_loss=monitor.loss)
+            self.view = self.view._replace(link=noted)
 
     def _is_vehicle(self, message: Message, peer: Address, now_s: float) -> bool:
         """Return True if the message is from our vehicle; without one, accept the first autopilot's heartbeat."""

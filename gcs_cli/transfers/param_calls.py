@@ -14,8 +14,8 @@ from gcs_cli.link.calls import TEXT_WAIT_S, vehicle_address
 from gcs_cli.link.connection import Connection
 from gcs_cli.vehicle.param_info import METADATA_PATH, ParamInfo, number_text, parse_metadata
 
-METADATA_WAIT_S = 3.0
-"""Timeout of the parameter metadata; many vehicles have none."""
+METADATA_SILENCE_S = 3.0
+"""Longest time without progress of the download of the metadata; many vehicles have none, and do not answer."""
 TIMING = ParamTiming()
 Progress: TypeAlias = Callable[[int, int], None]
 """Called with the transferred parameters and their total."""
@@ -116,9 +116,9 @@ def _change_in_any_order(
 
 def fetch_metadata(connection: Connection) -> dict[str, ParamInfo]:
     """Return the metadata of the vehicle's parameters, by name; empty if it sends none."""
-    client = FtpClient(vehicle_address(connection.session), connection.session.own)
+    client = FtpClient(vehicle_address(connection.session), connection.session.own, METADATA_SILENCE_S)
     client.start_download(METADATA_PATH)
-    connection.run(client, "parameter metadata", METADATA_WAIT_S)
+    connection.run(client, "parameter metadata")
     return parse_metadata(client.result.content) if isinstance(client.result, FtpDone) else {}
 
 

@@ -154,6 +154,8 @@ class WatchApp(App[None]):
         if screens and isinstance(screens[0], WatchScreen) and screens[0].is_composed:
             screens[0].show(view, self.feed.now_s)
             self.redraws += 1
+        if screens and isinstance(screens[-1], VehicleList):
+            screens[-1].update(self.feed.views, self.feed.now_s)
         for screen in screens:
             if (
                 screen.outer_size != self.size

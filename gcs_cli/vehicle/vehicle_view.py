@@ -9,6 +9,7 @@ from typing import Any
 from flightstack.core.portable_math import euler_angles
 from flightstack.mavlink.dialect import NAME_IN_VERSION, mavlink
 from gcs_cli.vehicle import mission_fold
+from gcs_cli.vehicle.link_counts import counted
 from gcs_cli.vehicle.status_texts import add_piece, without_stale_piece
 from gcs_cli.vehicle.view_types import (
     AvailableMode,
@@ -18,7 +19,6 @@ from gcs_cli.vehicle.view_types import (
     GeoPosition,
     Gnss,
     Identity,
-    LinkCounts,
     LoopTiming,
     Setpoint,
     Vector,
@@ -30,7 +30,6 @@ _ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 _IGNORE_POSITION, _IGNORE_VELOCITY, _IGNORE_YAW = 0b111, 0b111000, 1 << 10  # POSITION_TARGET_TYPEMASK
 _IGNORE_ATTITUDE = 128  # ATTITUDE_TARGET_TYPEMASK
 _PREARM_CHECK = 1 << 28  # MAV_SYS_STATUS_PREARM_CHECK: no sensor
-_RATE_WINDOW_S = 1.0
 _MOST_ROTORS = 16
 _STANDARD = "MAV_STANDARD_MODE_"
 _NOT_SELECTABLE = 2  # MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
@@ -62,7 +61,7 @@ def update(view: VehicleView, message: Any, now_s: float) -> VehicleView:
         view = view._replace(identity=sender)
     elif (message.get_srcSystem(), message.get_srcComponent()) != view.identity[:2]:
         return view
-    view = without_stale_piece(view, now_s)._replace(link=_counted(view.link, message.get_seq(), now_s))
+    view = without_stale_piece(view, now_s)._replace(link=counted(view.link, message.get_seq(), now_s))
     fold = FOLDS.get(message.get_type())
     return view if fold is None else _restarted(view.time_s, fold(view, message, now_s))
 
@@ -72,20 +71,6 @@ def _restarted(before_s: float | None, view: VehicleView) -> VehicleView:
     if before_s is None or view.time_s is None or view.time_s > before_s - _RESTART_S:
         return view
     return view._replace(restarts=view.restarts + 1)
-
-
-def _counted(link: LinkCounts, sequence: int, now_s: float) -> LinkCounts:
-    gap = 0 if link.last_sequence is None else (sequence - link.last_sequence - 1) % 256
-    if gap > 128:  # out of order or repeated, not a gap of more than half the range
-        gap = 0
-    start, count, rate, last = link.window_start_s, link.window_count + 1, link.rate_hz, link.last_received_s
-    if start is None or last is None or (rate is None and now_s == start):
-        start, count = now_s, 0  # read at once with the first message: a backlog has no rate
-    elif now_s != last and last - start >= _RATE_WINDOW_S:  # messages read at one time belong to one window
-        start, count, rate = last, 1, link.window_count / (last - start)
-    return LinkCounts(
-        link.received + 1, link.lost + gap, sequence, now_s, rate, start, count, link.round_trip_s
-    )
 
 
 def _number(value: float) -> float | None:

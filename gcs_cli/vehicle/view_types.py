@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from gcs_cli.autopilots.autopilot import Autopilot
 from gcs_cli.autopilots.registry import autopilot_of
+from gcs_cli.vehicle.link_counts import LinkCounts
 
 TEXTS_KEPT = 100
 LOST_AFTER_S = 5.0
@@ -241,26 +242,6 @@ class PartialText(NamedTuple):
     pieces: int
     received_s: float
     vehicle_time_s: float | None
-
-
-class LinkCounts(NamedTuple):
-    """Messages from the vehicle: received, missing in the sequence, and the recent rate [1/s]."""
-
-    received: int = 0
-    lost: int = 0
-    last_sequence: int | None = None
-    last_received_s: float | None = None
-    rate_hz: float | None = None
-    window_start_s: float | None = None
-    window_count: int = 0
-    round_trip_s: float | None = None
-    """Time from the newest answered TIMESYNC to its answer; None without one."""
-
-    @property
-    def quality(self) -> float | None:
-        """Share of the vehicle's messages that arrived, 0 to 1."""
-        total = self.received + self.lost
-        return self.received / total if total else None
 
 
 class VehicleView(NamedTuple):

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import json
+import lzma
+import math
+from collections.abc import Hashable
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 
 from flightstack.mavlink.files import Entry, FileTree, fixed
-from flightstack.mavlink.ftp_messages import FtpError
-from flightstack.mavlink.link import Address
+from flightstack.mavlink.ftp_messages import FtpError, next_sequence, read_packet
+from flightstack.mavlink.link import Address, Message
 from flightstack.services.files.ftp_server import FtpServer
 from flightstack.services.logs.log_store import DatedLogs, FlatLogs
 from flightstack.transports.memory import LOSSLESS, Conditions
-from gcs_cli.clients.ftp_client import FtpClient, FtpDone, FtpFailed
+from gcs_cli.clients.ftp_client import RETRY_S, FtpClient, FtpDone, FtpFailed
+from gcs_cli.transfers.param_calls import METADATA_SILENCE_S, fetch_metadata
+from gcs_cli.vehicle.param_info import METADATA_PATH
 from tests.protocol.file_harness import GCS, LOSSY, VEHICLE, Ether, MemoryLogs, Station, content
 from tests.support.tools import NIGHTLY
 
@@ -146,6 +155,82 @@ def test_clients_download_at_once_and_share_fairly() -> None:
     ether.run(lambda: all(client.result is not None for client in clients))
     assert all(client.result == FtpDone(BIG) for client in clients)
     assert ether.most_per_poll <= 16 + len(clients)
+
+
+class RepeatingServer(FtpServer):
+    """Takes a request with the number of the last one for its repetition, as PX4's mavlink_ftp.cpp does."""
+
+    last: Message = None
+    repeated: tuple[tuple[Hashable, Message], ...] = ()
+
+    def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
+        sequence = next_sequence(read_packet(message).sequence)
+        if self.last is not None and read_packet(self.last).sequence == sequence:
+            self.repeated = ((peer, self.last),)
+        else:
+            super().receive(message, peer, now_s)
+
+    def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
+        answers = super().poll(now_s)
+        self.last = answers[-1][1] if answers else self.last
+        repeated, self.repeated = self.repeated, ()
+        return [*repeated, *answers]
+
+
+@pytest.mark.parametrize("first", [0, 65_535])
+def test_an_answer_to_an_earlier_client_is_not_taken_for_a_refusal(
+    first: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("random.randrange", lambda _end: first)
+    earlier, client = FtpClient(VEHICLE, GCS), FtpClient(VEHICLE, GCS)
+    earlier.start_list("nothing")
+    client.start_download("exact")
+    stations = [Station(earlier), Station(client)]
+    ether = Ether(RepeatingServer(VEHICLE, tree()), stations[0])
+    ether.run(lambda: earlier.result is not None)
+    ether.stations = (stations[1],)
+    ether.run(lambda: client.result is not None)
+    assert client.result == FtpDone(BIG[: 239 * 4])
+
+
+def test_clients_begin_with_different_numbers() -> None:
+    numbers = set()
+    for _ in range(4):  # equal by chance in one of 10^14 runs
+        client = FtpClient(VEHICLE, GCS)
+        client.start_list("etc")
+        numbers |= {read_packet(message).sequence for message in client.poll(0.0)}
+    assert len(numbers) > 1
+
+
+@pytest.mark.parametrize("silence_s", [1.0, 3.0])
+def test_a_download_ends_after_a_time_without_progress(silence_s: float) -> None:
+    client = FtpClient(VEHICLE, GCS, silence_s)
+    client.start_download("big.bin")
+    ether = Ether(FtpServer(VEHICLE, tree()), Station(client, Conditions(loss=1.0)))
+    assert ether.run(lambda: client.result is not None) == pytest.approx(silence_s, abs=RETRY_S)
+    assert isinstance(client.result, FtpFailed)
+
+
+class LossyConnection:
+    """Runs a transfer from a vehicle with metadata over a link that loses 70 %, in simulated time."""
+
+    session = SimpleNamespace(target=VEHICLE, own=GCS)
+    took_s = 0.0
+
+    def run(self, client: FtpClient, _name: str, timeout_s: float = math.inf) -> None:
+        entry = {"name": "MPC_XY_CRUISE", "type": "Float", "longDesc": content(2000).hex()}
+        document = json.dumps({"version": 1, "parameters": [entry]}).encode()
+        files = FileTree({METADATA_PATH: fixed(lzma.compress(document))}, {})
+        conditions = Conditions(loss=0.7, delay_s=0.02)
+        ether = Ether(FtpServer(VEHICLE, files), Station(client, conditions, seed=6))
+        end_s = ether.now_s + timeout_s
+        self.took_s = ether.run(lambda: client.result is not None or ether.now_s >= end_s)
+
+
+def test_metadata_on_a_slow_link_are_complete() -> None:
+    connection: Any = LossyConnection()
+    assert set(fetch_metadata(connection)) == {"MPC_XY_CRUISE"}
+    assert connection.took_s > METADATA_SILENCE_S  # 6.4 s
 
 
 def test_one_client_downloads_one_file_after_another() -> None:

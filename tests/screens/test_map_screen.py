@@ -23,11 +23,12 @@ from tests.support.still_feed import StillFeed
 MISSION = (item(22), item(16, Place(20.0, 0.0)), item(16, Place(20.0, 30.0)), item(20))
 FENCE = (item(FenceCommand.CIRCLE_EXCLUSION, Place(-10.0, 20.0), param1=8.0),)
 RALLY = (item(5100, Place(-15.0, -10.0)),)
+FLYING = VIEW._replace(armed=True)
 PLANS: tuple[tuple[MissionItem, ...], ...] = (MISSION, FENCE, RALLY)
 
 
 def drive(
-    story: Callable[[Pilot[None], WatchApp, MapScreen], Awaitable[None]], size=(80, 24), view=VIEW
+    story: Callable[[Pilot[None], WatchApp, MapScreen], Awaitable[None]], size=(80, 24), view=FLYING
 ) -> None:
     app = WatchApp(StillFeed(view))
 
@@ -118,6 +119,22 @@ def test_click_asks_before_the_vehicle_is_sent(answer):
         await pilot.press(answer)
         await pilot.pause()
         assert [action.name for action in app.feed.actions] == ["goto"] * (answer == "y")
+
+    drive(story)
+
+
+def test_disarmed_vehicle_is_not_sent_and_the_footer_has_no_key_for_it():
+    async def story(pilot, app, screen):
+        app.feed.shown = VIEW
+        app.redraw()
+        await pilot.pause()
+        assert "Go here" not in shown(app)[-1]
+        await pilot.click(screen.map, (10, 5))
+        await pilot.press("h", "g", "G", "Y")
+        await pilot.pause()
+        assert app.screen is screen
+        said = [notice.message for notice in app._notifications]
+        assert said == ["the vehicle is disarmed: take off first"]
 
     drive(story)
 

@@ -217,6 +217,8 @@ def test_saved_parameters_load_after_a_question_with_the_differences(tmp_path: P
     async def story(pilot, app, screen):
         await enter(pilot, app, "w")
         assert "MPC_XY_CRUISE\t4\t" in file.read_text()
+        await enter(pilot, app, "f")
+        assert shown(app)[2].endswith(" none other than in a.params")
         file.write_text(file.read_text().replace("MPC_XY_CRUISE\t4", "MPC_XY_CRUISE\t8"))
         await enter(pilot, app, "f")
         assert screen.names_shown == ["MPC_XY_CRUISE"]

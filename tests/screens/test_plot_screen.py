@@ -132,6 +132,25 @@ def test_field_is_found_added_and_removed():
     drive(story)
 
 
+def test_field_list_shows_fields_and_values_that_arrive_while_it_is_open():
+    async def story(pilot, app, screen):
+        await pilot.press("enter")
+        await pilot.pause()
+        await pilot.press(*"roll", "down")
+        picker = app.screen
+        selected = picker.shown[picker.query_one(RowList).cursor]
+        for name, value in ((b"a roll", 1.5), (b"a roll", 2.5)):
+            named = mavlink.MAVLink_named_value_float_message(0, name, value)
+            app.feed.history.record(received(named), END_S)
+            app.redraws = 0
+            screen.show(VIEW, END_S)
+            await pilot.pause()
+            assert any(f"{value:.3f}" in line for line in shown(app)), shown(app)
+        assert picker.shown[picker.query_one(RowList).cursor] == selected
+
+    drive(story)
+
+
 def test_field_list_reads_the_values_of_the_visible_names_only(monkeypatch):
     read = []
 

@@ -288,6 +288,35 @@ def test_vehicles_are_listed_selected_and_commanded_together() -> None:
     play(story, size=(120, 24))
 
 
+def test_open_list_of_vehicles_shows_changes_and_keeps_the_selected_one() -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        app.feed.others.append(OTHER)
+        app.redraw()
+        await pilot.press("v", "down")
+        app.feed.others[0] = OTHER._replace(mode="LAND")
+        app.feed.others.append(FULL._replace(identity=Identity(9, 1, 2, 12), mode="RTL"))
+        app.redraw()
+        await pilot.pause()
+        lines = "\n".join(shown(app))
+        assert "hexarotor  LAND" in lines
+        assert "quadrotor  RTL" in lines
+        await pilot.press("enter")
+        await pilot.pause()
+        assert app.feed.view.identity.system_id == 7
+
+    play(story, size=(120, 24))
+
+
+def test_messages_say_that_there_are_none() -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await pilot.press("5")
+        app.redraw()
+        await pilot.pause()
+        assert shown(app)[2] == " no messages yet"
+
+    play(story, FULL._replace(texts=()))
+
+
 @pytest.mark.parametrize("size", [(80, 24), (120, 35), (200, 50)], ids=str)
 @pytest.mark.parametrize(
     "entry", [entry for entry in SCREENS if entry.mode in ("fly", "messages")], ids=lambda entry: entry.mode

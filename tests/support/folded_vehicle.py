@@ -21,7 +21,11 @@ class Vehicle:
         self.view = VehicleView()
 
     def send(self, message: Any, now_s: float = 1.0) -> VehicleView:
-        for decoded in Link(0, 0).decode(self.link.encode(message)):
+        return self.receive(self.link.encode(message), now_s)
+
+    def receive(self, frame: bytes, now_s: float = 1.0) -> VehicleView:
+        """Fold a frame of the vehicle."""
+        for decoded in Link(0, 0).decode(frame):
             self.view = update(self.view, decoded, now_s)
         return self.view
 

@@ -7,6 +7,7 @@ import math
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 from gcs_cli.tui.fly.history import History
+from gcs_cli.vehicle.link_counts import LinkCounts
 from gcs_cli.vehicle.view_types import (
     Battery,
     Estimator,
@@ -14,7 +15,6 @@ from gcs_cli.vehicle.view_types import (
     GeoPosition,
     Gnss,
     Identity,
-    LinkCounts,
     LoopTiming,
     Mission,
     Setpoint,

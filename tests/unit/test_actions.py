@@ -60,6 +60,16 @@ def test_takeoff_ends_at_the_altitude(flying: World) -> None:
     assert flying.state.altitude_m == pytest.approx(5.0, abs=0.6)
 
 
+def test_takeoff_counts_from_the_ground_to_which_home_moves(world: World) -> None:
+    """As the vehicle arms; before, home may be metres off, because the estimated altitude drifts."""
+    area = world.engine.stack.area
+    area.set_home(area.home._replace(altitude_m=area.home.altitude_m + 2.0), chosen=False)
+    world.run_for(2.1)  # HOME_POSITION is sent every 2 s
+    assert perform(world, in_flight.takeoff(5.0))[:2] == (Outcome.DONE, "at 5 m")
+    assert seen(world).relative_altitude_m == pytest.approx(5.0, abs=0.6)
+    assert world.state.altitude_m == pytest.approx(5.0, abs=0.6)
+
+
 def test_takeoff_without_an_altitude_goes_to_the_vehicles_own(world: World) -> None:
     assert perform(world, in_flight.takeoff())[:2] == (Outcome.DONE, "took off")
     assert seen(world).mode == "HOLD"

@@ -143,7 +143,8 @@ def test_unknown_messages_do_not_count_as_lost() -> None:
 
 
 def test_round_trip_and_loss_are_measured() -> None:
-    fleet, vehicle = met(Fleet(), FakeVehicle(1)), Link(1, 1)
+    fleet, vehicle = Fleet(), Link(1, 1)
+    fleet.receive(vehicle.encode(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3)), HERE, 0.0)
     (request,) = (
         message
         for data, _ in fleet.poll(0.0)
@@ -164,3 +165,19 @@ def test_round_trip_and_loss_are_measured() -> None:
     received, lost = fleet.selected.view.link.received, fleet.selected.view.link.lost
     assert lost > 0
     assert quality.loss == pytest.approx(lost / (received + lost), abs=0.2)
+
+
+def test_the_view_has_the_loss_of_the_last_ten_seconds() -> None:
+    fleet, vehicle = Fleet(), Link(1, 1)
+    shown = list[float | None]()
+    for second in range(15):
+        for number in range(10):
+            frame = vehicle.encode(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3))
+            if second > 0 or number % 2 == 0:  # half of the first second is lost
+                fleet.receive(frame, HERE, float(second))
+        fleet.poll(float(second))
+        shown.append(fleet.selected.view.link.quality)
+    assert shown[2] is not None
+    assert shown[2] < 0.95  # 5 of 30 are lost
+    assert shown[-1] == 1.0
+    assert fleet.selected.view.link.lost > 0

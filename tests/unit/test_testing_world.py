@@ -37,6 +37,13 @@ def flight() -> Flight:
 # ---------------------------------------------------------------------- requests
 
 
+def test_takeoff_counts_from_the_ground_to_which_home_moves(world: World) -> None:
+    area = world.engine.stack.area
+    area.set_home(area.home._replace(altitude_m=area.home.altitude_m + 1.0), chosen=False)
+    world.takeoff(3.0)
+    assert world.run_until("mode == 'HOLD'").altitude_m == pytest.approx(3.0, abs=0.5)
+
+
 def test_requests_change_the_state(world: World) -> None:
     world.takeoff(3.0)
     assert world.state.armed

@@ -223,6 +223,24 @@ def test_gaps_in_the_sequence_are_counted_as_lost(vehicle: Vehicle) -> None:
     assert link.quality == 0.5
 
 
+def test_a_message_that_others_overtook_is_not_lost(vehicle: Vehicle) -> None:
+    late = vehicle.link.encode(heartbeat())
+    vehicle.send(heartbeat())
+    vehicle.receive(late)
+    link = vehicle.send(heartbeat()).link
+    assert (link.received, link.lost) == (4, 0)
+    assert link.quality == 1.0
+
+
+def test_a_sequence_that_begins_anew_counts_no_loss(vehicle: Vehicle) -> None:
+    for _ in range(100):
+        vehicle.send(heartbeat())
+    vehicle.link = Link(1, 1)
+    for _ in range(3):
+        vehicle.send(heartbeat())
+    assert vehicle.view.link.lost == 0
+
+
 def test_message_rate_is_measured_over_a_second() -> None:
     vehicle = Vehicle()
     for index in range(50):

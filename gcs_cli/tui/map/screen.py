@@ -15,7 +15,7 @@ from gcs_cli.tui.map.drawing import legend, place_text
 from gcs_cli.tui.map.model import MapModel
 from gcs_cli.tui.map.widget import MapWidget
 from gcs_cli.tui.mission.plan_fetcher import PlanFetcher
-from gcs_cli.tui.orders.orders import vehicle_name
+from gcs_cli.tui.orders.orders import order_named, vehicle_name
 from gcs_cli.tui.watch_screen import WatchScreen
 from gcs_cli.tui.widgets.drawing import LineWidget, watch_app
 from gcs_cli.vehicle.view_types import VehicleView
@@ -101,6 +101,10 @@ class MapScreen(WatchScreen):
         left.append_text(place)
         line.show_line(left)
 
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Return False for keys that have no effect now."""
+        return action != "goto" or any(map(order_named("goto").applies, watch_app(self).feed.targets))
+
     def action_map(self, method: str) -> None:
         """Call a method of the map without arguments."""
         {"follow": self.map.follow, "fit": self.map.fit, "toggle_grid": self.map.toggle_grid}[method]()
@@ -128,18 +132,18 @@ class MapScreen(WatchScreen):
     @work(exclusive=True)
     async def action_goto(self) -> None:
         """Ask, and fly to the place under the cursor at the current altitude."""
-        frame, place = self._model.frame, self.map.cursor_place
-        if frame is None or place is None:
-            reason = (
-                "the vehicle has no position yet" if frame is None else "move the map or the mouse to a place"
-            )
-            self.notify(reason, severity="warning")
+        app, frame, place = watch_app(self), self._model.frame, self.map.cursor_place
+        targets = [view for view in app.feed.targets if order_named("goto").applies(view)]
+        if frame is None or place is None or not targets:
+            reason = "the vehicle is disarmed: take off first" if place is not None else ""
+            reason = reason or "move the map or the mouse to a place"
+            self.notify("the vehicle has no position yet" if frame is None else reason, severity="warning")
             return
-        app, target = watch_app(self), frame.to_geo(Vector3(*place, 0.0))
+        target = frame.to_geo(Vector3(*place, 0.0))
         where = f"{place_text(frame, place, self.map.scene.home)}\nat the current altitude"
         await app.perform(
             "Fly there",
-            app.feed.targets,
+            targets,
             lambda _view: in_flight.goto(target.latitude_deg, target.longitude_deg),
             lambda view: f"Fly {vehicle_name(view)} to {where}?",
         )

@@ -77,7 +77,9 @@ class MessagesScreen(WatchScreen):
     def _show_filter(self) -> None:
         entries = watch_app(self).feed.messages.since(0)
         shown = len(selected(entries, LEVELS[self._level][0], self._words))
-        text = f"{LEVELS[self._level][1]}: {shown} of {len(entries)}"
+        text = (
+            f"{LEVELS[self._level][1]}: {shown or 'none'} of {len(entries)}" if entries else "no messages yet"
+        )
         if self._words:
             text += f", with “{self._words}”"
         self.query_one("#filter", LineWidget).show_line(Text(text))

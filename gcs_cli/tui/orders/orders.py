@@ -169,6 +169,7 @@ ORDERS = (
             Field("longitude", "°", smallest=-180.0, largest=180.0),
             _ALTITUDE,
         ),
+        applies=lambda view: view.armed,
     ),
     Order(
         "speed",
@@ -185,6 +186,7 @@ ORDERS = (
         "Turn to a heading",
         in_flight.yaw,
         (Field("heading", "° clockwise from north", smallest=0.0, largest=360.0),),
+        applies=lambda view: view.armed,
     ),
     Order(
         "mission",

@@ -34,12 +34,21 @@ class VehicleList(ModalScreen[int | None]):
 
     def compose(self) -> ComposeResult:
         """Yield the list."""
-        options = [Option(vehicle_line(view, self._now_s), id=str(_system_id(view))) for view in self._views]
-        if len(options) > 1:
-            options.append(Option("all of them: actions go to every vehicle", id=str(ALL)))
-        listed = OptionList(*options, markup=False)
+        listed = OptionList(*_options(self._views, self._now_s), markup=False)
         listed.border_title = "Vehicles"
         yield listed
+
+    def update(self, views: tuple[VehicleView, ...], now_s: float) -> None:
+        """Show the vehicles of now; the selected one stays selected."""
+        listed = self.query_one(OptionList)
+        options = _options(views, now_s)
+        if [option.prompt for option in options] == [option.prompt for option in listed.options]:
+            return
+        before = None if listed.highlighted_option is None else listed.highlighted_option.id
+        listed.set_options(options)
+        listed.highlighted = next(
+            (index for index, option in enumerate(options) if option.id == before), listed.highlighted
+        )
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
         """End with the vehicle."""
@@ -48,6 +57,13 @@ class VehicleList(ModalScreen[int | None]):
     def action_cancel(self) -> None:
         """End without a choice."""
         self.dismiss(None)
+
+
+def _options(views: tuple[VehicleView, ...], now_s: float) -> list[Option]:
+    options = [Option(vehicle_line(view, now_s), id=str(_system_id(view))) for view in views]
+    if len(options) > 1:
+        options.append(Option("all of them: actions go to every vehicle", id=str(ALL)))
+    return options
 
 
 def vehicle_line(view: VehicleView, now_s: float) -> str:

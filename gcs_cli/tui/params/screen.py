@@ -124,10 +124,13 @@ class ParamScreen(JobScreen):
             query = self.query_one(SearchField).value
             left.append(f", with “{query}”" if query else "", colours.text)
             left.append(", changed only" if self._changed_only else "", colours.warning)
-        what = "in the file" if params.file is None else f"other than in {params.file_name}"
-        what = "not at the default" if params.file is None else what
-        right = Text(f"{self._changes} {what}" if self._changes else "", colours.warning)
-        self.show_line("param-state", left, right)
+        self.show_line("param-state", left, Text(self._changes_text(), colours.warning))
+
+    def _changes_text(self) -> str:
+        params = self._params
+        if params.file is None:
+            return f"{self._changes} not at the default" if self._changes else ""
+        return f"{self._changes or 'none'} other than in {params.file_name}"
 
     # -- the table
 

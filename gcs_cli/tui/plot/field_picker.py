@@ -92,6 +92,14 @@ class FieldPicker(ModalScreen[None]):
         """The names that match, best first."""
         return [match.name for match in self._found]
 
+    def update(self) -> None:
+        """Show the names and values of now; the selected name stays selected."""
+        rows = self.query_one(_Names)
+        before = self._found[rows.cursor].name if self._found else ""
+        self._load()
+        if before in self.shown and self.shown[rows.cursor] != before:
+            rows.select(self.shown.index(before))
+
     def on_input_changed(self, event: Input.Changed) -> None:
         """Show the names that match."""
         before, self._query = self._query, event.value

@@ -1,0 +1,60 @@
+"""Messages of a vehicle by their sequence numbers: received, lost, late, and their rate. Pure."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+_RATE_WINDOW_S = 1.0
+_MOST_LATE = 32
+"""Messages that may overtake another one: PX4 sends from several threads."""
+_LARGEST_GAP = 128
+"""Of lost messages; larger gaps in the sequence are a sender that began anew."""
+
+
+class LinkCounts(NamedTuple):
+    """Messages from the vehicle: received, missing in the sequence, and the recent rate [1/s]."""
+
+    received: int = 0
+    lost: int = 0
+    last_sequence: int | None = None
+    last_received_s: float | None = None
+    rate_hz: float | None = None
+    window_start_s: float | None = None
+    window_count: int = 0
+    round_trip_s: float | None = None
+    """Time from the newest answered TIMESYNC to its answer; None without one."""
+    recent_loss: float | None = None
+    """Share of the messages that were lost in the last 10 s, 0 to 1; None if it is not measured."""
+
+    @property
+    def quality(self) -> float | None:
+        """Share of the vehicle's messages that arrived in the last 10 s, else in all, 0 to 1."""
+        if self.recent_loss is not None:
+            return 1.0 - self.recent_loss
+        total = self.received + self.lost
+        return self.received / total if total else None
+
+
+def _missing(link: LinkCounts, sequence: int) -> tuple[int, int]:
+    """Return the number of messages lost until now, and the newest sequence number."""
+    if link.last_sequence is None:
+        return link.lost, sequence
+    late = (link.last_sequence - sequence) % 256
+    if late == 0:  # repeated
+        return link.lost, sequence
+    if late <= _MOST_LATE:  # overtaken by later ones, which counted it as lost
+        return max(0, link.lost - 1), link.last_sequence
+    gap = (sequence - link.last_sequence - 1) % 256
+    return link.lost + (gap if gap <= _LARGEST_GAP else 0), sequence
+
+
+def counted(link: LinkCounts, sequence: int, now_s: float) -> LinkCounts:
+    """Return the counts after a message with this sequence number."""
+    lost, newest = _missing(link, sequence)
+    start, count, rate, last = link.window_start_s, link.window_count + 1, link.rate_hz, link.last_received_s
+    if start is None or last is None or (rate is None and now_s == start):
+        start, count = now_s, 0  # read at once with the first message: a backlog has no rate
+    elif now_s != last and last - start >= _RATE_WINDOW_S:  # messages read at one time belong to one window
+        start, count, rate = last, 1, link.window_count / (last - start)
+    received, trip_s, loss = link.received + 1, link.round_trip_s, link.recent_loss
+    return LinkCounts(received, lost, newest, now_s, rate, start, count, trip_s, loss)
