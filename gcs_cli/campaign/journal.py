@@ -13,14 +13,13 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from flightstack import __version__
 from flightstack.core.atomic_file import write_text_atomically
 from flightstack.core.errors import ConfigError
-from flightstack.firmware.sources import source_hash
+from gcs_cli.campaign.installed import FLYING, sources_digest
 from gcs_cli.campaign.plan import PlannedFlight
 from gcs_cli.campaign.rows import Row
 from gcs_cli.errors import USAGE, CliError
@@ -29,7 +28,6 @@ JOURNAL, RECORD = "flights.jsonl", "campaign.json"
 RESULTS = PARQUET, CSV, REPORT = "flights.parquet", "flights.csv", "report.html"
 _FORM = 1
 """Version of the directory's form."""
-_SOURCES = frozenset((".py", ".toml", ".xml"))
 
 
 def record_of(kind: str, files: Mapping[str, bytes], flights: Sequence[PlannedFlight]) -> dict[str, Any]:
@@ -39,27 +37,10 @@ def record_of(kind: str, files: Mapping[str, bytes], flights: Sequence[PlannedFl
         "form": _FORM,
         "kind": kind,
         "version": __version__,
-        "sources": _sources_digest(),
+        "sources": sources_digest(FLYING),
         "flights": hashlib.sha256(inputs.encode()).hexdigest(),
         "files": {name: hashlib.sha256(content).hexdigest() for name, content in sorted(files.items())},
     }
-
-
-def _package(name: str) -> Path:
-    spec = find_spec(name)
-    assert spec is not None
-    assert spec.origin is not None
-    return Path(spec.origin).parent
-
-
-def _sources_digest() -> str:
-    """Return a digest of the programs that fly: an edit of a law of this project changes flights too."""
-    result = hashlib.sha256(source_hash())  # of the loops in C
-    for package in map(_package, ("flightstack", "sim_bridge")):
-        for path in sorted(path for path in package.rglob("*") if path.suffix in _SOURCES):
-            result.update(str(path.relative_to(package)).encode())
-            result.update(path.read_bytes())
-    return result.hexdigest()
 
 
 class Journal:
