@@ -74,6 +74,10 @@ def nominal_point(campaign: Campaign) -> FloatArray:
             raise ConfigError(
                 campaign.path, f"vary.{name}.nominal", "is missing: --seek worst searches from there"
             )
+        low, high = distribution.ends
+        if not low <= value <= high:
+            problem = f"{value:g}, from which --seek worst searches, is outside the range {low:g} to {high:g}"
+            raise ConfigError(campaign.path, f"vary.{name}", f"{problem}: give another range, or nominal")
         shares.append(distribution.share_of(value))
     return np.array(shares)
 
