@@ -121,17 +121,21 @@ def case_of(campaign: Campaign, flight: PlannedFlight, options: CampaignOptions)
 
 
 def check_flights(campaign: Campaign, flights: Sequence[PlannedFlight]) -> None:
-    """Check types and ranges of all flights, and all else of those with the extremes of each input or with each choice.
+    """Check types and ranges of all inputs, and all else of the flights with the extremes and the choices of each.
 
-    Raise ConfigError: a wrong file ends before anything flies.
+    Types and ranges depend on one input alone, and a number between two that are allowed is allowed: that of a grid may
+    be no whole number. Raise ConfigError: a wrong file ends before anything flies.
     """
-    checked = {flights[0].number}
+    checked = {flights[0].number: flights[0]}
+    read: dict[int, PlannedFlight] = {}
     for name, distribution in campaign.vary.items():
-        if distribution.is_choice:
-            checked |= set({each.inputs[name]: each.number for each in flights}.values())
-        else:
-            checked |= {select(flights, key=lambda each: each.inputs[name]).number for select in (min, max)}
-    for flight in flights:
+        if distribution.is_choice or distribution.steps is not None:
+            each = {flight.inputs[name]: flight for flight in flights}.values()
+            (checked if distribution.is_choice else read).update({flight.number: flight for flight in each})
+        if not distribution.is_choice:
+            ends = (select(flights, key=lambda flight: flight.inputs[name]) for select in (min, max))
+            checked |= {flight.number: flight for flight in ends}
+    for number, flight in sorted((read | checked).items()):
         scenario = campaign.scenario(flight.inputs)
-        if flight.number in checked:
+        if number in checked:
             check_scenario(scenario)
