@@ -51,19 +51,27 @@ class Journal:
 
         ``overwrite``: begin anew, whatever is there.
         """
-        self._descriptor = os.open(
-            folder / JOURNAL, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666
-        )
+        path = folder / JOURNAL
+        is_new = not path.exists()
+        self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
         try:
             self._lock(folder)
             if overwrite:
                 self._clear(folder)
-            _check_record(folder, record)
-            self._record = record
-            self.rows = self._read()
+            self._open(folder, record, is_new)
         except BaseException:
             self.close()
             raise
+
+    def _open(self, folder: Path, record: Mapping[str, Any], is_new: bool) -> None:
+        try:
+            _check_record(folder, record)
+        except BaseException:
+            if is_new and not os.fstat(self._descriptor).st_size:
+                (folder / JOURNAL).unlink()
+            raise
+        self._record = record
+        self.rows = self._read()
         """The row of each flight that is over, by its number."""
 
     def _lock(self, folder: Path) -> None:
@@ -128,6 +136,16 @@ def flown_before(folder: Path, number: int) -> PlannedFlight:
     if number not in rows:
         raise CliError(f"--only {number}: the search in {folder} has {len(rows)} flights", USAGE)
     return PlannedFlight(number, rows[number]["seed"], rows[number]["inputs"])
+
+
+def changed_since(folder: Path, files: Mapping[str, bytes]) -> str:
+    """Return what changed since the flights of ``folder``, as the beginning of a sentence, or empty."""
+    with contextlib.suppress(
+        OSError, ValueError, TypeError, AttributeError, KeyError
+    ):  # no record, or a damaged one
+        before = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        return _difference(before, record_of("seek", files, ()) | {"flights": before["flights"]})
+    return ""
 
 
 def _whole_rows(content: bytes) -> tuple[dict[int, Row], int]:

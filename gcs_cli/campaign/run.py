@@ -18,6 +18,7 @@ from gcs_cli.campaign.journal import (
     PARQUET,
     REPORT,
     Journal,
+    changed_since,
     flown_before,
     open_journal,
     record_of,
@@ -41,7 +42,12 @@ def run_campaign(pool: FlightPool, options: CampaignOptions, console: Console) -
     library("pyarrow")  # missing: say so before the flights
     campaign = load_campaign(options.file)
     if options.seek is not None and options.only is not None:
-        return fly_only(pool, campaign, flown_before(options.folder, options.only), options, console)
+        flight = flown_before(options.folder, options.only)
+        if changed := changed_since(options.folder, campaign.files([flight.inputs])):
+            _say(
+                console, f"{changed} since the search: this flight may differ from its flight {flight.number}"
+            )
+        return fly_only(pool, campaign, flight, options, console)
     if options.seek is not None:
         return run_search(pool, campaign, options, console)
     flights = plan_flights(campaign)
