@@ -34,7 +34,7 @@ class Answer(NamedTuple):
 
 
 _thread = threading.local()
-"""``session``, ``root`` and ``pool`` of the client for which this thread flies."""
+"""``session``, ``root`` and ``pool`` of the client for which this thread flies; ``installed`` files that are equal."""
 
 
 def fly(session: str, folder: str, wanted: Mapping[str, str], order: bytes) -> Answer:
@@ -50,13 +50,19 @@ def fly(session: str, folder: str, wanted: Mapping[str, str], order: bytes) -> A
         _begin(session, Path(worker.local_directory) / f"flightstack-{session}", folder)
     given: Order = pickle.loads(order)
     case = given.place(_thread.root)
-    try:
-        problem = difference(given.installed, digests(case.scenario.installed_files()))
-    except ConfigError as error:  # without the controller
-        problem = f"cannot fly: {error}"
-    if problem:
-        return Answer(problem=f"worker {worker.address} {problem}")
+    if given.installed != _thread.installed:
+        if problem := _problem(case, given.installed):
+            return Answer(problem=f"worker {worker.address} {problem}")
+        _thread.installed = given.installed
     return _flown(worker, case, given.wanted)
+
+
+def _problem(case: Case, wanted: Mapping[str, str]) -> str:
+    """Return how the installed files of a case differ from those of the client, as the end of a sentence, or empty."""
+    try:
+        return difference(wanted, digests(case.scenario.installed_files()))
+    except ConfigError as error:  # without the controller
+        return f"cannot fly: {error}"
 
 
 def _begin(session: str, root: Path, folder: str) -> None:
@@ -66,6 +72,7 @@ def _begin(session: str, root: Path, folder: str) -> None:
     here = below(root, folder)
     here.mkdir(parents=True, exist_ok=True)
     _thread.pool, _thread.root, _thread.session = Pool(1, here), root, session
+    _thread.installed = None
 
 
 def _flown(worker: distributed.Worker, case: Case, wanted: Wanted) -> Answer:

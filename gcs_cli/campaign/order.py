@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -41,10 +41,34 @@ class Order(NamedTuple):
         return replace(self.case, scenario=_placed(self.case.scenario, root))
 
 
-def make_order(case: Case, wanted: Wanted, read: Callable[[Path], bytes] = Path.read_bytes) -> Order:
-    """Return the order for a case, whose files ``read`` reads; raise OSError."""
-    own = {str(path.absolute()): read(path.absolute()) for path in case.scenario.own_files()}
-    return Order(case, wanted, own, digests(case.scenario.installed_files()))
+class Files:
+    """The files of scenarios, each read at its first use: another machine writes it once."""
+
+    def __init__(self) -> None:
+        self._contents: dict[Path, bytes] = {}
+        self._known: dict[tuple[str | None, ...], tuple[Mapping[str, bytes], Mapping[str, str]]] = {}
+
+    def order(self, case: Case, wanted: Wanted) -> Order:
+        """Return the order for a case; raise OSError."""
+        scenario = case.scenario
+        uploads = (event.upload for event in scenario.event)
+        key = (
+            scenario.plan,
+            scenario.vehicle,
+            scenario.gains,
+            scenario.controller,
+            str(scenario.path),
+            *uploads,
+        )
+        if key not in self._known:
+            own = {str(path.absolute()): self._content(path.absolute()) for path in scenario.own_files()}
+            self._known[key] = own, digests(scenario.installed_files())
+        return Order(case, wanted, *self._known[key])
+
+    def _content(self, path: Path) -> bytes:
+        if path not in self._contents:
+            self._contents[path] = path.read_bytes()
+        return self._contents[path]
 
 
 def below(root: Path, path: str) -> Path:

@@ -10,7 +10,7 @@ import pytest
 from flightstack.testing.scenario import load_scenario
 from gcs_cli.campaign import cluster
 from gcs_cli.campaign.installed import difference, digests, installation
-from gcs_cli.campaign.order import below, make_order, without_root
+from gcs_cli.campaign.order import Files, below, without_root
 from gcs_cli.scenarios.result import Result, Wanted, not_flown
 from gcs_cli.scenarios.selection import Case
 from tests.support.commands import gcs
@@ -38,7 +38,7 @@ def test_an_order_flies_without_the_files_of_the_client(
     names = (vehicle, plan, later) if is_absolute else ("../v.toml", "p.plan", "../later.plan")
     text = "vehicle = '{}'\nplan = '{}'\nevent = [{{at_s = 1, upload = '{}'}}]\n".format(*names)
     case = case_of(here / "c.toml" if is_absolute else Path("c.toml"), text)
-    order = make_order(case, Wanted())
+    order = Files().order(case, Wanted())
     (tmp_path / "client").rename(tmp_path / "gone")
     there = below(root, str(here))
     there.mkdir(parents=True)
@@ -49,7 +49,7 @@ def test_an_order_flies_without_the_files_of_the_client(
 
 
 def test_an_order_names_files_of_the_installation_only(tmp_path: Path) -> None:
-    order = make_order(case_of(tmp_path / "c.toml", "plan = 'hop'\n"), Wanted())
+    order = Files().order(case_of(tmp_path / "c.toml", "plan = 'hop'\n"), Wanted())
     assert (order.files, order.installed) == ({}, digests([ROOT / "missions/hop.plan"]))
 
 
