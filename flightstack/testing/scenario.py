@@ -28,6 +28,7 @@ from flightstack.testing.properties import parse_window
 from flightstack.testing.setup import OPTION_KEYS, Setup
 from flightstack.testing.toml_record import key, read_record
 from gcs_cli.report.flight_outcome import Code
+from gcs_cli.transfers.plan_files import example_plans
 
 SEVERITIES = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
 OUTCOMES = ("any", *Code, *Mode.__members__, *Failsafe.__members__)
@@ -148,16 +149,30 @@ class Scenario:
         return tuple(range(self.seed, self.seed + self.repeat))
 
     def files(self) -> tuple[Path, ...]:
-        """Return the files on which the flights depend: scenario, plans, those of vehicle and gains, a plug-in."""
-        setup, controller = Setup(folder=self.path.parent), load_controller(self.controller)
-        plans = (self.plan, *(event.upload for event in self.event))
+        """Return the files on which the flights depend."""
+        return (self.path, *self.own_files(), *self.installed_files())
+
+    def own_files(self) -> tuple[Path, ...]:
+        """Return the scenario's files that are read in each flight: plans, those of vehicle and gains."""
         records = (_beside(name, self.path.parent) for name in (self.vehicle, self.gains))
+        examples = example_plans().values()
         return (
-            self.path,
-            *(setup.plan_path(plan) for plan in plans if plan is not None),
+            *(path for path in self._plans() if path not in examples),
             *(Path(name) for name in records if name.endswith(".toml")),
+        )
+
+    def installed_files(self) -> tuple[Path, ...]:
+        """Return the files of the installation that flights depend on besides flightstack: example plans, a plug-in."""
+        controller, examples = load_controller(self.controller), example_plans().values()
+        return (
+            *(path for path in self._plans() if path in examples),
             *(source for law in controller.own_laws.values() for source in law.sources),
         )
+
+    def _plans(self) -> list[Path]:
+        setup = Setup(folder=self.path.parent)
+        plans = (self.plan, *(event.upload for event in self.event))
+        return [setup.plan_path(plan) for plan in plans if plan is not None]
 
     def setup(self, seed: int) -> Setup:
         """Return the vehicle and conditions of the flight with ``seed``."""

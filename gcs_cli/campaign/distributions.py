@@ -54,6 +54,13 @@ class Distribution:
         cut = min(max(below + share * (above - below), _LEAST), 1.0 - _LEAST)
         return min(max(first + second * float(ndtri(cut)), self.low), self.high)
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The least and the largest value of a range."""
+        if self.kind == "normal":
+            return self.low, self.high
+        return float(self.of[0]), float(self.of[1])
+
     def share_of(self, value: float) -> float:
         """Return the share at which ``at`` gives ``value``, 0 or 1 beyond the ends."""
         first, second = float(self.of[0]), float(self.of[1])

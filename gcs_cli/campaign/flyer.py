@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from typing import Protocol
 
 from flightstack.testing.scenario import check_scenario
 from gcs_cli.campaign.definition import Campaign
@@ -14,7 +15,7 @@ from gcs_cli.campaign.options import CampaignOptions, continuing, only_command
 from gcs_cli.campaign.plan import PlannedFlight
 from gcs_cli.campaign.rows import row_of
 from gcs_cli.errors import CliError
-from gcs_cli.scenarios.pool import Finished, Notice, Pool, Started
+from gcs_cli.scenarios.pool import Cases, Finished, Message, Notice, Started
 from gcs_cli.scenarios.result import Wanted
 from gcs_cli.scenarios.selection import Case
 
@@ -25,11 +26,42 @@ class LostWorkerError(CliError):
     """A process ended that flew a flight."""
 
 
+class SchedulerLostError(CliError):
+    """The scheduler of a cluster was lost: no more cases can be flown."""
+
+
+class FlightPool(Protocol):
+    """Workers that fly cases: of this machine or of a cluster."""
+
+    def fly(self, cases: Cases, wanted: Wanted) -> Generator[Message, None, None]:
+        """Fly the cases and yield their events; end all flights if the iterator is closed."""
+
+
+class _Cases:
+    """The cases of flights, each made when it is flown: a campaign may have a million."""
+
+    def __init__(
+        self, campaign: Campaign, flights: Sequence[PlannedFlight], options: CampaignOptions
+    ) -> None:
+        self._campaign, self._flights, self._options = campaign, flights, options
+
+    def __len__(self) -> int:
+        return len(self._flights)
+
+    def __getitem__(self, index: int) -> Case:
+        return case_of(self._campaign, self._flights[index], self._options)
+
+
 class Flyer:
     """Flies what the journal does not have yet."""
 
     def __init__(
-        self, pool: Pool, campaign: Campaign, journal: Journal, display: Display, options: CampaignOptions
+        self,
+        pool: FlightPool,
+        campaign: Campaign,
+        journal: Journal,
+        display: Display,
+        options: CampaignOptions,
     ) -> None:
         self._pool, self._campaign, self._journal = pool, campaign, journal
         self._display, self._options = display, options
@@ -38,7 +70,18 @@ class Flyer:
     def fly(self, flights: Sequence[PlannedFlight]) -> None:
         """Fly all of ``flights`` that are not over; raise LostWorkerError after the others, ConfigError, OSError."""
         missing = [flight for flight in flights if flight.number not in self._journal.rows]
-        cases = [case_of(self._campaign, flight, self._options) for flight in missing]
+        cases = _Cases(self._campaign, missing, self._options)
+        try:
+            lost = self._fly(missing, cases)
+        except SchedulerLostError as error:
+            over = f"{len(self._journal.rows)} flights are over"
+            remedy = f"{continuing(self._options)} continues, also without --scheduler"
+            raise SchedulerLostError(f"{error}: {over}; {remedy}") from None
+        for number, reason in lost:
+            raise LostWorkerError(f"flight {number}: {reason}; {continuing(self._options)} flies it again")
+
+    def _fly(self, missing: Sequence[PlannedFlight], cases: Cases) -> list[tuple[int, str]]:
+        """Return number and reason of each flight that was lost."""
         lost: list[tuple[int, str]] = []
         with contextlib.closing(self._pool.fly(cases, _WANTED)) as messages:
             for message in messages:
@@ -50,11 +93,10 @@ class Flyer:
                 elif isinstance(message, Finished):
                     self._add(missing[message.case], message)
                 elif isinstance(message, Notice):
-                    self._note(message.line)
+                    self._note(message)
                 else:
                     self._display.tick()
-        for number, reason in lost:
-            raise LostWorkerError(f"flight {number}: {reason}; {continuing(self._options)} flies it again")
+        return lost
 
     def _add(self, flight: PlannedFlight, finished: Finished) -> None:
         assert finished.result is not None
@@ -64,11 +106,12 @@ class Flyer:
             print(json.dumps({"event": "flight", **row}, allow_nan=False), flush=True)
         self._display.add(row)
 
-    def _note(self, line: str) -> None:
-        """Show the first line about compilation: each worker has the same."""
-        if not self._has_noted:
-            self._has_noted = True
-            self._display.note(line)
+    def _note(self, notice: Notice) -> None:
+        """Show a line, of those that each worker has the first one."""
+        if notice.is_common and self._has_noted:
+            return
+        self._has_noted |= notice.is_common
+        self._display.note(notice.line)
 
 
 def case_of(campaign: Campaign, flight: PlannedFlight, options: CampaignOptions) -> Case:
@@ -78,17 +121,21 @@ def case_of(campaign: Campaign, flight: PlannedFlight, options: CampaignOptions)
 
 
 def check_flights(campaign: Campaign, flights: Sequence[PlannedFlight]) -> None:
-    """Check types and ranges of all flights, and all else of those with the extremes of each input or with each choice.
+    """Check types and ranges of all inputs, and all else of the flights with the extremes and the choices of each.
 
-    Raise ConfigError: a wrong file ends before anything flies.
+    Types and ranges depend on one input alone, and a number between two that are allowed is allowed: that of a grid may
+    be no whole number. Raise ConfigError: a wrong file ends before anything flies.
     """
-    checked = {flights[0].number}
+    checked = {flights[0].number: flights[0]}
+    read: dict[int, PlannedFlight] = {}
     for name, distribution in campaign.vary.items():
-        if distribution.is_choice:
-            checked |= set({each.inputs[name]: each.number for each in flights}.values())
-        else:
-            checked |= {select(flights, key=lambda each: each.inputs[name]).number for select in (min, max)}
-    for flight in flights:
+        if distribution.is_choice or distribution.steps is not None:
+            each = {flight.inputs[name]: flight for flight in flights}.values()
+            (checked if distribution.is_choice else read).update({flight.number: flight for flight in each})
+        if not distribution.is_choice:
+            ends = (select(flights, key=lambda flight: flight.inputs[name]) for select in (min, max))
+            checked |= {flight.number: flight for flight in ends}
+    for number, flight in sorted((read | checked).items()):
         scenario = campaign.scenario(flight.inputs)
-        if flight.number in checked:
+        if number in checked:
             check_scenario(scenario)

@@ -13,14 +13,13 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from flightstack import __version__
 from flightstack.core.atomic_file import write_text_atomically
 from flightstack.core.errors import ConfigError
-from flightstack.firmware.sources import source_hash
+from gcs_cli.campaign.installed import FLYING, sources_digest
 from gcs_cli.campaign.plan import PlannedFlight
 from gcs_cli.campaign.rows import Row
 from gcs_cli.errors import USAGE, CliError
@@ -29,7 +28,6 @@ JOURNAL, RECORD = "flights.jsonl", "campaign.json"
 RESULTS = PARQUET, CSV, REPORT = "flights.parquet", "flights.csv", "report.html"
 _FORM = 1
 """Version of the directory's form."""
-_SOURCES = frozenset((".py", ".toml", ".xml"))
 
 
 def record_of(kind: str, files: Mapping[str, bytes], flights: Sequence[PlannedFlight]) -> dict[str, Any]:
@@ -39,27 +37,10 @@ def record_of(kind: str, files: Mapping[str, bytes], flights: Sequence[PlannedFl
         "form": _FORM,
         "kind": kind,
         "version": __version__,
-        "sources": _sources_digest(),
+        "sources": sources_digest(FLYING),
         "flights": hashlib.sha256(inputs.encode()).hexdigest(),
         "files": {name: hashlib.sha256(content).hexdigest() for name, content in sorted(files.items())},
     }
-
-
-def _package(name: str) -> Path:
-    spec = find_spec(name)
-    assert spec is not None
-    assert spec.origin is not None
-    return Path(spec.origin).parent
-
-
-def _sources_digest() -> str:
-    """Return a digest of the programs that fly: an edit of a law of this project changes flights too."""
-    result = hashlib.sha256(source_hash())  # of the loops in C
-    for package in map(_package, ("flightstack", "sim_bridge")):
-        for path in sorted(path for path in package.rglob("*") if path.suffix in _SOURCES):
-            result.update(str(path.relative_to(package)).encode())
-            result.update(path.read_bytes())
-    return result.hexdigest()
 
 
 class Journal:
@@ -70,19 +51,27 @@ class Journal:
 
         ``overwrite``: begin anew, whatever is there.
         """
-        self._descriptor = os.open(
-            folder / JOURNAL, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666
-        )
+        path = folder / JOURNAL
+        is_new = not path.exists()
+        self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
         try:
             self._lock(folder)
             if overwrite:
                 self._clear(folder)
-            _check_record(folder, record)
-            self._record = record
-            self.rows = self._read()
+            self._open(folder, record, is_new)
         except BaseException:
             self.close()
             raise
+
+    def _open(self, folder: Path, record: Mapping[str, Any], is_new: bool) -> None:
+        try:
+            _check_record(folder, record)
+        except BaseException:
+            if is_new and not os.fstat(self._descriptor).st_size:
+                (folder / JOURNAL).unlink()
+            raise
+        self._record = record
+        self.rows = self._read()
         """The row of each flight that is over, by its number."""
 
     def _lock(self, folder: Path) -> None:
@@ -147,6 +136,16 @@ def flown_before(folder: Path, number: int) -> PlannedFlight:
     if number not in rows:
         raise CliError(f"--only {number}: the search in {folder} has {len(rows)} flights", USAGE)
     return PlannedFlight(number, rows[number]["seed"], rows[number]["inputs"])
+
+
+def changed_since(folder: Path, files: Mapping[str, bytes]) -> str:
+    """Return what changed since the flights of ``folder``, as the beginning of a sentence, or empty."""
+    with contextlib.suppress(
+        OSError, ValueError, TypeError, AttributeError, KeyError
+    ):  # no record, or a damaged one
+        before = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        return _difference(before, record_of("seek", files, ()) | {"flights": before["flights"]})
+    return ""
 
 
 def _whole_rows(content: bytes) -> tuple[dict[int, Row], int]:

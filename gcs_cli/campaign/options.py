@@ -26,6 +26,12 @@ Workers = Annotated[
         "--workers", "-j", min=1, max=256, help="Flights at once.  [default: one for each processor]"
     ),
 ]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS", help="Fly on the Dask cluster of this scheduler, such as tcp://10.0.0.1:8786."
+    ),
+]
 Out = Annotated[
     Path | None,
     typer.Option("--out", "-o", metavar="DIR", help="Directory of the results, where a campaign also continues.  "
@@ -54,6 +60,7 @@ class CampaignOptions:
 
     file: File
     workers: Workers = None
+    scheduler: Scheduler = None
     out: Out = None
     csv: Csv = False
     only: Only = None

@@ -12,12 +12,13 @@ from rich.console import Console
 from flightstack.core.atomic_file import write_bytes_atomically, write_text_atomically
 from gcs_cli.campaign.definition import Campaign, load_campaign
 from gcs_cli.campaign.display import inputs_text, make_display
-from gcs_cli.campaign.flyer import Flyer, case_of, check_flights
+from gcs_cli.campaign.flyer import FlightPool, Flyer, case_of, check_flights
 from gcs_cli.campaign.journal import (
     CSV,
     PARQUET,
     REPORT,
     Journal,
+    changed_since,
     flown_before,
     open_journal,
     record_of,
@@ -32,16 +33,21 @@ from gcs_cli.campaign.table import write_tables
 from gcs_cli.errors import DONE, FAILED, INTERRUPTED, USAGE, CliError
 from gcs_cli.logs.export_tables import library
 from gcs_cli.run_directory import LOG_NAME, REPORT_NAME, results_directory
-from gcs_cli.scenarios.pool import Finished, Pool
+from gcs_cli.scenarios.pool import Finished, Notice
 from gcs_cli.scenarios.result import Wanted
 
 
-def run_campaign(pool: Pool, options: CampaignOptions, console: Console) -> int:
+def run_campaign(pool: FlightPool, options: CampaignOptions, console: Console) -> int:
     """Fly what is not flown yet, write the table and the report; return the exit code. Raise ConfigError, CliError."""
     library("pyarrow")  # missing: say so before the flights
     campaign = load_campaign(options.file)
     if options.seek is not None and options.only is not None:
-        return fly_only(pool, campaign, flown_before(options.folder, options.only), options, console)
+        flight = flown_before(options.folder, options.only)
+        if changed := changed_since(options.folder, campaign.files([flight.inputs])):
+            _say(
+                console, f"{changed} since the search: this flight may differ from its flight {flight.number}"
+            )
+        return fly_only(pool, campaign, flight, options, console)
     if options.seek is not None:
         return run_search(pool, campaign, options, console)
     flights = plan_flights(campaign)
@@ -83,14 +89,16 @@ def _numbered(campaign: Campaign, flights: Sequence[PlannedFlight], number: int)
 
 
 def fly_only(
-    pool: Pool, campaign: Campaign, flight: PlannedFlight, options: CampaignOptions, console: Console
+    pool: FlightPool, campaign: Campaign, flight: PlannedFlight, options: CampaignOptions, console: Console
 ) -> int:
     """Fly one flight alone, keep its log and report, and print its row; return the exit code."""
     case = case_of(campaign, flight, options)
     wanted = Wanted(every_file=True, metrics=True)
     result = None
     for message in pool.fly([case], wanted):
-        if isinstance(message, Finished):
+        if isinstance(message, Notice) and not message.is_common:
+            _say(console, message.line)
+        elif isinstance(message, Finished):
             if message.result is None:
                 raise CliError(f"flight {flight.number}: {message.reason}")
             result = message.result

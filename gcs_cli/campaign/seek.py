@@ -15,7 +15,7 @@ from flightstack.testing.scenario import check_scenario
 from gcs_cli.campaign.definition import Campaign
 from gcs_cli.campaign.display import inputs_text, make_display
 from gcs_cli.campaign.figures import map_figure
-from gcs_cli.campaign.flyer import Flyer
+from gcs_cli.campaign.flyer import FlightPool, Flyer
 from gcs_cli.campaign.journal import REPORT, Journal, open_journal, record_of
 from gcs_cli.campaign.options import CampaignOptions, continuing, only_command
 from gcs_cli.campaign.page import render_campaign
@@ -27,12 +27,11 @@ from gcs_cli.campaign.table import write_tables
 from gcs_cli.charts.figure import Figure
 from gcs_cli.errors import DONE, FAILED, INTERRUPTED, USAGE, CliError
 from gcs_cli.run_directory import results_directory
-from gcs_cli.scenarios.pool import Pool
 
 _DEFAULT_FLIGHTS = 200
 
 
-def run_search(pool: Pool, campaign: Campaign, options: CampaignOptions, console: Console) -> int:
+def run_search(pool: FlightPool, campaign: Campaign, options: CampaignOptions, console: Console) -> int:
     """Search and report; return 0 if nothing fails, else 1. Raise ConfigError, CliError."""
     nominal = nominal_point(campaign)
     for point in (nominal, *box_ends(nominal)):
@@ -75,6 +74,10 @@ def nominal_point(campaign: Campaign) -> FloatArray:
             raise ConfigError(
                 campaign.path, f"vary.{name}.nominal", "is missing: --seek worst searches from there"
             )
+        low, high = distribution.ends
+        if not low <= value <= high:
+            problem = f"{value:g}, from which --seek worst searches, is outside the range {low:g} to {high:g}"
+            raise ConfigError(campaign.path, f"vary.{name}", f"{problem}: give another range, or nominal")
         shares.append(distribution.share_of(value))
     return np.array(shares)
 

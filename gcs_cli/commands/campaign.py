@@ -6,6 +6,7 @@ A module of its own, as each command: it is imported when it is used.
 from __future__ import annotations
 
 import webbrowser
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -13,6 +14,10 @@ from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.campaign.options import SEEKS, CampaignOptions
 from gcs_cli.errors import INTERRUPTED, USAGE, CliError
 from gcs_cli.settings import settings_of
+
+if TYPE_CHECKING:
+    from gcs_cli.campaign.cluster import ClusterPool
+    from gcs_cli.scenarios.pool import Pool
 
 app = make_app(add_completion=False)
 
@@ -23,15 +28,12 @@ def fly_campaign(context: typer.Context, options: CampaignOptions) -> None:
     """Fly a scenario many times with varied inputs.
 
     Writes a table (Parquet) with a row for each flight, and a report. After Ctrl-C or a crash the same command
-    continues. Exits with 0 if all flights passed, 1 if one failed, 2 for a bad file, 130 after Ctrl-C.
+    continues. Exits with 0 if all flights passed, 1 if one failed, 2 for a bad file, 3 without the
+    scheduler, 130 after Ctrl-C.
     """
-    from gcs_cli.scenarios.pool import Pool, default_jobs
-
     _check(context, options)
     try:
-        with Pool(
-            options.workers or default_jobs()
-        ) as pool:  # its first worker imports while this process does
+        with _pool(options) as pool:  # its first worker imports while this process does
             from gcs_cli.campaign.run import run_campaign
             from gcs_cli.fly.fly_display import FlyConsole
 
@@ -45,10 +47,28 @@ def fly_campaign(context: typer.Context, options: CampaignOptions) -> None:
     raise typer.Exit(code)
 
 
+def _pool(options: CampaignOptions) -> Pool | ClusterPool:
+    """Return the workers of the campaign; raise CliError (usage) without the library for those of a cluster."""
+    if options.scheduler is None:
+        from gcs_cli.scenarios.pool import Pool, default_jobs
+
+        return Pool(options.workers or default_jobs())
+    from gcs_cli.logs.export_tables import library
+
+    library("distributed", "--scheduler", "cluster")
+    from gcs_cli.campaign.cluster import ClusterPool
+
+    return ClusterPool(options.scheduler)
+
+
 def _check(context: typer.Context, options: CampaignOptions) -> None:
     """Raise CliError (usage) for options that exclude each other."""
     if settings_of(context).link.connect is not None:
         raise CliError("campaign flies vehicles of its own: leave --connect out", USAGE)
+    if options.scheduler is not None and options.workers is not None:
+        raise CliError(
+            "--workers is for this machine: leave it out, the cluster has workers of its own", USAGE
+        )
     if options.seek not in (None, *SEEKS):
         raise CliError(f"--seek {options.seek}: is not one of {', '.join(SEEKS)}", USAGE)
     if options.flights is not None and options.seek is None:

@@ -20,14 +20,14 @@ from gcs_cli.logs.recording import AnyArray, Recording, Topic
 _PACKAGES = {"rerun": "rerun-sdk"}
 
 
-def library(module: str) -> Any:
-    """Return a module; raise CliError (usage) if it is not installed."""
+def library(module: str, user: str = "this format", extra: str = "export") -> Any:
+    """Return a module that ``user`` needs; raise CliError (usage) if it is not installed."""
     try:
         return import_module(module)
     except ImportError:
         name = module.partition(".")[0]
         package = _PACKAGES.get(name, name)
-        raise CliError(f"this format needs {package}: pip install 'flightstack[export]'", USAGE) from None
+        raise CliError(f"{user} needs {package}: pip install 'flightstack[{extra}]'", USAGE) from None
 
 
 TIME_COLUMN = "timestamp"

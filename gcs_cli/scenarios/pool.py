@@ -6,10 +6,11 @@ import contextlib
 import os
 import subprocess
 import threading
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
+from pathlib import Path
 from queue import Empty, SimpleQueue
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from flightstack.process.command_line import own_program
 from gcs_cli.scenarios.pipes import receive, send
@@ -45,6 +46,8 @@ class Notice(NamedTuple):
     """A line of a worker, such as the compilation of a kernel."""
 
     line: str
+    is_common: bool = True
+    """Each worker has about the same, so that the first one is enough."""
 
 
 class Tick(NamedTuple):
@@ -52,6 +55,13 @@ class Tick(NamedTuple):
 
 
 Message = Started | Finished | Notice | Tick
+
+
+class Cases(Protocol):
+    """A sequence of cases, which may make each when it is needed."""
+
+    def __len__(self) -> int: ...
+    def __getitem__(self, index: int, /) -> Case: ...
 
 
 def default_jobs() -> int:
@@ -63,9 +73,10 @@ def default_jobs() -> int:
 class _Worker:
     """One process; a thread passes its answers to the pool."""
 
-    def __init__(self, answers: SimpleQueue[tuple[_Worker, Any]]) -> None:
+    def __init__(self, answers: SimpleQueue[tuple[_Worker, Any]], folder: Path | None) -> None:
         self._process = subprocess.Popen(
             own_program("gcs_cli.scenarios.worker"),
+            cwd=folder,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             start_new_session=True,  # Ctrl-C is for the parent
@@ -111,16 +122,20 @@ class _Worker:
 class Pool:
     """Worker processes, which start when they are needed. Leaving the ``with`` block ends them."""
 
-    def __init__(self, jobs: int) -> None:
-        """Start the first worker, which imports while the caller reads the files."""
+    def __init__(self, jobs: int, folder: Path | None = None) -> None:
+        """Start the first worker, which imports while the caller reads the files.
+
+        Relative paths of cases are relative to ``folder``, by default to the working directory.
+        """
         self.jobs = jobs
         """Flights at once, at most."""
+        self._folder = folder
         self._answers: SimpleQueue[tuple[_Worker, Any]] = SimpleQueue()
-        self._idle = [_Worker(self._answers)]
+        self._idle = [self._new()]
         self._busy: list[_Worker] = []
 
     def fly(
-        self, cases: Sequence[Case], wanted: Wanted, *, stops_at_failure: bool = False
+        self, cases: Cases, wanted: Wanted, *, stops_at_failure: bool = False
     ) -> Generator[Message, None, None]:
         """Fly the cases and yield their events; end all flights if the iterator is closed.
 
@@ -159,10 +174,13 @@ class Pool:
         """Replace the idle workers by one that has imported no plug-in controller: its source may change."""
         for worker in self._idle:
             worker.end()
-        self._idle = [_Worker(self._answers)]
+        self._idle = [self._new()]
+
+    def _new(self) -> _Worker:
+        return _Worker(self._answers, self._folder)
 
     def _take(self) -> _Worker:
-        worker = self._idle.pop() if self._idle else _Worker(self._answers)
+        worker = self._idle.pop() if self._idle else self._new()
         self._busy.append(worker)
         return worker
 
@@ -180,11 +198,15 @@ class Pool:
             self._busy.remove(worker)
             worker.end()
 
+    def close(self) -> None:
+        """End all flights and workers."""
+        for worker in (*self._busy, *self._idle):
+            worker.end()
+
     def __enter__(self) -> Pool:
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for worker in (*self._busy, *self._idle):
-            worker.end()
+        self.close()

@@ -183,4 +183,9 @@ def test_a_search_continues_and_its_flights_fly_alone(folder: Path) -> None:
         *("--only", found["smallest"], "--json"),
     )
     (flown,) = events(alone.stdout, "flight")
-    assert flown["log_sha256"] == smallest["log_sha256"]
+    assert (flown["log_sha256"], alone.stderr) == (smallest["log_sha256"], "")
+    (folder / "s.toml").write_text(SEARCH.replace("0.2", "0.3"))
+    changed = gcs("campaign", "s.toml", "--seek", "worst", "--out", "found", "--only", 1)
+    assert changed.stdout.startswith(
+        "s.toml has changed since the search: this flight may differ from its flight 1\n"
+    )

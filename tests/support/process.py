@@ -21,13 +21,18 @@ from tests.support.programs import PROGRAMS, Program
 
 BOUND_S = 60.0
 MOST_LINES = 200
+IMPORTS = {
+    "dask": ("gcs_cli.campaign.cluster", "distributed.cli.dask_scheduler", "distributed.cli.dask_worker")
+}
+"""Modules that a third party's program and its clients import: the warm server imports them once."""
 SUPERVISOR = "flightstack.process.supervised"
 
 
 def start(module: str, arguments: Sequence[str], listens: bool) -> Program | subprocess.Popen[str]:
-    """Start one of ``PROGRAMS`` from the warm server, another module in a new interpreter."""
-    if module in PROGRAMS:
-        return Program(module, arguments, listens=listens, joins_output=True)
+    """Start one of ``PROGRAMS`` or ``IMPORTS`` from the warm server, another module in a new interpreter."""
+    if module in PROGRAMS or module in IMPORTS:
+        imports = IMPORTS.get(module, ())
+        return Program(module, arguments, listens=listens, joins_output=True, imports=imports)
     return subprocess.Popen(
         [sys.executable, "-u", "-m", module, *arguments],
         stdout=subprocess.PIPE,
@@ -108,12 +113,13 @@ class Process:
         except Empty:
             return None
 
-    def wait_for(self, text: str) -> None:
+    def wait_for(self, text: str) -> str:
+        """Wait for a line of output that has ``text``, and return it."""
         for _ in range(MOST_LINES):
             line = self.next_line()
             assert line is not None, f"{self.name} never said {text!r}: {self.output}"
             if text in line:
-                return
+                return line
         raise AssertionError(f"{self.name} did not say {text!r} in {MOST_LINES} lines: {self.output}")
 
     def tell(self, line: str) -> None:

@@ -48,8 +48,9 @@ class Program:
         listens: bool = False,
         joins_output: bool = False,
         log: IO[bytes] | None = None,
+        imports: Sequence[str] = (),
     ) -> None:
-        """Start ``python -m MODULE ARGUMENTS``.
+        """Start ``python -m MODULE ARGUMENTS``; the server imports the modules ``imports`` before its first start.
 
         With ``joins_output``, standard error goes to ``stdout``; with a ``log``, both go to that file instead.
         """
@@ -69,6 +70,7 @@ class Program:
             "arguments": list(arguments),
             "directory": str(directory or Path.cwd()),
             "environment": dict(os.environ),
+            "imports": list(imports),
         }
         given = [input_end, output_end, errors_end, report_end]
         server = _server()

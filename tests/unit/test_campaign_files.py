@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import io
+from collections.abc import Generator, Mapping
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from flightstack.core.errors import ConfigError
 from flightstack.params.vehicle import load_vehicle, load_vehicle_with
+from flightstack.testing.scenario import Scenario
 from gcs_cli.campaign.definition import Campaign, load_campaign
-from gcs_cli.campaign.distributions import Distribution, read_distribution
-from gcs_cli.campaign.flyer import check_flights
+from gcs_cli.campaign.display import make_display
+from gcs_cli.campaign.distributions import Distribution, Value, read_distribution
+from gcs_cli.campaign.flyer import Flyer, check_flights
+from gcs_cli.campaign.journal import open_journal, record_of
+from gcs_cli.campaign.options import CampaignOptions
 from gcs_cli.campaign.plan import flight_seed, plan_flights
+from gcs_cli.scenarios.pool import Cases, Message, Started
+from gcs_cli.scenarios.result import Wanted
 
 HOP = Path(__file__).resolve().parents[2] / "missions" / "hop.plan"
 SCENARIO = """\
@@ -259,6 +268,49 @@ def test_inputs_out_of_range_are_refused_before_a_flight(folder: Path, vary: str
         check_flights(found, flights)
     print(refused.value)
     assert sentence.replace("{folder}", str(folder)) in str(refused.value)
+
+
+def test_whole_numbers_of_a_grid_are_checked_between_its_ends(folder: Path) -> None:
+    scenario = SCENARIO.replace("{weak}", "0.9").replace("[wind]", "[[client]]\nname = 'a'\n[wind]")
+    vary = "[vary]\n'client[0].system_id' = { uniform = [1, 4], steps = 3 }"
+    found = campaign(folder, "method = 'grid'", vary, scenario)
+    with pytest.raises(ConfigError, match=r"client\[0\].system_id: 2.5 is not a whole number"):
+        check_flights(found, plan_flights(found))
+
+
+def test_check_reads_few_of_many_flights(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = campaign(folder, "flights = 2000")
+    read, made = [], Campaign.scenario
+
+    def scenario(self: Campaign, inputs: Mapping[str, Value]) -> Scenario:
+        read.append(inputs)
+        return made(self, inputs)
+
+    monkeypatch.setattr(Campaign, "scenario", scenario)
+    check_flights(found, plan_flights(found))
+    assert len(read) <= 1 + 5 * 2 + 3  # the first, both ends of five ranges, three choices
+
+
+def test_each_case_is_made_when_it_is_flown(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = campaign(folder, "flights = 100")
+    flights, read, made = plan_flights(found), [], Campaign.scenario
+
+    def scenario(self: Campaign, inputs: Mapping[str, Value]) -> Scenario:
+        read.append(inputs)
+        return made(self, inputs)
+
+    class Pool:
+        def fly(self, cases: Cases, wanted: Wanted) -> Generator[Message, None, None]:
+            assert len(cases) == 100
+            yield Started(7)
+            assert cases[7].seed == flights[7].seed
+
+    monkeypatch.setattr(Campaign, "scenario", scenario)
+    options = CampaignOptions(folder / "c.toml")
+    display = make_display(Console(file=io.StringIO()), 100, ())
+    with open_journal(folder, record_of("plan", {}, flights)) as journal:
+        Flyer(Pool(), found, journal, display, options).fly(flights)
+    assert read == [flights[7].inputs]
 
 
 def test_each_choice_is_checked_before_a_flight(folder: Path) -> None:

@@ -178,6 +178,7 @@ def test_a_new_campaign_keeps_files_of_other_commands(tmp_path: Path, name: str)
     with pytest.raises(ConfigError, match=f"{name}: exists already: give another --out, or --overwrite"):
         Journal(tmp_path, RECORD_1)
     assert (tmp_path / name).read_text() == "other"
+    assert [path.name for path in tmp_path.iterdir()] == [name]
     with open_journal(tmp_path, RECORD_1, overwrite=True):
         assert not (tmp_path / name).exists()
 

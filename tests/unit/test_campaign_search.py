@@ -114,6 +114,15 @@ def test_search_starts_where_nothing_varies(tmp_path: Path) -> None:
     [
         ("late = {uniform = [0, 2]}", "vary.late.nominal: is missing: --seek worst searches from there"),
         ("late = {choice = [0, 2]}", "vary.late: is a choice: --seek worst searches ranges"),
+        (
+            "late = {uniform = [1, 2], nominal = 0.5}",
+            "vary.late: 0.5, from which --seek worst searches, is outside the range 1 to 2: give another range, or "
+            "nominal",
+        ),
+        (
+            "simulated.body.mass_kg = {normal = [0.7, 0.1], low = 0.65}",
+            "mass_kg: 0.55, from which .* 0.65 to inf",
+        ),
     ],
 )
 def test_inputs_without_range_or_start_are_not_searched(tmp_path: Path, vary: str, sentence: str) -> None:

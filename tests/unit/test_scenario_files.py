@@ -118,7 +118,8 @@ def test_the_files_of_a_scenario_are_those_it_depends_on(tmp_path: Path) -> None
     text = "plan = 'square.plan'\nvehicle = 'v.toml'\nevent = [{at_s = 1, upload = 'next.plan'}]\n"
     scenario = load_scenario(written(tmp_path, text))
     names = [path.name for path in scenario.files()]
-    assert names == ["a.toml", "square.plan", "next.plan", "v.toml"]
+    assert names == ["a.toml", "next.plan", "v.toml", "square.plan"]
+    assert [path.name for path in scenario.installed_files()] == ["square.plan"]
     assert all(path.exists() for path in scenario.files())
 
 

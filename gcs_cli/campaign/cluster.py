@@ -1,0 +1,184 @@
+"""Fly cases on the workers of a Dask cluster: ``gcs campaign --scheduler tcp://HOST:PORT``.
+
+Dask schedules, flies the flights of a lost worker again, and takes workers that join. The client keeps the journal: a
+lost scheduler loses no flight that is over.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import logging
+import math
+import pickle
+import secrets
+import time
+import warnings
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from types import TracebackType
+from typing import Any
+
+import distributed
+
+from gcs_cli.campaign.cluster_worker import Answer, fly
+from gcs_cli.campaign.flyer import SchedulerLostError
+from gcs_cli.campaign.installed import installation
+from gcs_cli.campaign.order import Files, Order
+from gcs_cli.errors import NO_ANSWER, USAGE, CliError
+from gcs_cli.scenarios.pool import Cases, Finished, Message, Notice, Started, Tick
+from gcs_cli.scenarios.result import Wanted
+
+ANSWER_S = 10.0
+"""Longest wait for the scheduler's first answer."""
+_AHEAD, _FEWEST = 2, 2
+"""Flights at the scheduler: for each thread of a worker one that is flown and the next one; at least."""
+_TICK_S = 0.1
+_LOOK_S = 1.0
+"""Time between two looks at the cluster's size."""
+_LOST = (OSError, CancelledError, distributed.client.ClosedClientError)
+"""What Dask raises without its scheduler."""
+
+
+class ClusterPool:
+    """The workers of a Dask cluster in place of processes of this machine. Leaving the ``with`` block disconnects."""
+
+    def __init__(self, address: str) -> None:
+        """Raise CliError (usage) for what is no address."""
+        self._address = address
+        for name in ("distributed", "tornado", "asyncio"):  # one sentence of ours says what happened
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+        try:
+            distributed.comm.get_address_host_port(address, strict=True)
+        except ValueError:
+            problem = "is no address of a scheduler, such as tcp://10.0.0.1:8786"
+            raise CliError(f"--scheduler {address}: {problem}", USAGE) from None
+        self._session = secrets.token_hex(8)
+        self._files = Files()
+        self._client: Any = None
+
+    def fly(self, cases: Cases, wanted: Wanted) -> Generator[Message, None, None]:
+        """Fly the cases and yield their events; cancel all flights if the iterator is closed.
+
+        Raise SchedulerLostError; CliError without a scheduler, or for a worker whose results may differ; OSError.
+        """
+        if not cases:
+            return
+        run = _Run(self._connected(), self._address, (self._session, str(Path.cwd()), installation()))
+        try:
+            while run.over < len(cases):
+                numbers = range(run.submitted, min(run.submitted + run.room(), len(cases)))
+                if numbers:
+                    run.submit([self._files.order(cases[number], wanted) for number in numbers])
+                    yield from map(Started, numbers)
+                yield from run.events()
+        finally:
+            run.cancel()
+
+    def _connected(self) -> Any:
+        """Return the client, connected at its first use: a campaign that is over needs no cluster."""
+        if self._client is None:
+            warnings.filterwarnings("ignore", module="distributed")  # other versions of libraries
+            try:
+                self._client = distributed.Client(self._address, timeout=ANSWER_S, set_as_default=False)
+            except (OSError, ImportError):
+                problem = "no Dask scheduler answers: start one with `dask scheduler`, or check the address"
+                raise CliError(f"--scheduler {self._address}: {problem}", NO_ANSWER) from None
+        return self._client
+
+    def __enter__(self) -> ClusterPool:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._client is not None:
+            with contextlib.suppress(*_LOST):
+                self._client.close()
+
+
+class _Run:
+    """Flights at the scheduler: a few more than it has threads, however many there are to fly."""
+
+    def __init__(self, client: Any, address: str, session: tuple[str, str, Mapping[str, str]]) -> None:
+        self._client, self._address, self._session = client, address, session
+        self._flying: dict[int, Any] = {}
+        """Futures of Dask by the number of their cases."""
+        self._done: SimpleQueue[int] = SimpleQueue()
+        self._threads, self._next_look_s = 1, -math.inf
+        self._has_noted = False
+        self.submitted = self.over = 0
+        """Numbers of cases."""
+
+    def room(self) -> int:
+        """Return how many more flights are to be submitted; workers come and go."""
+        now_s = time.monotonic()
+        if now_s >= self._next_look_s:
+            self._next_look_s = now_s + _LOOK_S
+            with self._losing_scheduler():
+                self._threads = sum(self._client.nthreads().values())
+        return max(_AHEAD * self._threads, _FEWEST) - len(self._flying)
+
+    def submit(self, orders: Sequence[Order]) -> None:
+        """Submit the next cases at once: alone each takes the scheduler three times as long."""
+        task = functools.partial(fly, *self._session)
+        with self._losing_scheduler():
+            futures = self._client.map(task, list(map(pickle.dumps, orders)), pure=False)
+        for number, future in enumerate(futures, self.submitted):
+            future.add_done_callback(lambda _, number=number: self._done.put(number))
+            self._flying[number] = future
+        self.submitted += len(orders)
+
+    def events(self) -> Iterator[Message]:
+        """Yield what happened since the last call; wait a little."""
+        if self._threads == 0 and not self._has_noted:
+            yield Notice(f"{self._address} has no workers: the flights wait for one", is_common=False)
+        self._has_noted = self._threads == 0
+        try:
+            numbers = [self._done.get(timeout=_TICK_S)]
+        except Empty:
+            yield Tick()
+            return
+        with contextlib.suppress(Empty):
+            while True:
+                numbers.append(self._done.get_nowait())
+        futures = {number: self._flying.pop(number) for number in numbers}
+        with self._losing_scheduler():
+            answers = self._client.gather(futures, errors="skip")  # at once: each call takes two messages
+        for number, answer in answers.items():
+            self.over += 1
+            yield self._finished(number, futures[number], answer)
+
+    def _finished(self, number: int, future: Any, answer: Answer | None) -> Finished:
+        """Return the end of a flight; ``answer`` is None if Dask has none."""
+        if answer is None:
+            return Finished(number, None, self._why_lost(future))
+        if answer.problem:
+            raise CliError(f"{answer.problem}: install the same on the client and on all workers", USAGE)
+        return Finished(number, answer.result, answer.reason)
+
+    def _why_lost(self, future: Any) -> str:
+        if future.cancelled():
+            raise SchedulerLostError(f"the scheduler {self._address} was lost")
+        with self._losing_scheduler():
+            error = future.exception()
+        if isinstance(error, distributed.KilledWorker):
+            count = error.allowed_failures + 1
+            return f"it was lost with its worker {'once' if count == 1 else f'{count} times'}"
+        problem = f"a worker cannot fly: {type(error).__name__}: {error}"
+        raise CliError(f"{problem}: install flightstack on all workers, and on the scheduler", USAGE)
+
+    @contextlib.contextmanager
+    def _losing_scheduler(self) -> Iterator[None]:
+        try:
+            yield
+        except _LOST:
+            raise SchedulerLostError(f"the scheduler {self._address} was lost") from None
+
+    def cancel(self) -> None:
+        """Cancel all flights."""
+        if self._flying and self._client.status == "running":
+            with contextlib.suppress(*_LOST):
+                self._client.cancel(list(self._flying.values()))
