@@ -62,19 +62,19 @@ def level(count: int, flags: int) -> Sequence:
 def test_a_changed_gain_keeps_what_its_integral_gives() -> None:
     python, c = both("pid", load_vehicle("paper_quad"))
     ticks = level(200, OUTER_DUE)
-    for name, value in (
-        ("PID_ROLL_I", 50.0),
-        ("PID_PITCH_I", 0.0),
-        ("PID_YAW_P", 12.5),
-        ("MPC_TILTMAX_AIR", 20.0),
+    for name, value, factors in (
+        ("PID_ROLL_I", 50.0, [4.0, 1.0, 1.0]),
+        ("PID_ROLL_I", 1.0, [50.0, 1.0, 1.0]),
+        ("PID_PITCH_I", 0.0, [1.0, 0.0, 1.0]),
+        ("PID_YAW_P", 12.5, [1.0, 1.0, 1.0]),
+        ("MPC_TILTMAX_AIR", 20.0, [1.0, 1.0, 1.0]),
     ):
         assert_same(c.run(*ticks)[0], run_python(python, ticks)[0])
         python.set_parameter(name, value)
         before = c.integrals
         assert c.set(name, value) == 0
         assert c.get(name) == value
-        expected = {"PID_ROLL_I": [4.0, 1.0, 1.0], "PID_PITCH_I": [1.0, 0.0, 1.0]}.get(name, [1.0, 1.0, 1.0])
-        assert c.integrals == pytest.approx([i * factor for i, factor in zip(before, expected, strict=True)])
+        assert c.integrals == pytest.approx([i * factor for i, factor in zip(before, factors, strict=True)])
         assert before[0] != 0.0
         assert before[1] != 0.0
     assert_same(c.run(*ticks)[0], run_python(python, ticks)[0])

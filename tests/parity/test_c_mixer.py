@@ -14,6 +14,7 @@ import pytest
 from flightstack.control.mixer import Mixer, derived, mixer_for
 from flightstack.params.vehicle import Vehicle, load_vehicle
 from tests.firmware import core_reference as python
+from tests.firmware.core_mixer import mixer_of_c
 from tests.firmware.core_samples import Samples
 from tests.firmware.core_support import Compared, Core
 from tests.support.rotor_sets import multirotor, ring
@@ -79,18 +80,6 @@ class Mixed(NamedTuple):
     """Speeds that C wrote beyond the vehicle's rotors."""
     ways: int
     """Short ways that the mixer took itself to be fit for: 1 effectiveness undoes allocation, 2 rotors are alike."""
-
-
-def mixer_of_c(c: Core, rotors: Mixer) -> np.ndarray:
-    """Return memory of an fs_mixer with these numbers, and nothing derived yet."""
-    flat, n = np.zeros(c.library.drive_sizes(3) // c.dtype.itemsize, c.dtype), rotors.spin.size
-    numbers = flat[1:]  # after the number of rotors
-    numbers[: 4 * n] = rotors.allocation.ravel()
-    for axis in range(4):
-        numbers[32 + 8 * axis : 32 + 8 * axis + n] = rotors.effectiveness[axis]
-    for place, values in enumerate((rotors.low, rotors.high, rotors.spin)):
-        numbers[64 + 8 * place : 64 + 8 * place + n] = values
-    return flat
 
 
 def mixed(real: str, name: str, count: int = COUNT // 5) -> Mixed:
