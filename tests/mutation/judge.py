@@ -32,7 +32,10 @@ COUNT = 20_000
 """Samples for each law, where the tests in earnest take 200 000, and a million at night."""
 TESTS = {
     "core": [
-        *(f"tests/parity/test_c_{what}.py" for what in ("laws", "mixer", "mixer_numbers", "mission")),
+        *(
+            f"tests/parity/test_c_{what}.py"
+            for what in ("laws", "geometry", "mixer", "mixer_numbers", "mission")
+        ),
         *(f"tests/firmware/test_core_{what}.py" for what in ("loops", "math", "builds")),
     ],
     "mavlink": [f"tests/firmware/test_codec_{what}.py" for what in ("messages", "parser")],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
@@ -33,21 +34,33 @@ def uneven() -> Iterator[Mixer]:
     """Yield mixers of four rotors of which one has one number half as large again, of either sign."""
     even = mixer_for(load_vehicle("x_quad"))
     yield even
-    for rotor in range(4):
-        for factor in (1.5, -1.5):
-            arrays = [
-                np.array(getattr(even, name)) for name in ("allocation", "effectiveness", "low", "high")
-            ]
-            for column in range(4):
-                allocation, effectiveness, low, high = (array.copy() for array in arrays)
-                effectiveness[column, rotor] *= factor
-                yield derived(allocation, effectiveness, low, high, even.spin)
-                allocation[rotor, column] *= factor
-                yield derived(allocation, arrays[1], low, high, even.spin)
-            for limit in (2, 3):
-                changed = [array.copy() for array in arrays]
-                changed[limit][rotor] *= factor
-                yield derived(*changed, even.spin)
+    for rotor, factor in itertools.product(range(4), (1.5, -1.5)):
+        for name, column in [
+            *itertools.product(("allocation", "effectiveness"), range(4)),
+            ("low", 0),
+            ("high", 0),
+        ]:
+            changed = {n: np.array(getattr(even, n)) for n in ("allocation", "effectiveness", "low", "high")}
+            place = {"allocation": (rotor, column), "effectiveness": (column, rotor)}.get(name, rotor)
+            changed[name][place] *= factor
+            yield derived(**changed, spin=even.spin)
+
+
+def nearly_even() -> Iterator[Mixer]:
+    """Yield mixers of which one rotor's number differs from the first one's by as much as rounding may, and by more."""
+    even = mixer_for(load_vehicle("x_quad"))
+    first = 2.0 - 2.0**-23  # sixteen roundings of it are no multiple of its last place
+    for places in (14, 15, 16, 17):
+        near = first - places * 2.0**-52
+        limits, allocation = np.full(4, first), even.allocation.copy()
+        yield derived(
+            even.allocation, even.effectiveness, np.array([first, near, first, first]), limits, even.spin
+        )
+        yield derived(
+            even.allocation, even.effectiveness, limits, np.array([first, first, near, first]), even.spin
+        )
+        allocation[:, 0] = first, first, first, near
+        yield derived(allocation, even.effectiveness, limits, limits, even.spin)
 
 
 def derived_in_c(core: Core, rotors: Mixer) -> tuple[np.ndarray, np.ndarray]:
@@ -60,7 +73,8 @@ def derived_in_c(core: Core, rotors: Mixer) -> tuple[np.ndarray, np.ndarray]:
 
 def test_numbers_derived_in_double_have_pythons_bits() -> None:
     core = Core("double")
-    for rotors in uneven():
+    assert {rotors.is_even for rotors in nearly_even()} == {0.0, 1.0}
+    for rotors in (*uneven(), *nearly_even()):
         expected = np.hstack([rotors.middle, rotors.reach, rotors.is_inverse, rotors.is_even])
         made, resolution = derived_in_c(core, rotors)
         assert np.array_equal(made, expected)
