@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 from pathlib import Path
@@ -38,13 +39,19 @@ def assert_same(made: np.ndarray, expected: np.ndarray) -> None:
         assert same_bits(made[:, part], expected[:, part]), name
 
 
+@functools.cache
+def shaken_in_python(name: str) -> tuple[Sequence, np.ndarray, np.ndarray]:
+    """Return inputs, outputs and status of a shaken vehicle."""
+    controller, vehicle = FLOWN[name]
+    inputs = sequence(5000, 41, vehicle().weight_n)
+    return inputs, *run_python(both(controller, vehicle())[0], inputs)
+
+
 @pytest.mark.parametrize("name", FLOWN)
 def test_a_shaken_vehicle_is_answered_as_by_python(name: str) -> None:
     controller, vehicle = FLOWN[name]
-    python, c = both(controller, vehicle())
-    inputs = sequence(5000, 41, vehicle().weight_n)
-    expected, expected_status = run_python(python, inputs)
-    made, status = c.run(*inputs)
+    inputs, expected, expected_status = shaken_in_python(name)
+    made, status = both(controller, vehicle())[1].run(*inputs)
     assert np.array_equal(status, expected_status)
     assert_same(made, expected)
     assert {0, LoopStatus.INPUT_NOT_FINITE} <= set(status.tolist())

@@ -6,6 +6,7 @@ import functools
 import gc
 import mmap
 import os
+import re
 import resource
 import shutil
 import signal
@@ -48,8 +49,8 @@ BESIDE = ("laws", "sensing", "ports/host")
 """What the application's tests compile beside the mutated parts."""
 SLOW = "not clang and not compiler and not compiles and not sanitizers and not fresh and not own_no_memory"
 """Without these, of which each compiles everything again."""
-KEPT = {"flight", "filled_stack", "stream"}
-"""Caches that hold nothing that the sources made: missions as flown by Python."""
+KEPT = re.compile(r"flight|filled_stack|stream|\w+_in_python")
+"""Caches that hold nothing that the sources made: what Python makes of the same inputs."""
 LEAST_LIMIT_S, TIMES = 1.0, 10.0
 """CPU time after which a test is taken for an endless loop: so many times what it takes without a mutant."""
 MOST_MEMORY = 8 << 30
@@ -262,7 +263,7 @@ def _forget() -> None:
     for name, module in list(sys.modules.items()):
         if name.startswith(("tests.firmware", "tests.parity")):
             for word, thing in list(vars(module).items()):
-                if isinstance(thing, functools._lru_cache_wrapper) and word not in KEPT:
+                if isinstance(thing, functools._lru_cache_wrapper) and not KEPT.fullmatch(word):
                     thing.cache_clear()
 
 
