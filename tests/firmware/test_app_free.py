@@ -47,7 +47,7 @@ def target() -> Iterator[Target]:
 
 
 def started(target: Target, every: float = 1, timeout_ms: float = 0) -> None:
-    target.poll()
+    target.poll(1_500)  # figures of a second count from the start of the run, not of the target
     target.run(-1)
     target.run(0)
     target.heard()
