@@ -41,6 +41,14 @@ CLOCK_READINGS = 32
 """Of the application at its start, which measures their cost."""
 
 
+UNWRITTEN = 0xA5
+"""Each byte of an application's memory before its start: nothing is zero by chance."""
+ALLOCATED_SIZE = getattr(ctypes.CDLL(None), "malloc_usable_size", None)
+"""glibc's; without it the memory stays as it comes."""
+if ALLOCATED_SIZE is not None:
+    ALLOCATED_SIZE.restype = ctypes.c_size_t
+
+
 def sources(*folders: str) -> list[Path]:
     """Return the C files of folders of the firmware."""
     return [path for folder in folders for path in sorted((FIRMWARE / folder).glob("*.c"))]
@@ -114,7 +122,7 @@ def library(path: str = "", real: str = "float") -> ctypes.CDLL:
     if not path and real == "float":
         path = os.environ.get(LIBRARY, "")
     loaded = ctypes.CDLL(path or str(cached(f"app-{real}.so", *flags)))
-    loaded.fs_host_app_new.restype = ctypes.c_void_p
+    loaded.fs_host_app_new.restype = loaded.fs_host_port.restype = ctypes.c_void_p
     for name in ("fs_host_app_transmit", "fs_app_wait_ms", "fs_app_run_wait_us"):
         getattr(loaded, name).restype = ctypes.c_uint32
     loaded.fs_app_state.restype = ctypes.c_uint16
@@ -158,8 +166,11 @@ class Target:
         if has_estimator:
             self._port.sense = ctypes.cast(self._library.fs_sensing_take, ctypes.c_void_p)
             self._port.read_estimator = ctypes.cast(self._library.fs_sensing_read, ctypes.c_void_p)
-        port = None if own_port else ctypes.byref(self._port)
-        self._app = ctypes.c_void_p(self._library.fs_host_app_new(port))
+        port = self._library.fs_host_port() if own_port else ctypes.addressof(self._port)
+        self._app = ctypes.c_void_p(self._library.fs_host_app_new(None))
+        if ALLOCATED_SIZE is not None:
+            ctypes.memset(self._app, UNWRITTEN, ALLOCATED_SIZE(self._app))
+        self._library.fs_app_init(self._app, ctypes.c_void_p(port))
         self.now_ms = 0
         self.codec = mavlink.MAVLink(None, *GCS)
         self.codec.robust_parsing = True

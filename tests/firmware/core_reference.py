@@ -23,7 +23,7 @@ from flightstack.core.array_items import as_tuple, store
 from flightstack.core.arrays import position_setpoint, vehicle_state
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import AttitudeReference, Quaternion, Vector3, Wrench
-from flightstack.core.geometry import blend, conjugate, quaternion_product, rotation_vector
+from flightstack.core.geometry import blend, conjugate, quaternion_product, rotation_over, rotation_vector
 
 
 @compiled
@@ -50,6 +50,13 @@ def _quaternion(x):  # type: ignore[no-untyped-def]
 @compiled
 def _vector(x):  # type: ignore[no-untyped-def]
     return Vector3(x[0], x[1], x[2])
+
+
+@compiled
+def rotations(turned, rates, dt_s, vectors, made):  # type: ignore[no-untyped-def]
+    for i in range(dt_s.size):
+        store(vectors[i], rotation_vector(_quaternion(turned[i])))
+        store(made[i], rotation_over(_vector(rates[i]), dt_s[i]))
 
 
 @compiled

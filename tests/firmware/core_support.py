@@ -34,6 +34,8 @@ WARNINGS = [
 EXACT = ["-std=c99", "-ffp-contract=off", "-fno-fast-math"]
 OUTER_DUE, SET_TARGET, RESET = 1, 2, 4
 ROW_SIZE = 31
+UNWRITTEN = 0xA5
+"""Each byte of memory before the core writes it: nothing is zero by chance."""
 PARTS = {
     "attitude target": slice(0, 4),
     "target thrust": slice(4, 5),
@@ -133,7 +135,7 @@ class Loops:
 
     def __init__(self, core: Core, numbers: Mapping[str, float]) -> None:
         self.core, self.numbers = core, dict(numbers)
-        self.memory = np.zeros(core.library.drive_sizes(1), np.uint8)
+        self.memory = np.full(core.library.drive_sizes(1), UNWRITTEN, np.uint8)
         core.call("drive_init", self.memory)
         for name, value in numbers.items():
             assert self.set(name, value) == 0, name
@@ -148,6 +150,11 @@ class Loops:
         return float(
             self.core.library.drive_get(self.memory.ctypes.data_as(ctypes.c_void_p), self.core.index(name))
         )
+
+    def values(self) -> list[float]:
+        """Return all parameters, in the order of their indices."""
+        get, pointer = self.core.library.drive_get, self.memory.ctypes.data_as(ctypes.c_void_p)
+        return [get(pointer, index) for index in range(self.core.library.fs_param_count())]
 
     @property
     def integrals(self) -> list[float]:

@@ -47,7 +47,7 @@ def target() -> Iterator[Target]:
 
 
 def started(target: Target, every: float = 1, timeout_ms: float = 0) -> None:
-    target.poll()
+    target.poll(1_500)  # figures of a second count from the start of the run, not of the target
     target.run(-1)
     target.run(0)
     target.heard()
@@ -156,12 +156,12 @@ def test_the_newest_state_flies_and_its_age_is_told(target: Target) -> None:
     target.poll(10)
     assert target.heard() == []  # figures come once a second
     (first,) = at(target, PERIOD_US)
-    (second,) = at(target, 2 * PERIOD_US)
+    second, third = (at(target, tick * PERIOD_US)[0] for tick in (2, 3))
     assert (first.state_time_us, first.age_us) == (9, 1_500)
-    assert (second.state_time_us, second.age_us) == (9, 3_500)
+    assert (second.state_time_us, second.age_us, third.age_us) == (9, 3_500, 5_500)
     told = timing(target)
-    assert (told.states, told.skipped, told.held, told.age_max_us) == (3, 2, 1, 3_500)
-    assert told.age_mean_us == pytest.approx(2_500.0)
+    assert (told.states, told.skipped, told.held, told.age_max_us) == (3, 2, 2, 5_500)
+    assert told.age_mean_us == pytest.approx(3_500.0)
     assert timing(target).age_mean_us == 0.0  # of the next second
 
 
@@ -190,11 +190,16 @@ def test_rotors_stop_when_states_stop() -> None:
     target.close()
 
 
-def test_the_default_timeout_is_100_ms(target: Target) -> None:
+@pytest.mark.parametrize(("given_ms", "timeout_ms"), [(0, 100), (1, 1), (6, 6)])
+def test_rotors_stop_after_the_given_timeout_or_100_ms(given_ms: int, timeout_ms: int) -> None:
+    target = Target()
+    started(target, timeout_ms=given_ms)
     at(target, 0, state(1, RESET))
-    assert max(at(target, 100_000)[0].rotor_command) > 0.0
-    target.run(102_000)
+    target.run(timeout_ms * 1_000)
+    assert target.state == FREE
+    target.run(timeout_ms * 1_000 + PERIOD_US)
     assert target.state == SAFE
+    target.close()
 
 
 @pytest.mark.parametrize("place", [0, 12, 13, 23])

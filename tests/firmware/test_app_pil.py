@@ -269,3 +269,16 @@ def test_a_reboot_gives_the_loops_their_defaults_back_but_not_in_flight(target: 
         (refusal,) = target.ask(command(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, what))
         assert refusal.result == mavlink.MAV_RESULT_DENIED
     other.close()
+
+
+def test_a_step_before_a_free_run_is_not_repeated_after_it(target: Target) -> None:
+    target.step(0, RESET)
+    assert not target.step(1).status & REPEATED
+    assert target.step(1).status & REPEATED
+    target.poll(5_000)  # the host is silent: the flight may go on, or another one begin
+    target.run(-1)
+    target.run(0)
+    for on in (1, 0):
+        (ack,) = (m for m in target.ask(command(mavlink.MAV_CMD_FS_FREE_RUN, on, 1)) if hasattr(m, "result"))
+        assert ack.result == mavlink.MAV_RESULT_ACCEPTED
+    assert target.step(1).status & (REPEATED | OUT_OF_ORDER) == OUT_OF_ORDER

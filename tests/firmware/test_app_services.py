@@ -57,6 +57,7 @@ def test_the_host_tells_what_it_is() -> None:
     target = Target(own_port=True)
     identity, status = target.request("FS_PIL_IDENTITY"), target.status()
     assert (identity.board, identity.clock_hz, identity.cost_unit) == ("host", 0, NANOSECONDS)
+    assert identity.source_hash == [0] * 8  # which the build of a library does not give
     assert identity.compiler.startswith(("gcc ", "clang "))
     assert (status.stack_size, status.stack_high_water) == (0, 0)
     outer, inner, mixer, whole = target.step(0, RESET | OUTER_DUE).cycles
@@ -262,6 +263,15 @@ def test_a_step_behind_a_damaged_one_is_answered_without_waiting_for_more(target
     assert kinds(target.heard()) == ["FS_PIL_REPORT"]
     status = target.status()
     assert (status.bad_frames, status.skipped_octets, status.frames) == (1, 3, 2)
+
+
+def test_a_single_octet_does_not_hold_back_the_next_frame(target: Target) -> None:
+    target.poll()
+    target.heard()
+    target.give(b"\xfd")
+    target.poll(1)  # hears that an octet came
+    target.poll(20)
+    assert target.status().skipped_octets == 1
 
 
 def test_fields_without_a_meaning_are_zero(target: Target) -> None:

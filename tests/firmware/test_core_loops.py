@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 from pathlib import Path
@@ -38,13 +39,19 @@ def assert_same(made: np.ndarray, expected: np.ndarray) -> None:
         assert same_bits(made[:, part], expected[:, part]), name
 
 
+@functools.cache
+def shaken_in_python(name: str) -> tuple[Sequence, np.ndarray, np.ndarray]:
+    """Return inputs, outputs and status of a shaken vehicle."""
+    controller, vehicle = FLOWN[name]
+    inputs = sequence(5000, 41, vehicle().weight_n)
+    return inputs, *run_python(both(controller, vehicle())[0], inputs)
+
+
 @pytest.mark.parametrize("name", FLOWN)
 def test_a_shaken_vehicle_is_answered_as_by_python(name: str) -> None:
     controller, vehicle = FLOWN[name]
-    python, c = both(controller, vehicle())
-    inputs = sequence(5000, 41, vehicle().weight_n)
-    expected, expected_status = run_python(python, inputs)
-    made, status = c.run(*inputs)
+    inputs, expected, expected_status = shaken_in_python(name)
+    made, status = both(controller, vehicle())[1].run(*inputs)
     assert np.array_equal(status, expected_status)
     assert_same(made, expected)
     assert {0, LoopStatus.INPUT_NOT_FINITE} <= set(status.tolist())
@@ -62,19 +69,19 @@ def level(count: int, flags: int) -> Sequence:
 def test_a_changed_gain_keeps_what_its_integral_gives() -> None:
     python, c = both("pid", load_vehicle("paper_quad"))
     ticks = level(200, OUTER_DUE)
-    for name, value in (
-        ("PID_ROLL_I", 50.0),
-        ("PID_PITCH_I", 0.0),
-        ("PID_YAW_P", 12.5),
-        ("MPC_TILTMAX_AIR", 20.0),
+    for name, value, factors in (
+        ("PID_ROLL_I", 50.0, [4.0, 1.0, 1.0]),
+        ("PID_ROLL_I", 1.0, [50.0, 1.0, 1.0]),
+        ("PID_PITCH_I", 0.0, [1.0, 0.0, 1.0]),
+        ("PID_YAW_P", 12.5, [1.0, 1.0, 1.0]),
+        ("MPC_TILTMAX_AIR", 20.0, [1.0, 1.0, 1.0]),
     ):
         assert_same(c.run(*ticks)[0], run_python(python, ticks)[0])
         python.set_parameter(name, value)
         before = c.integrals
         assert c.set(name, value) == 0
         assert c.get(name) == value
-        expected = {"PID_ROLL_I": [4.0, 1.0, 1.0], "PID_PITCH_I": [1.0, 0.0, 1.0]}.get(name, [1.0, 1.0, 1.0])
-        assert c.integrals == pytest.approx([i * factor for i, factor in zip(before, expected, strict=True)])
+        assert c.integrals == pytest.approx([i * factor for i, factor in zip(before, factors, strict=True)])
         assert before[0] != 0.0
         assert before[1] != 0.0
     assert_same(c.run(*ticks)[0], run_python(python, ticks)[0])

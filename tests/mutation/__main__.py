@@ -1,105 +1,116 @@
 """Mutation run over core, codec and application.
 
-``python -m tests.mutation [--mutants N] [--seed S] [--jobs J] [--only PART]``
+``python -m tests.mutation [--mutants N] [--seed S] [--only PART] [--again FATE] [--results FILE]``
 
-Prints the score, and every survivor: a fault that the fast tests do not see, or no fault at all.
+Mutants that the file of results knows are not tried again: a run that was ended goes on. Prints every survivor (a
+fault that the fast tests do not see, or no fault at all) and the score.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
 import random
-import shutil
 import sys
-import tempfile
 import time
 from collections import Counter
 from pathlib import Path
 
-from tests.mutation import judge
-from tests.mutation.judge import INVALID, SURVIVED, TESTS, UNTRIED, Verdict
+from tests.mutation.judge import EQUAL, FIRMWARE, INVALID, SURVIVED, TESTS, UNTRIED, Judge, with_tests
 from tests.mutation.mutants import Mutant, mutants
+from tests.mutation.results import Result, Results
 
-GENERATED = ("fs_param_table.c", "fs_messages.c", "fs_messages.h")
-MOST_OF_A_GENERATED_FILE = 100
-"""Its lines are alike, and `make generated` compares all of it with its source anyway."""
-ELSEWHERE = ("fs_constants.h",)
-"""Only the application uses these values of enumerations; `make generated` compares them with the XML."""
+ELSEWHERE = {"mavlink/fs_constants.h": "app"}
+"""The application alone uses these values."""
+TABLES = ("fs_param_table.c", "fs_messages.c", "fs_messages.h")
+"""Generated, their lines alike: tried last."""
+NO_FAULT = {EQUAL, INVALID}
 
 
-def chosen(sources: Path, only: str, number: int, seed: int) -> list[Mutant]:
-    """Return mutants of all files by chance, so many of them when ``number`` is not 0."""
-    rng, found = random.Random(seed), []
+def all_mutants() -> dict[str, list[Mutant]]:
+    """Return the mutants of each part's files."""
+    found: dict[str, list[Mutant]] = {part: [] for part in TESTS}
     for part in TESTS:
-        for path in sorted((sources / part).glob("*.[ch]")):
-            of_file = list(mutants(path.name, path.read_text())) if path.name not in ELSEWHERE else []
-            if path.name in GENERATED:
-                of_file = rng.sample(of_file, min(len(of_file), MOST_OF_A_GENERATED_FILE))
-            found += [m for m in of_file if only in f"{part}/{path.name}"]
-    rng.shuffle(found)
-    return found[:number] if number else found
+        for path in sorted((FIRMWARE / part).glob("*.[ch]")):
+            name = f"{part}/{path.name}"
+            found[ELSEWHERE.get(name, part)] += mutants(name, path.read_text())
+    return found
 
 
-def judged(sample: list[Mutant], jobs: int, minutes: float, sources: Path, objects: Path) -> list[Verdict]:
-    """Try mutants, ``jobs`` at a time, until all are tried or the time is over."""
-    waiting, running, verdicts = list(sample), {}, []
-    end_s = time.monotonic() + 60.0 * minutes
-    while running or (waiting and time.monotonic() < end_s):
-        if waiting and len(running) < jobs and time.monotonic() < end_s:
-            mutant, work = waiting.pop(), Path(tempfile.mkdtemp(prefix="mutant-"))
-            running[judge.start(mutant, work, sources, objects)] = (mutant, work)
-            continue
-        child, status = os.wait()
-        mutant, work = running.pop(child)
-        shutil.rmtree(work)
-        verdicts.append(Verdict(mutant, judge.fate_of(status)))
-        if verdicts[-1].fate in {SURVIVED, UNTRIED}:
-            print(f"[{len(verdicts)}/{len(sample)}] {verdicts[-1].fate}  {mutant}", flush=True)
-    return verdicts
+def chosen(only: str, number: int, seed: int) -> dict[tuple[bool, str], list[Mutant]]:
+    """Return mutants of files whose name has ``only`` in it, sorted in by whether it is a table, and by part.
 
-
-def report(verdicts: list[Verdict]) -> None:
-    """Print a line for each file and one for all."""
-    print(f"\n{'file':32}{'mutants':>9}{'killed':>9}{'survived':>10}{'score':>8}")
-    rows = [
-        (name, [v for v in verdicts if v.mutant.file == name])
-        for name in sorted({v.mutant.file for v in verdicts})
+    ``number`` of them are drawn by chance, 0: all.
+    """
+    drawn = [
+        (part, mutant) for part, found in all_mutants().items() for mutant in found if only in mutant.file
     ]
-    for name, of_file in [*rows, ("all", verdicts)]:
-        counted = [v for v in of_file if v.fate != INVALID]
-        survived = sum(v.fate == SURVIVED for v in counted)
-        if counted:
-            score = 100.0 * (len(counted) - survived) / len(counted)
-            print(f"{name:32}{len(counted):9}{len(counted) - survived:9}{survived:10}{score:7.1f}%")
-    fates = Counter(v.fate for v in verdicts)
+    random.Random(seed).shuffle(drawn)
+    sorted_in: dict[tuple[bool, str], list[Mutant]] = {
+        (last, part): [] for last in (False, True) for part in TESTS
+    }
+    for part, mutant in drawn[:number] if number else drawn:
+        sorted_in[mutant.file.endswith(TABLES), part].append(mutant)
+    return sorted_in
+
+
+def run(part: str, waiting: list[Mutant], results: Results, end_s: float) -> None:
+    """Try mutants of a part until all are tried or the time is over."""
+
+    def try_all(judge: Judge) -> None:
+        for number, mutant in enumerate(waiting, start=1):
+            if time.monotonic() > end_s:
+                return
+            results.add(verdict := judge.judged(mutant))
+            if verdict.fate in {SURVIVED, UNTRIED}:
+                print(f"[{number}/{len(waiting)}] {verdict.fate}  {mutant}", flush=True)
+
+    with_tests(part, try_all)
+
+
+def report(results: list[Result]) -> None:
+    """Print a line for each file and one for all."""
+    print(f"\n{'file':36}{'mutants':>9}{'no fault':>10}{'found':>8}{'survived':>10}{'score':>8}{'CPU s':>8}")
+    for name in [*sorted({result.file for result in results}), ""]:
+        of_file = [result for result in results if name in {result.file, ""}]
+        fates = Counter(result.fate for result in of_file)
+        no_fault, survived = sum(fates[fate] for fate in NO_FAULT), fates[SURVIVED]
+        found = len(of_file) - no_fault - survived
+        score = 100.0 * found / max(1, found + survived)
+        cpu_s = sum(result.cpu_s for result in of_file)
+        print(
+            f"{name or 'all':36}{len(of_file):9}{no_fault:10}{found:8}{survived:10}{score:7.1f}%{cpu_s:8.0f}"
+        )
     print(", ".join(f"{number} {fate}" for fate, number in fates.most_common()))
 
 
 def main() -> int:
-    """Run; exit code 1 when less than ``--least`` percent were killed."""
+    """Run; exit code 1 when less than ``--least`` percent were found."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutation", description=__doc__)
     parser.add_argument("--mutants", type=int, default=0, help="so many of them, drawn by chance; 0: all")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument(
-        "--minutes", type=float, default=24.0 * 60.0, help="begin no more of them after this time"
+        "--minutes", type=float, default=24.0 * 60.0, help="try no more of them after this time"
     )
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--only", default="", help="part of a file's name, core/fs_mixer.c for instance")
-    parser.add_argument("--least", type=float, default=0.0, help="percent that must be killed")
+    parser.add_argument(
+        "--again", default=UNTRIED, help="try mutants of this fate again: survived, for instance"
+    )
+    parser.add_argument("--results", type=Path, default=Path("build/mutation.jsonl"))
+    parser.add_argument("--least", type=float, default=0.0, help="percent that must be found")
     given = parser.parse_args()
-    with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
-        sources, objects = Path(folder) / "firmware", Path(folder) / "objects"
-        objects.mkdir()
-        judge.snapshot(sources)
-        sample = chosen(sources, given.only, given.mutants, given.seed)
-        print(f"{len(sample)} mutants", flush=True)
-        judge.warm_up({judge.part_of(mutant) for mutant in sample}, sources, objects)
-        verdicts = judged(sample, given.jobs, given.minutes, sources, objects)
-    report(verdicts)
-    counted = [v for v in verdicts if v.fate != INVALID]
-    killed = sum(v.fate != SURVIVED for v in counted)
-    untried = any(v.fate == UNTRIED for v in verdicts)
+    results, end_s = Results(given.results), time.monotonic() + 60.0 * given.minutes
+    sample = chosen(given.only, given.mutants, given.seed)
+    for (is_table, part), mutants_of_part in sample.items():
+        known = ((mutant, results.of(mutant)) for mutant in mutants_of_part)
+        waiting = [mutant for mutant, result in known if result is None or result.fate == given.again]
+        if waiting and time.monotonic() < end_s:
+            print(f"{part}{', tables' if is_table else ''}: {len(waiting)} mutants to try", flush=True)
+            run(part, waiting, results, end_s)
+    tried = [result for found in sample.values() for m in found if (result := results.of(m)) is not None]
+    report(tried)
+    counted = [result for result in tried if result.fate not in NO_FAULT]
+    killed = sum(result.fate != SURVIVED for result in counted)
+    untried = any(result.fate == UNTRIED for result in tried)
     return int(untried or 100.0 * killed < given.least * len(counted))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -98,6 +99,7 @@ AFTER_OPERAND = re.compile(r"[\w)\]]")
 ONE_STATEMENT = re.compile(
     r"^[ \t]+(?!return\b|static\b|const\b|typedef\b)[\w*][^;{}\n]*;(?=[ \t]*(?:/\*.*\*/)?[ \t]*$)", re.M
 )
+FUNCTION = re.compile(r"^\w[\w \t*]*?(\w+)\(", re.M)
 DECLARATION = re.compile(r"\s*(?:const |static )?(?:fs_\w+|u?int\d+_t|float|char|void)\s+\*?\w+(?:\[|,|;| =)")
 
 
@@ -110,6 +112,10 @@ class Mutant(NamedTuple):
     kind: str
     before: str
     after: str
+    function: str
+    """Its name, or that of the last one before it; empty before the first."""
+    key: str
+    """Differs for each mutant, and for each version of the file's text."""
 
     def applied(self, text: str) -> str:
         """Return the text with the fault; ValueError when the text is another one."""
@@ -127,9 +133,13 @@ def mutants(file: str, text: str) -> Iterator[Mutant]:
     unused = (
         {"name", "width", "statement"} if file.endswith(".h") else set()
     )  # a header is declarations, mostly
+    names = [(found.start(), found[1]) for found in FUNCTION.finditer(text)]
+    version = hashlib.sha256(text.encode()).hexdigest()[:8]
     for start, kind, before, after in sorted({*_of_tokens(text), *_of_statements(text)}):
         if kind not in unused and not any(first <= start < last for first, last in _double_parts(text)):
-            yield Mutant(file, start, text.count("\n", 0, start) + 1, kind, before, after)
+            function = next((name for at, name in reversed(names) if at <= start), "")
+            key = f"{file} {version} {start} {kind} {after}"
+            yield Mutant(file, start, text.count("\n", 0, start) + 1, kind, before, after, function, key)
 
 
 def _of_tokens(text: str) -> Iterator[tuple[int, str, str, str]]:

@@ -9,6 +9,7 @@ bound.
 from __future__ import annotations
 
 import functools
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -30,7 +31,15 @@ def core(real: str) -> Core:
 # ------------------------------------------------------------------ position
 
 
-def position(real: str) -> dict[str, Compared]:
+class Case(NamedTuple):
+    """Inputs of a law, and what Python makes of them; computed once, since both precisions are compared with it."""
+
+    inputs: tuple[np.ndarray, ...]
+    outputs: tuple[np.ndarray, ...]
+
+
+@functools.cache
+def position_in_python() -> Case:
     s = Samples(COUNT, 1)
     attitude = s.attitudes()
     states = np.hstack([s.normal(3, 20.0), s.normal(3, 5.0), attitude, s.normal(3, 1.0)])
@@ -43,19 +52,22 @@ def position(real: str) -> dict[str, Compared]:
         *((0.2, 2.0), (10.0, 60.0), (0.1, 1.2), (0.0, 5.0)),
     )
     memory, dt_s, saturation = s.normal(3, 1.0), s.uniform(DT_S), s.choice(1, [-1.0, 0.0, 1.0])
-    c = core(real)
-    c_memory, c_target = c.array(memory), c.unwritten(COUNT, 5)
-    c.call(
-        "drive_position", COUNT, c_memory, c.array(states), c.array(setpoints), c.array(params), c.array(dt_s),
-        c.array(saturation), c_target,
-    )  # fmt: skip
-    py_memory, py_target = memory.copy(), np.zeros((COUNT, 5))
-    python.position(py_memory, states, setpoints, params, dt_s, saturation, py_target)
-    c_target, c_memory = c_target.astype(np.float64), c_memory.astype(np.float64)
+    advanced, target = memory.copy(), np.zeros((COUNT, 5))
+    python.position(advanced, states, setpoints, params, dt_s, saturation, target)
+    return Case((memory, states, setpoints, params, dt_s, saturation), (advanced, target))
+
+
+def position(real: str) -> dict[str, Compared]:
+    case, c = position_in_python(), core(real)
+    memory, *inputs = map(c.array, case.inputs)
+    target = c.unwritten(COUNT, 5)
+    c.call("drive_position", COUNT, memory, *inputs, target)
+    py_memory, py_target = case.outputs
+    target = target.astype(np.float64)
     return {
-        "attitude": Compared(c_target[:, :4], py_target[:, :4]),
-        "thrust": Compared(c_target[:, 4:], py_target[:, 4:]),
-        "integral": Compared(c_memory, py_memory),
+        "attitude": Compared(target[:, :4], py_target[:, :4]),
+        "thrust": Compared(target[:, 4:], py_target[:, 4:]),
+        "integral": Compared(memory.astype(np.float64), py_memory),
     }
 
 
@@ -76,8 +88,8 @@ def test_position_loop_in_float_is_near() -> None:
 # ------------------------------------------------------------------ attitude reference
 
 
-def reference(real: str, rate: float = 2.0, most: float = 10.0) -> dict[str, Compared]:
-    """``rate``: standard deviation of what is turned with, ``most``: the largest limit of it [rad/s]."""
+@functools.cache
+def reference_in_python(rate: float, most: float) -> Case:
     s = Samples(COUNT, 2)
     attitude = s.attitudes()
     start = s.near(attitude, 0.1)
@@ -85,23 +97,27 @@ def reference(real: str, rate: float = 2.0, most: float = 10.0) -> dict[str, Com
     memory = np.hstack([s.near(start, 0.05), s.normal(3, rate)])
     params = s.uniform((0.0, 120.0), (0.5, 1.5), (1.0, most), (20.0, 300.0))
     params[s.random.random(COUNT) < 0.05, 0] = 0.0  # no filter
-    fraction, dt_s = s.uniform((0.0, 1.2)), s.uniform(DT_S)
-    c = core(real)
-    c_memory, c_reference, c_error = c.array(memory), c.unwritten(COUNT, 10), c.unwritten(COUNT, 3)
-    c.call(
-        "drive_reference", COUNT, c_memory, c.array(start), c.array(end), c.array(fraction), c.array(params),
-        c.array(dt_s), c.array(attitude), c_reference, c_error,
-    )  # fmt: skip
-    py_memory, py_reference, py_error = memory.copy(), np.zeros((COUNT, 10)), np.zeros((COUNT, 3))
-    python.reference(py_memory, start, end, fraction, params, dt_s, attitude, py_reference, py_error)
-    c_reference, c_memory = c_reference.astype(np.float64), c_memory.astype(np.float64)
+    inputs = (start, end, s.uniform((0.0, 1.2)), params, s.uniform(DT_S), attitude)
+    advanced, made, error = memory.copy(), np.zeros((COUNT, 10)), np.zeros((COUNT, 3))
+    python.reference(advanced, *inputs, made, error)
+    return Case((memory, *inputs), (advanced, made, error))
+
+
+def reference(real: str, rate: float = 2.0, most: float = 10.0) -> dict[str, Compared]:
+    """``rate``: standard deviation of what is turned with, ``most``: the largest limit of it [rad/s]."""
+    case, c = reference_in_python(rate, most), core(real)
+    memory, *inputs = map(c.array, case.inputs)
+    made, error = c.unwritten(COUNT, 10), c.unwritten(COUNT, 3)
+    c.call("drive_reference", COUNT, memory, *inputs, made, error)
+    py_memory, py_made, py_error = case.outputs
+    made, memory = made.astype(np.float64), memory.astype(np.float64)
     return {
-        "attitude": Compared(c_reference[:, :4], py_reference[:, :4]),
-        "rates": Compared(c_reference[:, 4:7], py_reference[:, 4:7]),
-        "acceleration": Compared(c_reference[:, 7:], py_reference[:, 7:]),
-        "kept attitude": Compared(c_memory[:, :4], py_memory[:, :4]),
-        "kept rates": Compared(c_memory[:, 4:], py_memory[:, 4:]),
-        "error": Compared(c_error.astype(np.float64), py_error),
+        "attitude": Compared(made[:, :4], py_made[:, :4]),
+        "rates": Compared(made[:, 4:7], py_made[:, 4:7]),
+        "acceleration": Compared(made[:, 7:], py_made[:, 7:]),
+        "kept attitude": Compared(memory[:, :4], py_memory[:, :4]),
+        "kept rates": Compared(memory[:, 4:], py_memory[:, 4:]),
+        "error": Compared(error.astype(np.float64), py_error),
     }
 
 
@@ -150,32 +166,45 @@ def attitude_inputs(s: Samples) -> np.ndarray:
 INERTIAS = ((1e-3, 0.1), (1e-3, 0.1), (1e-3, 0.1))
 
 
-def pid(real: str) -> dict[str, Compared]:
+@functools.cache
+def pid_in_python() -> Case:
     s = Samples(COUNT, 3)
     inputs, memory, dt_s = attitude_inputs(s), s.normal(3, 0.2), s.uniform(DT_S)
     params = s.uniform(
         *[(0.0, 400.0)] * 3, *[(0.0, 300.0)] * 3, *[(0.0, 40.0)] * 3, *[(0.0, 1.0)] * 2, *INERTIAS
     )
-    c = core(real)
-    c_memory, c_torque = c.array(memory), c.unwritten(COUNT, 3)
-    c.call("drive_pid", COUNT, c_memory, c.array(inputs), c.array(params), c.array(dt_s), c_torque)
-    py_memory, py_torque = memory.copy(), np.zeros((COUNT, 3))
-    python.pid(py_memory, inputs, params, dt_s, py_torque)
+    advanced, torque = memory.copy(), np.zeros((COUNT, 3))
+    python.pid(advanced, inputs, params, dt_s, torque)
+    return Case((memory, inputs, params, dt_s), (advanced, torque))
+
+
+def pid(real: str) -> dict[str, Compared]:
+    case, c = pid_in_python(), core(real)
+    memory, *inputs = map(c.array, case.inputs)
+    torque = c.unwritten(COUNT, 3)
+    c.call("drive_pid", COUNT, memory, *inputs, torque)
+    py_memory, py_torque = case.outputs
     return {
-        "torque": Compared(c_torque.astype(np.float64), py_torque),
-        "integral": Compared(c_memory.astype(np.float64), py_memory),
+        "torque": Compared(torque.astype(np.float64), py_torque),
+        "integral": Compared(memory.astype(np.float64), py_memory),
     }
 
 
-def backstepping(real: str) -> dict[str, Compared]:
+@functools.cache
+def backstepping_in_python() -> Case:
     s = Samples(COUNT, 4)
     inputs = attitude_inputs(s)
     params = s.uniform(*[(0.0, 40.0)] * 6, *[(0.0, 1.0)] * 2, *INERTIAS, (0.0, 1e-4))
-    c = core(real)
-    c_torque, py_torque = c.unwritten(COUNT, 3), np.zeros((COUNT, 3))
-    c.call("drive_backstepping", COUNT, c.array(inputs), c.array(params), c_torque)
-    python.backstepping(inputs, params, py_torque)
-    return {"torque": Compared(c_torque.astype(np.float64), py_torque)}
+    torque = np.zeros((COUNT, 3))
+    python.backstepping(inputs, params, torque)
+    return Case((inputs, params), (torque,))
+
+
+def backstepping(real: str) -> dict[str, Compared]:
+    case, c = backstepping_in_python(), core(real)
+    torque = c.unwritten(COUNT, 3)
+    c.call("drive_backstepping", COUNT, *map(c.array, case.inputs), torque)
+    return {"torque": Compared(torque.astype(np.float64), case.outputs[0])}
 
 
 @pytest.mark.parametrize("law", [pid, backstepping])

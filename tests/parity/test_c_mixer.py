@@ -14,6 +14,7 @@ import pytest
 from flightstack.control.mixer import Mixer, derived, mixer_for
 from flightstack.params.vehicle import Vehicle, load_vehicle
 from tests.firmware import core_reference as python
+from tests.firmware.core_mixer import mixer_of_c
 from tests.firmware.core_samples import Samples
 from tests.firmware.core_support import Compared, Core
 from tests.support.rotor_sets import multirotor, ring
@@ -81,23 +82,22 @@ class Mixed(NamedTuple):
     """Short ways that the mixer took itself to be fit for: 1 effectiveness undoes allocation, 2 rotors are alike."""
 
 
-def mixer_of_c(c: Core, rotors: Mixer) -> np.ndarray:
-    """Return memory of an fs_mixer with these numbers, and nothing derived yet."""
-    flat, n = np.zeros(c.library.drive_sizes(3) // c.dtype.itemsize, c.dtype), rotors.spin.size
-    numbers = flat[1:]  # after the number of rotors
-    numbers[: 4 * n] = rotors.allocation.ravel()
-    for axis in range(4):
-        numbers[32 + 8 * axis : 32 + 8 * axis + n] = rotors.effectiveness[axis]
-    for place, values in enumerate((rotors.low, rotors.high, rotors.spin)):
-        numbers[64 + 8 * place : 64 + 8 * place + n] = values
-    return flat
+class Case(NamedTuple):
+    """Wrenches for a mixer, and what Python makes of them."""
+
+    rotors: Mixer
+    wrenches: np.ndarray
+    speeds: np.ndarray
+    achieved: np.ndarray
+    relative: np.ndarray
 
 
-def mixed(real: str, name: str, count: int = COUNT // 5) -> Mixed:
+@functools.cache
+def mixed_in_python(name: str, count: int) -> Case:
+    """Mix wrenches from easy to far beyond what the rotors can do."""
     vehicle = VEHICLES[name]()
     s = Samples(count, 5)
     weight, n = vehicle.weight_n, len(vehicle.rotors)
-    # from easy to far beyond what the rotors can do
     wrenches = np.hstack(
         [
             s.normal(1, weight)[:, None] + weight,
@@ -105,28 +105,36 @@ def mixed(real: str, name: str, count: int = COUNT // 5) -> Mixed:
             s.normal(1, 0.02 * weight)[:, None],
         ]
     )
-    wrenches = s.narrow(wrenches)
-    rotors = mixer_for(
-        vehicle
-    )  # not narrowed: with float the rounding of these numbers is part of the difference
-    c = core(real)
-    flat = mixer_of_c(c, rotors)
+    made = Case(
+        mixer_for(vehicle), s.narrow(wrenches), np.zeros((count, n)), np.zeros((count, 4)), np.zeros(count)
+    )
+    python.mixer(made.wrenches, made.rotors, made.speeds, made.achieved, made.relative)
+    return made
+
+
+def mixed(real: str, name: str, count: int = COUNT // 5) -> Mixed:
+    case, c = mixed_in_python(name, count), core(real)
+    # not narrowed: with float the rounding of these numbers is part of the difference
+    flat, n = mixer_of_c(c, case.rotors), case.rotors.spin.size
     speeds, achieved, saturation = c.unwritten(count, 8), c.unwritten(count, 4), c.unwritten(count, 4)
     relative = c.unwritten(count)
-    c.call("drive_mixer", count, c.array(wrenches), flat, n, speeds, achieved, saturation, relative)
+    c.call("drive_mixer", count, c.array(case.wrenches), flat, n, speeds, achieved, saturation, relative)
     ways = int(c.library.drive_mixer_ways(flat.ctypes.data_as(ctypes.c_void_p)))
-    py_speeds, py_achieved, py_relative = np.zeros((count, n)), np.zeros((count, 4)), np.zeros(count)
-    python.mixer(wrenches, rotors, py_speeds, py_achieved, py_relative)
-    lag = wrenches - py_achieved
+    lag = case.wrenches - case.achieved
     quantities = {
-        "speeds": Compared(speeds[:, :n].astype(np.float64), py_speeds),
-        "squares": Compared(speeds[:, :n].astype(np.float64) ** 2, py_speeds**2),
-        "thrust": Compared(achieved[:, :1].astype(np.float64), py_achieved[:, :1]),
-        "torque": Compared(achieved[:, 1:].astype(np.float64), py_achieved[:, 1:]),
-        "relative speed": Compared(relative[:, None].astype(np.float64), py_relative[:, None]),
+        "speeds": Compared(speeds[:, :n].astype(np.float64), case.speeds),
+        "squares": Compared(speeds[:, :n].astype(np.float64) ** 2, case.speeds**2),
+        "thrust": Compared(achieved[:, :1].astype(np.float64), case.achieved[:, :1]),
+        "torque": Compared(achieved[:, 1:].astype(np.float64), case.achieved[:, 1:]),
+        "relative speed": Compared(relative[:, None].astype(np.float64), case.relative[:, None]),
     }
     return Mixed(
-        quantities, np.sign(saturation), np.sign(lag) * (np.abs(lag) > 1e-9), wrenches, speeds[:, n:], ways
+        quantities,
+        np.sign(saturation),
+        np.sign(lag) * (np.abs(lag) > 1e-9),
+        case.wrenches,
+        speeds[:, n:],
+        ways,
     )
 
 
@@ -175,20 +183,29 @@ def edge_wrenches(rotors: Mixer, rounding: float) -> np.ndarray:
     return np.array(made)
 
 
+@functools.cache
+def at_edges_in_python(name: str, dtype: np.dtype[np.floating]) -> Case:
+    rotors = mixer_for(VEHICLES[name]())
+    wrenches = edge_wrenches(rotors, float(np.finfo(dtype).eps)).astype(dtype).astype(np.float64)
+    count = len(wrenches)
+    made = Case(rotors, wrenches, np.zeros((count, rotors.spin.size)), np.zeros((count, 4)), np.zeros(count))
+    python.mixer(wrenches, rotors, made.speeds, made.achieved, made.relative)
+    return made
+
+
 @pytest.mark.parametrize(("real", "apart"), [("float", 3.0), ("double", 24.0)])  # measured 1.5 and 11.5
 @pytest.mark.parametrize("name", LIFTING)
 def test_no_rotor_is_asked_for_more_than_it_can_do_however_near_it_is(
     name: str, real: str, apart: float
 ) -> None:
-    rotors, c = mixer_for(VEHICLES[name]()), core(real)
+    c = core(real)
     rounding = float(np.finfo(c.dtype).eps)
-    wrenches = c.array(edge_wrenches(rotors, rounding)).astype(np.float64)
+    rotors, wrenches, expected, achieved, _ = at_edges_in_python(name, c.dtype)
     count, n = len(wrenches), rotors.spin.size
     speeds, saturation = c.unwritten(count, 8), c.unwritten(count, 4)
     rest = c.unwritten(count, 4), saturation, c.unwritten(count)
     c.call("drive_mixer", count, c.array(wrenches), mixer_of_c(c, rotors), n, speeds, *rest)
-    turning, expected, achieved = speeds[:, :n].astype(np.float64), np.zeros((count, n)), np.zeros((count, 4))
-    python.mixer(wrenches, rotors, expected, achieved, np.zeros(count))
+    turning = speeds[:, :n].astype(np.float64)
     lag = wrenches - achieved
     told = saturation != 0.0  # rounding is taken for no limit
     assert np.array_equal(np.sign(saturation)[told], (np.sign(lag) * (np.abs(lag) > 1e-9))[told])

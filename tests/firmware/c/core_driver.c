@@ -30,6 +30,15 @@ void drive_math(uint32_t count, const fs_real *y, const fs_real *x, fs_real *sin
     }
 }
 
+void drive_rotations(uint32_t count, const fs_quaternion *turned, const fs_vector3 *rates, const fs_real *dt_s,
+                     fs_vector3 *vector, fs_quaternion *rotation)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        vector[i] = fs_rotation_vector(&turned[i]);
+        rotation[i] = fs_rotation_over(&rates[i], dt_s[i]);
+    }
+}
+
 void drive_position(uint32_t count, fs_position_memory *memory, const fs_vehicle_state *state,
                     const fs_position_setpoint *setpoint, const fs_position_params *params, const fs_real *dt_s,
                     const fs_real *saturation, fs_attitude_target *target)
