@@ -107,5 +107,8 @@ ARDUPILOT = Autopilot(
     stores_items_exactly=False,
     is_silent_without_logs=False,
     sends_logs_armed=False,  # AP_Logger::handle_log_message
+    counters=frozenset(
+        {"MIS_TOTAL", "FENCE_TOTAL", "RALLY_TOTAL", "STAT_BOOTCNT", "STAT_FLTTIME", "STAT_RUNTIME"}
+    ),
     log_suffix=".bin",
 )

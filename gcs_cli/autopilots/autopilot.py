@@ -101,6 +101,8 @@ class Autopilot(NamedTuple):
     """True if LOG_REQUEST_LIST has no answer while the vehicle has no logs."""
     sends_logs_armed: bool
     """True if the vehicle answers requests for logs while it is armed."""
+    counters: frozenset[str] = frozenset()
+    """Parameters that the vehicle counts itself and does not let others set: a file of parameters is loaded without."""
     log_suffix: str = ".ulg"
     """End of the name of a downloaded log."""
 

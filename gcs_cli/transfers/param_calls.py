@@ -77,10 +77,11 @@ def change_all(
     Raise CliError if the vehicle does not answer, or if another one is selected meanwhile.
     """
     unknown = [f"{name}: the vehicle has no such parameter" for name in wanted if name not in present]
+    settable = wanted.keys() & present.keys() - connection.session.view.autopilot.counters
     different = {
         name: value
         for name, value in wanted.items()
-        if name in present and number_text(present[name].value) != number_text(value)
+        if name in settable and number_text(present[name].value) != number_text(value)
     }
     changed, refused = _change_in_any_order(connection, different, show)
     if not refused:

@@ -7,6 +7,8 @@ from typing import NamedTuple
 _RATE_WINDOW_S = 1.0
 _MOST_LATE = 32
 """Messages that may overtake another one: PX4 sends from several threads."""
+_SILENCE_S = 3.0
+"""Silence after which the sequence may have begun anew, or wrapped: the messages in it do not count as lost."""
 _LARGEST_GAP = 128
 """Of lost messages; larger gaps in the sequence are a sender that began anew."""
 
@@ -35,9 +37,11 @@ class LinkCounts(NamedTuple):
         return self.received / total if total else None
 
 
-def _missing(link: LinkCounts, sequence: int) -> tuple[int, int]:
+def _missing(link: LinkCounts, sequence: int, now_s: float) -> tuple[int, int]:
     """Return the number of messages lost until now, and the newest sequence number."""
-    if link.last_sequence is None:
+    if link.last_sequence is None or link.last_received_s is None:
+        return link.lost, sequence
+    if now_s - link.last_received_s > _SILENCE_S:
         return link.lost, sequence
     late = (link.last_sequence - sequence) % 256
     if late == 0:  # repeated
@@ -50,7 +54,7 @@ def _missing(link: LinkCounts, sequence: int) -> tuple[int, int]:
 
 def counted(link: LinkCounts, sequence: int, now_s: float) -> LinkCounts:
     """Return the counts after a message with this sequence number."""
-    lost, newest = _missing(link, sequence)
+    lost, newest = _missing(link, sequence, now_s)
     start, count, rate, last = link.window_start_s, link.window_count + 1, link.rate_hz, link.last_received_s
     if start is None or last is None or (rate is None and now_s == start):
         start, count = now_s, 0  # read at once with the first message: a backlog has no rate

@@ -6,13 +6,17 @@ import json
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.param_values import Parameter
 from flightstack.mavlink.signing import timestamp_of
+from gcs_cli.autopilots.ardupilot import ARDUPILOT
 from gcs_cli.clients.param_client import ParamTiming
+from gcs_cli.transfers.param_calls import Changes, change_all
 from gcs_cli.vehicle.param_info import UNKNOWN, load_parameters
 from tests.support.commands import Ended, gcs
 from tests.support.fake_vehicle import serve
@@ -212,6 +216,14 @@ def test_parameters_that_limit_each_other_reset_in_any_order(
     result = told(vehicle, "reset", *names)
     assert (result.stderr, result.returncode) == ("", 0)
     assert vehicle.values == {"MPC_THR_LEAST": 1.0, "MPC_THR_MOST": 2.0}
+
+
+def test_counters_of_arducopter_are_not_loaded() -> None:
+    """MIS_TOTAL is the number of stored mission items: a file that was saved before an upload was refused."""
+    session = SimpleNamespace(view=SimpleNamespace(autopilot=ARDUPILOT))
+    connection: Any = SimpleNamespace(session=session)
+    present = {"MIS_TOTAL": Parameter("MIS_TOTAL", 8.0, True, 0, 1)}
+    assert change_all(connection, {"MIS_TOTAL": 0.0}, present) == Changes((), ())
 
 
 def test_reset_of_all(vehicle: ParamVehicle) -> None:

@@ -241,6 +241,13 @@ def test_a_sequence_that_begins_anew_counts_no_loss(vehicle: Vehicle) -> None:
     assert vehicle.view.link.lost == 0
 
 
+def test_a_vehicle_that_restarts_after_a_silence_has_lost_nothing(vehicle: Vehicle) -> None:
+    for _ in range(200):
+        vehicle.send(heartbeat())
+    vehicle.link = Link(1, 1)
+    assert vehicle.send(heartbeat(), now_s=6.0).link.lost == 0
+
+
 def test_message_rate_is_measured_over_a_second() -> None:
     vehicle = Vehicle()
     for index in range(50):
