@@ -141,7 +141,7 @@ ORDERS = (
         "takeoff",
         "T",
         "Take off",
-        "Arm and climb to an altitude above home",
+        "Arm and climb to an altitude above the ground",
         in_flight.takeoff,
         (_ALTITUDE._replace(default="5", is_optional=_has_takeoff_altitude, omitted="the vehicle's own"),),
         applies=lambda view: not in_air(view),
