@@ -38,8 +38,19 @@ _AHEAD, _FEWEST = 2, 2
 _TICK_S = 0.1
 _LOOK_S = 1.0
 """Time between two looks at the cluster's size."""
+_CLOSE_S = 2.0
+"""Longest wait for the end of the connection: without its scheduler Dask tries to connect for a while."""
+_PACKAGE = "flightstack"
 _LOST = (OSError, CancelledError, distributed.client.ClosedClientError)
 """What Dask raises without its scheduler."""
+
+
+def _silence() -> None:
+    """Discard Dask's log: one sentence of this program says what happened."""
+    names = ("distributed", "tornado", "asyncio")
+    for name in [*names, *logging.root.manager.loggerDict]:  # Dask gives several loggers levels of their own
+        if name.partition(".")[0] in names:
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
 
 
 class ClusterPool:
@@ -48,8 +59,7 @@ class ClusterPool:
     def __init__(self, address: str) -> None:
         """Raise CliError (usage) for what is no address."""
         self._address = address
-        for name in ("distributed", "tornado", "asyncio"):  # one sentence of ours says what happened
-            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+        _silence()
         try:
             distributed.comm.get_address_host_port(address, strict=True)
         except ValueError:
@@ -58,6 +68,7 @@ class ClusterPool:
         self._session = secrets.token_hex(8)
         self._files = Files()
         self._client: Any = None
+        self._installation: Mapping[str, str] = {}
 
     def fly(self, cases: Cases, wanted: Wanted) -> Generator[Message, None, None]:
         """Fly the cases and yield their events; cancel all flights if the iterator is closed.
@@ -66,7 +77,8 @@ class ClusterPool:
         """
         if not cases:
             return
-        run = _Run(self._connected(), self._address, (self._session, str(Path.cwd()), installation()))
+        client = self._connected()
+        run = _Run(client, self._address, (self._session, str(Path.cwd()), self._installation))
         try:
             while run.over < len(cases):
                 numbers = range(run.submitted, min(run.submitted + run.room(), len(cases)))
@@ -80,6 +92,7 @@ class ClusterPool:
     def _connected(self) -> Any:
         """Return the client, connected at its first use: a campaign that is over needs no cluster."""
         if self._client is None:
+            self._installation = installation()
             warnings.filterwarnings("ignore", module="distributed")  # other versions of libraries
             try:
                 self._client = distributed.Client(self._address, timeout=ANSWER_S, set_as_default=False)
@@ -96,7 +109,7 @@ class ClusterPool:
     ) -> None:
         if self._client is not None:
             with contextlib.suppress(*_LOST):
-                self._client.close()
+                self._client.close(timeout=_CLOSE_S)
 
 
 class _Run:
@@ -108,6 +121,8 @@ class _Run:
         """Futures of Dask by the number of their cases."""
         self._done: SimpleQueue[int] = SimpleQueue()
         self._threads, self._next_look_s = 1, -math.inf
+        self._seen: set[str] = set()
+        """Addresses of workers that were checked."""
         self._has_noted = False
         self.submitted = self.over = 0
         """Numbers of cases."""
@@ -118,8 +133,20 @@ class _Run:
         if now_s >= self._next_look_s:
             self._next_look_s = now_s + _LOOK_S
             with self._losing_scheduler():
-                self._threads = sum(self._client.nthreads().values())
+                threads: Mapping[str, int] = self._client.nthreads()
+                if not threads.keys() <= self._seen:
+                    self._check_installed()
+            self._threads = sum(threads.values())
         return max(_AHEAD * self._threads, _FEWEST) - len(self._flying)
+
+    def _check_installed(self) -> None:
+        """Raise CliError (usage) for a process that cannot read its messages: it would end without saying why."""
+        versions = self._client.get_versions(packages=[_PACKAGE])
+        for name, each in {"the scheduler": versions["scheduler"], **versions["workers"]}.items():
+            if each["packages"].get(_PACKAGE) is None:
+                place = name if name == "the scheduler" else f"worker {name}"
+                raise CliError(f"{place} has no flightstack: install the same as on the client", USAGE)
+        self._seen |= versions["workers"].keys()
 
     def submit(self, orders: Sequence[Order]) -> None:
         """Submit the next cases at once: alone each takes the scheduler three times as long."""
@@ -167,8 +194,10 @@ class _Run:
         if isinstance(error, distributed.KilledWorker):
             count = error.allowed_failures + 1
             return f"it was lost with its worker {'once' if count == 1 else f'{count} times'}"
-        problem = f"a worker cannot fly: {type(error).__name__}: {error}"
-        raise CliError(f"{problem}: install flightstack on all workers, and on the scheduler", USAGE)
+        first = str(error).partition("\n")[0]
+        problem = f"{type(error).__name__}: {first}"
+        remedy = "install the same on the scheduler and on all workers as on the client"
+        raise CliError(f"the cluster cannot fly: {problem}: {remedy}", USAGE)
 
     @contextlib.contextmanager
     def _losing_scheduler(self) -> Iterator[None]:

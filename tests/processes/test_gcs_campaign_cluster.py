@@ -125,6 +125,16 @@ def test_a_worker_of_another_version_is_refused(folder: Path, cluster: Cluster) 
     assert Path("runs/campaign-c/flights.jsonl").read_bytes() == b""
 
 
+def test_a_worker_without_flightstack_is_refused(folder: Path, cluster: Cluster) -> None:
+    lacks = "import distributed.versions as v; v._version_cached = lambda name: None"
+    worker = cluster.add_worker(lacks)
+    worker.wait_for("Registered to")
+    run = campaign(cluster)
+    assert run.end() == 2
+    worker.kill()
+    assert run.lines[-1].endswith(" has no flightstack: install the same as on the client")
+
+
 def test_a_flight_that_is_lost_with_every_worker_is_named(folder: Path, tmp_path: Path) -> None:
     (folder / "c.toml").write_text(ENDLESS.replace("= 3", "= 1"))
     with Cluster(tmp_path, "def dask_setup(scheduler): scheduler.allowed_failures = 0") as cluster:
@@ -150,6 +160,7 @@ def test_a_campaign_without_its_scheduler_continues_on_this_machine(
         worker.end()
     over = len(Path("lost/flights.jsonl").read_text().splitlines())
     lost = f"gcs: the scheduler {cluster.address} was lost: {over} flights are over"
+    assert [line for line in run.lines[:-1] if "of 4 flights" not in line] == []
     assert run.lines[-1] == f"{lost}; the same command continues, also without --scheduler"
     with warm_children():
         rest = gcs("campaign", "c.toml", "-j", 1, "--out", "lost", "--csv", "--json")
