@@ -189,13 +189,13 @@ class QuietBlock:
         if not flies:
             self._loops.idle(now.state, now.rotor_speed, now.status.armed, self._idle)
         self._fly(*self._changing(count, log, imu_log))
-        ticks, flown, result = self._counters.tolist()
+        ticks, flown, result, sensed = self._counters.tolist()
         self._loops.fraction = float(self._fraction[0])
         row_at = log.n + ticks - 1
         if recorded is not None:
             log.n += ticks
         if imu_log is not self._no_imu_log:
-            imu_log.n += flown
+            imu_log.n += sensed
         self._count(ticks, flown, result, log.rows[row_at])
         return int(flown)
 

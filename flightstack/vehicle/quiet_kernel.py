@@ -15,8 +15,8 @@ from flightstack.core.kernel_calls import call_kernel, call_kernel_int
 
 ADVANCE, MEASURE, TAKE, ESTIMATE, CONTROL, FOLLOW, CALLS = range(7)
 """Kernels by their index in ``calls``."""
-TICKS, FLOWN, RESULT, COUNTERS = range(4)
-"""Counters: ticks of the vehicle, advances of the plant, and the last result of these."""
+TICKS, FLOWN, RESULT, SENSED, COUNTERS = range(5)
+"""Counters: ticks of the vehicle, advances of the plant, the last result of these, and samples of the sensors."""
 _REFERENCE, _COMMAND, _SPEED = (
     columns.start for columns in (LoopRow.REFERENCE_ATTITUDE, LoopRow.ROTOR_COMMAND, LoopRow.ROTOR_SPEED)
 )
@@ -92,7 +92,7 @@ def fly_quiet_ticks(
     rows, row_times, row_at = log
     records, record_times, record_at = imu_log
     resets_before, has_sensors = _sum_at(resets, reset_counts), len(sensing[1]) > 0
-    counters[TICKS] = 0
+    counters[TICKS], counters[SENSED] = 0, 0
     for i in range(count):
         result = call_kernel_int(calls[ADVANCE], (memory, commands, flags, steps, output))
         counters[FLOWN], counters[RESULT] = i + 1, result
@@ -103,6 +103,7 @@ def fly_quiet_ticks(
         if has_sensors:
             record_times[record_at + i] = time_us
             _sense(calls, sensing, time_us, interval_us, selected, records[record_at + i])
+            counters[SENSED] = i + 1
             if is_known[0] != 0:
                 _copy(known, control[0])
             if _sum_at(resets, reset_counts) != resets_before:

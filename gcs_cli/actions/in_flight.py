@@ -34,9 +34,10 @@ _NO_POSITION = "the vehicle does not send its position"
 
 
 def takeoff(altitude_m: float | None = None) -> Action:
-    """Take off to an altitude above home, and arm for it; None: the vehicle's own altitude.
+    """Take off to an altitude, and arm for it; None: the vehicle's own altitude.
 
-    Above mean sea level it is counted from the ground below the vehicle, to which home moves as the vehicle arms.
+    It counts from the ground on which the vehicle stands, wherever its home is, as MAVSDK's does. ArduPilot counts it
+    from home.
     """
 
     def plan(view: VehicleView) -> tuple[Step, ...]:
@@ -66,9 +67,14 @@ def takeoff(altitude_m: float | None = None) -> Action:
         f"taking off{to}",
         "took off" if altitude_m is None else f"at {altitude_m:g} m",
         {"altitude_m": altitude_m},
-        (lambda view: view.geo is not None) if altitude_m is not None else None,
+        _knows_ground if altitude_m is not None else None,
         f"{_NO_POSITION}, which --alt needs",
     )
+
+
+def _knows_ground(view: VehicleView) -> bool:
+    """Return True if the position is known, and of an armed vehicle whether it stands on the ground."""
+    return view.geo is not None and not (view.armed and view.on_ground is None)
 
 
 def _climbed(view: VehicleView, altitude_m: float | None) -> Condition:

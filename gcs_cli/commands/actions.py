@@ -29,6 +29,13 @@ AltitudeOption = Annotated[
     float | None,
     typer.Option("--alt", metavar="METRES", min=0.1, max=10_000.0, help="Altitude above home."),
 ]
+TakeoffAltitudeOption = Annotated[
+    float | None,
+    typer.Option(
+        "--alt", metavar="METRES", min=0.1, max=10_000.0,
+        help="Altitude above the ground where the vehicle stands; on ArduPilot above home.",
+    ),
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -92,7 +99,7 @@ _LANDED_STATE_S = 1.5
 @app.command()
 @expand_options
 def takeoff(
-    context: typer.Context, link: LinkOptions, options: ActionOptions, alt: AltitudeOption = None
+    context: typer.Context, link: LinkOptions, options: ActionOptions, alt: TakeoffAltitudeOption = None
 ) -> None:
     """Take off; arm first if disarmed.
 

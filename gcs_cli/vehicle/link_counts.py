@@ -7,6 +7,7 @@ from typing import NamedTuple
 _RATE_WINDOW_S = 1.0
 _MOST_LATE = 32
 """Messages that may overtake another one: PX4 sends from several threads."""
+_ALL_LATE = (1 << _MOST_LATE + 1) - 1
 _SILENCE_S = 3.0
 """Silence after which the sequence may have begun anew, or wrapped: the messages in it do not count as lost."""
 _LARGEST_GAP = 128
@@ -27,6 +28,10 @@ class LinkCounts(NamedTuple):
     """Time from the newest answered TIMESYNC to its answer; None without one."""
     recent_loss: float | None = None
     """Share of the messages that were lost in the last 10 s, 0 to 1; None if it is not measured."""
+    missing: int = 0
+    """Bit k: the message k before ``last_sequence`` counts as lost."""
+    stray: int | None = None
+    """The newest message, if it is before ``last_sequence`` and did not count as lost."""
 
     @property
     def quality(self) -> float | None:
@@ -37,28 +42,38 @@ class LinkCounts(NamedTuple):
         return self.received / total if total else None
 
 
-def _missing(link: LinkCounts, sequence: int, now_s: float) -> tuple[int, int]:
-    """Return the number of messages lost until now, and the newest sequence number."""
-    if link.last_sequence is None or link.last_received_s is None:
-        return link.lost, sequence
-    if now_s - link.last_received_s > _SILENCE_S:
-        return link.lost, sequence
-    late = (link.last_sequence - sequence) % 256
+def _following(link: LinkCounts, sequence: int, now_s: float) -> LinkCounts:
+    """Return the counts of losses after a message with this sequence number."""
+    last = link.last_sequence
+    if last is None or link.last_received_s is None or now_s - link.last_received_s > _SILENCE_S:
+        return link._replace(last_sequence=sequence, missing=0, stray=None)
+    late = (last - sequence) % 256
     if late == 0:  # repeated
-        return link.lost, sequence
-    if late <= _MOST_LATE:  # overtaken by later ones, which counted it as lost
-        return max(0, link.lost - 1), link.last_sequence
-    gap = (sequence - link.last_sequence - 1) % 256
-    return link.lost + (gap if gap <= _LARGEST_GAP else 0), sequence
+        return link
+    begins_anew = link.stray is not None and sequence == (link.stray + 1) % 256
+    if late <= _MOST_LATE and not begins_anew:
+        if link.missing >> late & 1:  # overtaken by later ones, which counted it as lost
+            return link._replace(lost=link.lost - 1, missing=link.missing ^ 1 << late)
+        return link._replace(stray=sequence)  # repeated, or the first one of a sender that began anew
+    gap = (sequence - last - 1) % 256
+    if begins_anew or gap > _LARGEST_GAP:
+        return link._replace(last_sequence=sequence, missing=0, stray=None)
+    missing = (link.missing << gap + 1 | (1 << gap + 1) - 2) & _ALL_LATE
+    return link._replace(lost=link.lost + gap, last_sequence=sequence, missing=missing, stray=None)
 
 
 def counted(link: LinkCounts, sequence: int, now_s: float) -> LinkCounts:
     """Return the counts after a message with this sequence number."""
-    lost, newest = _missing(link, sequence, now_s)
+    losses = _following(link, sequence, now_s)
     start, count, rate, last = link.window_start_s, link.window_count + 1, link.rate_hz, link.last_received_s
     if start is None or last is None or (rate is None and now_s == start):
         start, count = now_s, 0  # read at once with the first message: a backlog has no rate
     elif now_s != last and last - start >= _RATE_WINDOW_S:  # messages read at one time belong to one window
         start, count, rate = last, 1, link.window_count / (last - start)
-    received, trip_s, loss = link.received + 1, link.round_trip_s, link.recent_loss
-    return LinkCounts(received, lost, newest, now_s, rate, start, count, trip_s, loss)
+    return losses._replace(
+        received=link.received + 1,
+        last_received_s=now_s,
+        rate_hz=rate,
+        window_start_s=start,
+        window_count=count,
+    )

@@ -7,6 +7,7 @@ import pytest
 from flightstack.testing import World
 from flightstack.testing.engine import Engine
 from flightstack.testing.quiet_block import QuietBlock
+from sim_bridge.errors import PlantDivergedError
 from tests.support.inertial_sensors import x_quad_with_imus
 
 CONDITIONS = (
@@ -79,6 +80,20 @@ def test_a_reset_of_the_estimate_ends_a_compiled_call(monkeypatch: pytest.Monkey
         flights = [jump(quiet), jump(exchanged)]
     assert flights[0] == flights[1]
     assert any(shorter)
+
+
+@pytest.mark.parametrize("state", ["truth", "estimated"])
+def test_a_plant_that_diverges_is_logged_as_in_ticks_with_bytes(state: str) -> None:
+    logs = []
+    for make in (Engine, BytesEngine):
+        with World(state=state, make_engine=make) as world:
+            world.wait_until_ready()
+            world.arm()
+            world.engine.simulator.plant.memory[0]["body"][10:13] = 1e9
+            with pytest.raises(PlantDivergedError):
+                world.run_for(1.0)
+            logs.append(world.engine.newest_log())
+    assert logs[0] == logs[1]
 
 
 @pytest.mark.parametrize("state", ["truth", "estimated"])

@@ -2,7 +2,8 @@
 
 Rates count simulated time and are limited to the same rate on the link clock: at 50 times real time a client gets 50
 ATTITUDE messages per second of wall time, not 2500. At real time, and on an in-memory link, both clocks agree. A
-vehicle that was late and runs several ticks at once sends what was due in each of them.
+vehicle that was late and runs several ticks at once sends what was due in each of them, up to half a second's: that
+much also comes at once when a slow simulation becomes a fast one.
 """
 
 from __future__ import annotations

@@ -40,6 +40,8 @@ class VehicleList(ModalScreen[int | None]):
 
     def update(self, views: tuple[VehicleView, ...], now_s: float) -> None:
         """Show the vehicles of now; the selected one stays selected."""
+        if not self.is_mounted:  # it was opened just now
+            return
         listed = self.query_one(OptionList)
         options = _options(views, now_s)
         if [option.prompt for option in options] == [option.prompt for option in listed.options]:

@@ -94,6 +94,8 @@ class FieldPicker(ModalScreen[None]):
 
     def update(self) -> None:
         """Show the names and values of now; the selected name stays selected."""
+        if not self.is_mounted:  # it was opened just now
+            return
         rows = self.query_one(_Names)
         before = self._found[rows.cursor].name if self._found else ""
         self._load()
