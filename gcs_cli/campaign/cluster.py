@@ -96,7 +96,9 @@ class ClusterPool:
             warnings.filterwarnings("ignore", module="distributed")  # other versions of libraries
             try:
                 self._client = distributed.Client(self._address, timeout=ANSWER_S, set_as_default=False)
-            except (OSError, ImportError):
+            except ImportError as error:
+                raise CliError(f"--scheduler {self._address}: {error}", USAGE) from None
+            except OSError:
                 problem = "no Dask scheduler answers: start one with `dask scheduler`, or check the address"
                 raise CliError(f"--scheduler {self._address}: {problem}", NO_ANSWER) from None
         return self._client
@@ -188,7 +190,7 @@ class _Run:
 
     def _why_lost(self, future: Any) -> str:
         if future.cancelled():
-            raise SchedulerLostError(f"the scheduler {self._address} was lost")
+            raise SchedulerLostError(f"the scheduler {self._address} was lost", NO_ANSWER)
         with self._losing_scheduler():
             error = future.exception()
         if isinstance(error, distributed.KilledWorker):
@@ -204,7 +206,7 @@ class _Run:
         try:
             yield
         except _LOST:
-            raise SchedulerLostError(f"the scheduler {self._address} was lost") from None
+            raise SchedulerLostError(f"the scheduler {self._address} was lost", NO_ANSWER) from None
 
     def cancel(self) -> None:
         """Cancel all flights."""

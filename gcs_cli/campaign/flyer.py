@@ -14,11 +14,12 @@ from gcs_cli.campaign.journal import Journal
 from gcs_cli.campaign.options import CampaignOptions, continuing, only_command
 from gcs_cli.campaign.plan import PlannedFlight
 from gcs_cli.campaign.rows import row_of
-from gcs_cli.errors import CliError
+from gcs_cli.errors import NO_ANSWER, CliError
 from gcs_cli.scenarios.pool import Cases, Finished, Message, Notice, Started
 from gcs_cli.scenarios.result import Wanted
 from gcs_cli.scenarios.selection import Case
 
+_RATES = ("inner_hz", "outer_hz")
 _WANTED = Wanted(metrics=True)
 
 
@@ -76,7 +77,7 @@ class Flyer:
         except SchedulerLostError as error:
             over = f"{len(self._journal.rows)} flights are over"
             remedy = f"{continuing(self._options)} continues, also without --scheduler"
-            raise SchedulerLostError(f"{error}: {over}; {remedy}") from None
+            raise SchedulerLostError(f"{error}: {over}; {remedy}", NO_ANSWER) from None
         for number, reason in lost:
             raise LostWorkerError(f"flight {number}: {reason}; {continuing(self._options)} flies it again")
 
@@ -121,20 +122,22 @@ def case_of(campaign: Campaign, flight: PlannedFlight, options: CampaignOptions)
 
 
 def check_flights(campaign: Campaign, flights: Sequence[PlannedFlight]) -> None:
-    """Check types and ranges of all inputs, and all else of the flights with the extremes and the choices of each.
+    """Check all combinations of choices and rates, and the extremes of each other input.
 
-    Types and ranges depend on one input alone, and a number between two that are allowed is allowed: that of a grid may
-    be no whole number. Raise ConfigError: a wrong file ends before anything flies.
+    A number between two that are allowed is allowed, but for rates, of which one must divide the other; that of a grid
+    may be no whole number. Raise ConfigError: a wrong file ends before anything flies.
     """
-    checked = {flights[0].number: flights[0]}
+    vary = campaign.vary
+    together = [name for name, distribution in vary.items() if distribution.is_choice or name in _RATES]
+    combinations = {tuple(flight.inputs[name] for name in together): flight for flight in flights}
+    checked = {flight.number: flight for flight in combinations.values()}
     read: dict[int, PlannedFlight] = {}
-    for name, distribution in campaign.vary.items():
-        if distribution.is_choice or distribution.steps is not None:
+    for name in (name for name in vary if name not in together):
+        ends = (select(flights, key=lambda flight: flight.inputs[name]) for select in (min, max))
+        checked |= {flight.number: flight for flight in ends}
+        if vary[name].steps is not None:
             each = {flight.inputs[name]: flight for flight in flights}.values()
-            (checked if distribution.is_choice else read).update({flight.number: flight for flight in each})
-        if not distribution.is_choice:
-            ends = (select(flights, key=lambda flight: flight.inputs[name]) for select in (min, max))
-            checked |= {flight.number: flight for flight in ends}
+            read |= {flight.number: flight for flight in each}
     for number, flight in sorted((read | checked).items()):
         scenario = campaign.scenario(flight.inputs)
         if number in checked:

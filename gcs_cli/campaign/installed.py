@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import platform
 from collections.abc import Iterable, Mapping, Sequence
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -12,6 +14,7 @@ from flightstack.firmware.sources import source_hash
 
 FLYING = ("flightstack", "sim_bridge")
 """Packages that fly."""
+_LIBRARIES = ("numpy", "scipy", "numba", "llvmlite")
 _JUDGING = "gcs_cli"
 """The package that makes a row of a flight."""
 _SOURCES = frozenset((".py", ".toml", ".xml"))
@@ -35,13 +38,18 @@ def _folder(package: str) -> Path:
 
 
 def installation() -> dict[str, str]:
-    """Return what makes the rows of two machines equal: version and a digest of the source code."""
-    return {"version": __version__, "sources": sources_digest((*FLYING, _JUDGING))}
+    """Return what makes the rows of two machines equal: versions and a digest of the source code."""
+    libraries = {name: version(name) for name in _LIBRARIES}
+    sources = sources_digest((*FLYING, _JUDGING))
+    return {"flightstack": __version__, "Python": platform.python_version(), **libraries, "sources": sources}
 
 
 def digests(files: Iterable[Path]) -> dict[str, str]:
-    """Return a digest of each file by its name; raise OSError."""
-    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+    """Return a digest of the files of each name; raise OSError."""
+    contents: dict[str, list[bytes]] = {}
+    for path in files:
+        contents.setdefault(path.name, []).append(hashlib.sha256(path.read_bytes()).digest())
+    return {name: hashlib.sha256(b"".join(sorted(each))).hexdigest() for name, each in contents.items()}
 
 
 def difference(wanted: Mapping[str, str], found: Mapping[str, str]) -> str:
@@ -49,9 +57,12 @@ def difference(wanted: Mapping[str, str], found: Mapping[str, str]) -> str:
     for name, value in wanted.items():
         has = found.get(name)
         if has != value:
-            texts = {
-                "version": f"flightstack {has}, the client {value}",
-                "sources": "other source code of flightstack than the client",
-            }
-            return f"has {texts.get(name, f'another {name} than the client')}"
+            if name == "sources":
+                return "has other source code of flightstack than the client"
+            is_version = name in ("flightstack", "Python", *_LIBRARIES)
+            return (
+                f"has {name} {has}, the client {value}"
+                if is_version
+                else f"has another {name} than the client"
+            )
     return ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -72,8 +73,8 @@ class Files:
 
 
 def below(root: Path, path: str) -> Path:
-    """Return the place of an absolute path of the client."""
-    return root / path.lstrip("/")
+    """Return the place of an absolute path of the client, which is never outside ``root``."""
+    return root / os.path.normpath(f"/{path}").lstrip("/")
 
 
 def without_root(result: Result, root: Path) -> Result:

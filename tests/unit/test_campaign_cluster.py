@@ -57,7 +57,8 @@ def test_an_order_names_files_of_the_installation_only(tmp_path: Path) -> None:
     ("wanted", "found", "sentence"),
     [
         (installation(), installation(), ""),
-        ({"version": "2"}, {"version": "1"}, "has flightstack 1, the client 2"),
+        ({"flightstack": "2"}, {"flightstack": "1"}, "has flightstack 1, the client 2"),
+        ({"numpy": "2.4"}, {"numpy": "2.3"}, "has numpy 2.3, the client 2.4"),
         ({"sources": "a"}, {"sources": "b"}, "has other source code of flightstack than the client"),
         ({"hop.plan": "a"}, {"hop.plan": "b"}, "has another hop.plan than the client"),
     ],
@@ -66,6 +67,22 @@ def test_difference_of_two_installations_is_named(
     wanted: dict[str, str], found: dict[str, str], sentence: str
 ) -> None:
     assert difference(wanted, found) == sentence
+
+
+def test_files_of_one_name_are_compared_together(tmp_path: Path) -> None:
+    files = [tmp_path / folder / "__init__.py" for folder in "ab"]
+    for path in files:
+        path.parent.mkdir()
+        path.write_text(str(path))
+    before = digests(files)
+    files[0].write_text("changed")
+    assert difference(before, digests(files)) == "has another __init__.py than the client"
+
+
+def test_no_file_of_an_order_is_outside_its_root() -> None:
+    root = Path("/tmp/root")
+    assert below(root, "/a/../../../etc/p.plan") == root / "etc/p.plan"
+    assert below(root, "../p.plan") == root / "p.plan"
 
 
 def test_text_of_an_error_has_the_paths_of_the_client(tmp_path: Path) -> None:

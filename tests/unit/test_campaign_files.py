@@ -278,6 +278,21 @@ def test_whole_numbers_of_a_grid_are_checked_between_its_ends(folder: Path) -> N
         check_flights(found, plan_flights(found))
 
 
+@pytest.mark.parametrize(
+    ("plan", "vary"),
+    [
+        ("method = 'grid'", "inner_hz = {choice = [500, 1000]}\nouter_hz = {choice = [100, 200, 250]}"),
+        ("flights = 60", "inner_hz = {choice = [500, 1000]}\nouter_hz = {choice = [100, 200, 250]}"),
+        ("method = 'grid'", "outer_hz = {uniform = [100, 500], steps = 5}"),
+        ("flights = 60", "inner_hz = {uniform = [200, 1000]}"),
+    ],
+)
+def test_rates_are_checked_together(folder: Path, plan: str, vary: str) -> None:
+    found = campaign(folder, plan, f"[vary]\n{vary}", SCENARIO.replace("{weak}", "0.9"))
+    with pytest.raises(ConfigError, match=r"does not divide|whole number of microseconds"):
+        check_flights(found, plan_flights(found))
+
+
 def test_check_reads_few_of_many_flights(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     found = campaign(folder, "flights = 2000")
     read, made = [], Campaign.scenario
