@@ -45,7 +45,7 @@ $(READY): $(FLY_READY)
 fly: $(FLY_READY) ## Fly missions/square.plan: simulator, flight stack and ground station as three processes
 	@$(BIN)/gcs fly missions/square.plan
 
-test: $(READY) ## Run the tests that a developer runs all day: nine in ten of unit, protocol, flights, C against Python; one real flight
+test: $(READY) ## Run the tests that a developer runs all day: eleven in twelve of unit, protocol, flights, C against Python; one real flight
 	@$(PYTEST) -n $(CORES) $(QUICK)
 
 test-all: $(READY) ## Run every test
