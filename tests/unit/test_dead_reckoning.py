@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 from flightstack.core.contract import Vector3
+from flightstack.estimation import prediction
 from flightstack.estimation.error_state import (
     ACCEL_BIAS,
     ATTITUDE,
@@ -28,13 +29,16 @@ from flightstack.estimation.error_state import (
 )
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import OBSERVATION_COLUMNS, OBSERVATIONS, Filter
-from flightstack.estimation.prediction import DeltaSample, predict
+from flightstack.estimation.prediction import DeltaSample
+from tests.support.generated_c import in_python
 
 QUIET = EstimatorParams()._replace(
     gyro_noise=0.0, accel_noise=0.0, gyro_bias_walk=0.0, accel_bias_walk=0.0, gyro_scale_error=0.0
 )
 GRAVITY, STEP_S = QUIET.gravity_m_s2, 0.008
 NONE = Vector3(0.0, 0.0, 0.0)
+predict = in_python(prediction.predict)
+"""As plain Python, which parity tests hold equal: compiled for this test alone it would take 20 s."""
 
 
 def still(seconds: float, params: EstimatorParams, gyro_bias: float = 0.0, accel_bias: float = 0.0) -> Filter:
