@@ -31,9 +31,10 @@ def address(values: np.ndarray) -> ctypes.c_void_p:
 
 
 def uneven() -> Iterator[Mixer]:
-    """Yield mixers of four rotors of which one has one number half as large again, of either sign."""
+    """Yield mixers of four rotors that push down, or one of which has a number half as large again, of either sign."""
     even = mixer_for(load_vehicle("x_quad"))
     yield even
+    yield derived(even.allocation, even.effectiveness, -2.0 * even.high, even.high, even.spin)
     for rotor, factor in itertools.product(range(4), (1.5, -1.5)):
         for name, column in [
             *itertools.product(("allocation", "effectiveness"), range(4)),
