@@ -50,18 +50,14 @@ def uneven() -> Iterator[Mixer]:
 def nearly_even() -> Iterator[Mixer]:
     """Yield mixers of which one rotor's number differs from the first one's by as much as rounding may, and by more."""
     even = mixer_for(load_vehicle("x_quad"))
-    first = 2.0 - 2.0**-23  # sixteen roundings of it are no multiple of its last place
-    for places in (14, 15, 16, 17):
-        near = first - places * 2.0**-52
-        limits, allocation = np.full(4, first), even.allocation.copy()
-        yield derived(
-            even.allocation, even.effectiveness, np.array([first, near, first, first]), limits, even.spin
-        )
-        yield derived(
-            even.allocation, even.effectiveness, limits, np.array([first, first, near, first]), even.spin
-        )
-        allocation[:, 0] = first, first, first, near
-        yield derived(allocation, even.effectiveness, limits, limits, even.spin)
+    allocation, effectiveness, low, high, spin = even[:5]
+    yield derived(allocation, effectiveness, np.zeros(4), high, spin)
+    for first, places in itertools.product((2.0 - 2.0**-23, 1.0), (7, 8, 9, 14, 15, 16, 17)):
+        numbers = np.array([first, first + places * 2.0**-52, first, first])
+        yield derived(allocation, effectiveness, numbers, high, spin)
+        yield derived(allocation, effectiveness, low, numbers, spin)
+        shares = np.column_stack([numbers, allocation[:, 1:]])
+        yield derived(shares, effectiveness, low, high, spin)
 
 
 def derived_in_c(core: Core, rotors: Mixer) -> tuple[np.ndarray, np.ndarray]:
