@@ -269,6 +269,7 @@ def test_a_single_octet_does_not_hold_back_the_next_frame(target: Target) -> Non
     target.poll()
     target.heard()
     target.give(b"\xfd")
+    assert target.wait_ms == 20
     target.poll(1)  # hears that an octet came
     target.poll(20)
     short = mavlink.MAVLink_param_request_list_message(1, 0)  # its length passes for the flags of a frame
