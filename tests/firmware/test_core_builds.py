@@ -159,6 +159,7 @@ def test_setting_a_parameter_changes_no_other(real: str) -> None:
 def test_a_name_ends_at_nul_or_after_16_characters() -> None:
     find = Core("float").library.fs_param_find
     assert find(b"MPC_TILTMAX_AIR") == find(b"MPC_TILTMAX_AIR\0rubbish") >= 0
+    assert find(b"XPC_TILTMAX_AIR") == find(b"MPC_TILTMAX_AIR_") == -1
     assert find(b"MPC_TILTMAX_AIRS") == find(b"MPC_TILTMAX") == find(b"") == find(b"mpc_tiltmax_air") == -1
 
 
