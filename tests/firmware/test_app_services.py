@@ -135,6 +135,13 @@ def test_heartbeat_and_status_come_once_a_second_in_the_targets_time(target: Tar
     assert [message.get_seq() for message in heard] == list(range(22))
 
 
+def test_counts_start_at_zero(target: Target) -> None:
+    """In memory that was not zero before."""
+    told = target.status()
+    counts = {name: getattr(told, name) for name in told.fieldnames if not name.startswith(("stack", "frames"))}
+    assert {name for name, count in counts.items() if count} == set()
+
+
 def test_it_tells_when_there_is_something_due(target: Target) -> None:
     assert target.wait_ms == 0
     target.poll()

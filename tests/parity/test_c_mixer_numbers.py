@@ -85,7 +85,7 @@ def test_resolution_in_float_grows_with_the_largest_effect_of_a_rotor() -> None:
         reached = np.maximum(abs(rotors.low), abs(rotors.high)).sum() * abs(rotors.effectiveness).max(axis=1)
         expected = LEAST + 16.0 * 2.0**-24 * reached
         made = derived_in_c(core, rotors)[1].astype(np.float64)
-        assert (abs(made - expected) < 1e-6 * expected).all()  # measured 1.3e-7
+        assert (abs(made - expected) < 2e-7 * expected).all()  # measured 1.3e-7
 
 
 @pytest.mark.parametrize("real", REALS)
