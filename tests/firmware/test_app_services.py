@@ -138,7 +138,9 @@ def test_heartbeat_and_status_come_once_a_second_in_the_targets_time(target: Tar
 def test_counts_start_at_zero(target: Target) -> None:
     """In memory that was not zero before."""
     told = target.status()
-    counts = {name: getattr(told, name) for name in told.fieldnames if not name.startswith(("stack", "frames"))}
+    counts = {
+        name: getattr(told, name) for name in told.fieldnames if not name.startswith(("stack", "frames"))
+    }
     assert {name for name, count in counts.items() if count} == set()
 
 
