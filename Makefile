@@ -104,7 +104,7 @@ firmware-check: $(READY) ## Check the firmware alone: compilers, cppcheck, MISRA
 	@$(BIN)/python -m pytest tests/firmware tests/parity tests/mutation
 
 MUTANTS ?= 0
-mutation: $(READY) ## Plant faults into core, codec and application and count those that tests find: a night; MUTANTS=300: half an hour
+mutation: $(READY) ## Plant faults into core, codec and application and count those that tests find: an hour or two; goes on where it was ended; MUTANTS=300: a sample
 	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.mutation --mutants $(MUTANTS) --least 90
 
 clean: ## Remove the environment and all that was made

@@ -194,7 +194,7 @@ def clock(core: Core) -> dict[str, np.ndarray]:
     state[:, 6] = target[:, 0] = 1.0
     state[5, 0] = np.nan
     flags = np.array([RESET | OUTER_DUE, 0, SET_TARGET, OUTER_DUE, 0, OUTER_DUE], np.uint16)
-    costs, loops = np.zeros((6, 4), np.uint32), Loops(core, {})
+    costs, loops = np.zeros((6, 5), np.uint32), Loops(core, {})
     rows, status = np.zeros((6, 31), core.dtype), np.zeros(6, np.uint16)
     inputs = [core.array(part) for part in (state, setpoint, target)]
     core.call("drive_loops", loops.memory, 6, *inputs, flags, rows, status, costs, 2**32 - 95)

@@ -142,6 +142,17 @@ def test_a_rate_that_the_line_cannot_have_is_denied(target: Target, baud: float)
     assert target.baud == START_BAUD
 
 
+@pytest.mark.parametrize("baud", [9_600, 20_000_000])
+def test_slowest_and_fastest_rate_are_accepted(baud: int) -> None:
+    target = Target(bauds=(baud,))
+    target.poll()
+    target.heard()
+    assert set_baud(target, baud) == ACCEPTED
+    target.poll(1)
+    assert target.baud == baud
+    target.close()
+
+
 def test_a_change_waits_for_the_one_before(target: Target) -> None:
     target.is_sending = True
     assert set_baud(target, FAST) == ACCEPTED

@@ -108,6 +108,7 @@ def test_a_value_out_of_range_is_refused_and_the_old_one_told(
     (before,) = target.ask(read(name))
     error, told = target.ask(write(name, value))
     assert (error.get_type(), error.error, error.param_id) == ("PARAM_ERROR", OUT_OF_RANGE, name)
+    assert error.param_index == -1
     assert (told.get_type(), told.param_value) == ("PARAM_VALUE", before.param_value)
 
 

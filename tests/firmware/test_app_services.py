@@ -135,6 +135,15 @@ def test_heartbeat_and_status_come_once_a_second_in_the_targets_time(target: Tar
     assert [message.get_seq() for message in heard] == list(range(22))
 
 
+def test_counts_start_at_zero(target: Target) -> None:
+    """In memory that was not zero before."""
+    told = target.status()
+    counts = {
+        name: getattr(told, name) for name in told.fieldnames if not name.startswith(("stack", "frames"))
+    }
+    assert {name for name, count in counts.items() if count} == set()
+
+
 def test_it_tells_when_there_is_something_due(target: Target) -> None:
     assert target.wait_ms == 0
     target.poll()
@@ -269,8 +278,11 @@ def test_a_single_octet_does_not_hold_back_the_next_frame(target: Target) -> Non
     target.poll()
     target.heard()
     target.give(b"\xfd")
+    assert target.wait_ms == 20
     target.poll(1)  # hears that an octet came
     target.poll(20)
+    short = mavlink.MAVLink_param_request_list_message(1, 0)  # its length passes for the flags of a frame
+    assert kinds(target.ask(short))[0] == "PARAM_VALUE"
     assert target.status().skipped_octets == 1
 
 

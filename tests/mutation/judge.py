@@ -130,7 +130,7 @@ class Judge:
         """Of the child: the test that runs, and CPU time of each [s], NaN if it has not run."""
         fate, test = self._tested(NO_MUTANT)
         if fate != SURVIVED:
-            sys.exit(f"{test} fails in a fork without any mutant")
+            pytest.exit(f"{test} fails in a fork without any mutant")
 
     def _let_tests_use(self) -> None:
         core_support, codec_support, app_support = helpers = _helpers()
@@ -155,7 +155,7 @@ class Judge:
             is_broken = _fails(item)
             start_s = _cpu_s()
             if is_broken or _fails(item):
-                sys.exit(f"{item.nodeid} fails without any mutant")
+                pytest.exit(f"{item.nodeid} fails without any mutant")
             costs.append(_cpu_s() - start_s)
         _forget()
         return costs

@@ -19,6 +19,15 @@ def around(value: float) -> np.ndarray:
     return np.concatenate([nearest, value * np.linspace(1.0 - 1e-7, 1.0 + 1e-7, 2_001), value * below])
 
 
+def compare(turned: np.ndarray, rates: np.ndarray, dt_s: float) -> None:
+    count, core = len(rates), Core("double")
+    made, expected = ((np.full((count, 3), np.nan), np.full((count, 4), np.nan)) for _ in range(2))
+    core.call("drive_rotations", count, turned, rates, np.full(count, dt_s), *made)
+    python.rotations(turned, rates, np.full(count, dt_s), *expected)
+    for c, own in zip(made, expected, strict=True):
+        assert same_bits(c, own)
+
+
 def test_rotations_at_the_borders_of_their_formulas_have_pythons_bits() -> None:
     sine, rate = around(np.sqrt(LARGEST_SQUARE)), around(2.0 * np.sqrt(SMALL_SQUARE))
     turned, rates = np.zeros((sine.size, 4)), np.zeros((sine.size, 3))
@@ -30,9 +39,12 @@ def test_rotations_at_the_borders_of_their_formulas_have_pythons_bits() -> None:
     rates[-1] = 0.0
     square = ((rates[:, 0] ** 2 + rates[:, 1] ** 2) + rates[:, 2] ** 2) * 0.25
     assert (square == SMALL_SQUARE).any()
-    core, dt_s = Core("double"), np.ones(sine.size)
-    made, expected = ((np.full((sine.size, 3), np.nan), np.full((sine.size, 4), np.nan)) for _ in range(2))
-    core.call("drive_rotations", sine.size, turned, rates, dt_s, *made)
-    python.rotations(turned, rates, dt_s, *expected)
-    for c, own in zip(made, expected, strict=True):
-        assert same_bits(c, own)
+    compare(turned, rates, 1.0)
+
+
+def test_angles_at_the_borders_of_quadrants_have_pythons_bits() -> None:
+    """Odd multiples of an eighth of a turn: the nearest quarter changes there."""
+    angles = np.outer(np.pi / 4.0 * np.arange(1, 400, 2), 1.0 + np.linspace(-6e-8, 6e-8, 41)).ravel()
+    rates = np.zeros((angles.size, 3))
+    rates[:, 2] = angles
+    compare(np.zeros((angles.size, 4)), rates, 2.0)

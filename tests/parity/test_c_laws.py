@@ -94,6 +94,7 @@ def reference_in_python(rate: float, most: float) -> Case:
     attitude = s.attitudes()
     start = s.near(attitude, 0.1)
     end = s.near(start, 0.05)
+    start[0] = end[0] = 0.0  # no attitude: the identity is in its place
     memory = np.hstack([s.near(start, 0.05), s.normal(3, rate)])
     params = s.uniform((0.0, 120.0), (0.5, 1.5), (1.0, most), (20.0, 300.0))
     params[s.random.random(COUNT) < 0.05, 0] = 0.0  # no filter

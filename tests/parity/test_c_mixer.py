@@ -16,7 +16,7 @@ from flightstack.params.vehicle import Vehicle, load_vehicle
 from tests.firmware import core_reference as python
 from tests.firmware.core_mixer import mixer_of_c
 from tests.firmware.core_samples import Samples
-from tests.firmware.core_support import Compared, Core
+from tests.firmware.core_support import Compared, Core, same_bits
 from tests.support.rotor_sets import multirotor, ring
 from tests.support.tools import NIGHTLY
 
@@ -228,6 +228,18 @@ def test_a_slow_rotor_turns_the_way_it_is_asked_to(real: str) -> None:
     c.call("drive_mixer", 7, c.array(wrenches), mixer_of_c(c, rotors), rotors.spin.size, speeds, *rest)
     expected = np.sign(square) * np.sqrt(np.abs(square))
     assert speeds[:, :4] == pytest.approx(np.tile(expected[:, None], 4), rel=1e-6, abs=1e-6)
+
+
+def test_a_rotor_that_is_asked_for_nothing_has_pythons_zero() -> None:
+    """Whose sign tells which side of nothing it was taken for."""
+    rotors, c = mixer_for(VEHICLES["ideal"]()), core("double")
+    wrenches = np.zeros((1, 4))
+    speeds, expected = c.unwritten(1, 8), np.full((1, 4), np.nan)
+    rest = c.unwritten(1, 4), c.unwritten(1, 4), c.unwritten(1)
+    c.call("drive_mixer", 1, wrenches, mixer_of_c(c, rotors), rotors.spin.size, speeds, *rest)
+    python.mixer(wrenches, rotors, expected, np.zeros((1, 4)), np.zeros(1))
+    assert same_bits(speeds[:, :4], expected)
+    assert not expected.any()
 
 
 def undoes(real: str, rotors: Mixer) -> bool:

@@ -146,7 +146,7 @@ static uint32_t ticking_clock(void)
     return ticks;
 }
 
-/* costs: four for each step, counted by a clock that moves ten at every look, from where clock_at stands; NULL for no clock. */
+/* costs: five for each step, counted by a clock that moves ten at every look, from where clock_at stands; NULL for no clock. */
 void drive_loops(fs_loops *loops, uint32_t count, const fs_vehicle_state *state, const fs_position_setpoint *setpoint,
                  const fs_attitude_target *target, const uint16_t *flags, fs_real *rows, uint16_t *status,
                  uint32_t *costs, uint32_t clock_at)
@@ -166,10 +166,11 @@ void drive_loops(fs_loops *loops, uint32_t count, const fs_vehicle_state *state,
         put_output(&rows[i * ROW], &output);
         status[i] = output.status;
         if (costs != NULL) {
-            costs[4 * i] = cost.outer;
-            costs[4 * i + 1] = cost.inner;
-            costs[4 * i + 2] = cost.mixer;
-            costs[4 * i + 3] = cost.whole;
+            costs[5 * i] = cost.outer;
+            costs[5 * i + 1] = cost.inner;
+            costs[5 * i + 2] = cost.mixer;
+            costs[5 * i + 3] = cost.whole;
+            costs[5 * i + 4] = cost.readings;
         } else {
             status[i] = (uint16_t)(status[i] | (cost.outer | cost.inner | cost.mixer | cost.whole)); /* must be zero */
         }
