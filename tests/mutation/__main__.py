@@ -17,7 +17,7 @@ from pathlib import Path
 
 from tests.mutation.judge import EQUAL, FIRMWARE, INVALID, SURVIVED, TESTS, UNTRIED, Judge, with_tests
 from tests.mutation.mutants import Mutant, mutants
-from tests.mutation.results import Result, Results
+from tests.mutation.results import Result, Results, path_for_present_tests
 
 ELSEWHERE = {"mavlink/fs_constants.h": "app"}
 """The application alone uses these values."""
@@ -95,10 +95,15 @@ def main() -> int:
     parser.add_argument(
         "--again", default=UNTRIED, help="try mutants of this fate again: survived, for instance"
     )
-    parser.add_argument("--results", type=Path, default=Path("build/mutation.jsonl"))
+    parser.add_argument(
+        "--results", type=Path, help="file of results; default: one for the present sources and tests"
+    )
     parser.add_argument("--least", type=float, default=0.0, help="percent that must be found")
     given = parser.parse_args()
-    results, end_s = Results(given.results), time.monotonic() + 60.0 * given.minutes
+    results, end_s = (
+        Results(given.results or path_for_present_tests()),
+        time.monotonic() + 60.0 * given.minutes,
+    )
     sample = chosen(given.only, given.mutants, given.seed)
     for (is_table, part), mutants_of_part in sample.items():
         known = ((mutant, results.of(mutant)) for mutant in mutants_of_part)

@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from pathlib import Path
 from typing import NamedTuple
 
 from tests.mutation.judge import Verdict
 from tests.mutation.mutants import Mutant
+
+ROOT = Path(__file__).resolve().parents[2]
+_DEPENDS_ON = ("firmware", "tests/firmware", "tests/parity", "tests/support", "tests/mutation")
+
+
+def path_for_present_tests() -> Path:
+    """Return the file for firmware and tests as they are: after an edit, what was found and what survived is open."""
+    content = hashlib.sha256()
+    for folder in _DEPENDS_ON:
+        for path in sorted((ROOT / folder).rglob("*.[chp]*")):
+            if path.suffix in {".c", ".h", ".py"}:
+                content.update(str(path.relative_to(ROOT)).encode() + path.read_bytes())
+    return ROOT / "build" / f"mutation-{content.hexdigest()[:12]}.jsonl"
 
 
 class Result(NamedTuple):
