@@ -28,7 +28,6 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "campaign": (
         "gcs campaign gusts.toml --workers 4 --out results --csv",
-        "gcs campaign gusts.toml --scheduler tcp://10.0.0.1:8786",
         "gcs campaign gusts.toml --only 17",
         "gcs campaign gusts.toml --seek worst",
     ),
