@@ -9,6 +9,7 @@ bound.
 from __future__ import annotations
 
 import functools
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -218,3 +219,11 @@ def test_attitude_laws_in_double_have_pythons_bits(law) -> None:  # type: ignore
 def test_attitude_laws_in_float_are_near(law) -> None:  # type: ignore[no-untyped-def]
     for name, compared in law("float").items():
         assert compared.full_scale_ulps().max() < 4, name  # measured 1.3
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _forget() -> Iterator[None]:
+    """Samples of all laws and numbers take hundreds of megabytes."""
+    yield
+    for samples in (position_in_python, reference_in_python, pid_in_python, backstepping_in_python):
+        samples.cache_clear()

@@ -6,6 +6,7 @@ import ctypes
 import dataclasses
 import functools
 import itertools
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -296,3 +297,11 @@ def test_the_mixers_samples_reach_every_limit_both_ways() -> None:
     for axis in range(4):
         assert np.isin([-1.0, 1.0], mixed("double", "cross").saturation[:, axis]).all(), axis
     assert (mixed("double", "ideal").quantities["speeds"].python < 0.0).any()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _forget() -> Iterator[None]:
+    """Samples of all laws and numbers take hundreds of megabytes."""
+    yield
+    for samples in (mixed_in_python, at_edges_in_python):
+        samples.cache_clear()
