@@ -17,6 +17,8 @@ FLYING = ("flightstack", "sim_bridge")
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite")
 _JUDGING = "gcs_cli"
 """The package that makes a row of a flight."""
+_ONLY_IN_WHEEL = "missions"
+"""Folder of ``gcs_cli`` in a wheel, elsewhere in a clone: an example that a campaign flies is compared by itself."""
 _SOURCES = frozenset((".py", ".toml", ".xml"))
 
 
@@ -24,9 +26,11 @@ def sources_digest(packages: Sequence[str]) -> str:
     """Return a digest of the source code: an edit of a law of this project changes flights too."""
     result = hashlib.sha256(source_hash())  # of the loops in C
     for package in map(_folder, packages):
-        for path in sorted(path for path in package.rglob("*") if path.suffix in _SOURCES):
-            result.update(str(path.relative_to(package)).encode())
-            result.update(path.read_bytes())
+        names = sorted(path.relative_to(package) for path in package.rglob("*") if path.suffix in _SOURCES)
+        for name in names:
+            if name.parts[0] != _ONLY_IN_WHEEL:
+                result.update(str(name).encode())
+                result.update((package / name).read_bytes())
     return result.hexdigest()
 
 

@@ -140,12 +140,19 @@ def _sentences(
 
 
 def _alone(name: str, found: Search, index: int, journal: Journal) -> str:
+    found_edges = [
+        tuple(journal.rows[each.number]["inputs"][name] for each in (ray.passes, ray.fails))
+        for ray in found.alone(index)
+    ]
+    above = [edge for edge in found_edges if edge[1] > edge[0]]
+    below = [edge for edge in found_edges if edge[1] <= edge[0]]
     edges = []
-    for ray in found.alone(index):
-        passes, fails = (journal.rows[each.number]["inputs"][name] for each in (ray.passes, ray.fails))
-        edge = f"fails {'from' if fails > passes else 'down from'} {fails:.4g}, passes at {passes:.4g}"
-        if edge not in edges:
-            edges.append(edge)
+    if above:  # of several searches the narrowest interval
+        passes, fails = max(edge[0] for edge in above), min(edge[1] for edge in above)
+        edges.append(f"fails from {fails:.4g}, passes at {passes:.4g}")
+    if below:
+        passes, fails = min(edge[0] for edge in below), max(edge[1] for edge in below)
+        edges.append(f"fails down from {fails:.4g}, passes at {passes:.4g}")
     return "; ".join(edges) or "passes at both ends of its range"
 
 
