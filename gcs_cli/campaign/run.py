@@ -39,7 +39,7 @@ from gcs_cli.scenarios.result import Wanted
 
 def run_campaign(pool: FlightPool, options: CampaignOptions, console: Console) -> int:
     """Fly what is not flown yet, write the table and the report; return the exit code. Raise ConfigError, CliError."""
-    library("pyarrow")  # missing: say so before the flights
+    library("pyarrow", "gcs campaign")  # missing: say so before the flights
     campaign = load_campaign(options.file)
     if options.seek is not None and options.only is not None:
         flight = flown_before(options.folder, options.only)
