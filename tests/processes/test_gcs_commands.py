@@ -51,13 +51,13 @@ def test_an_order_is_carried_out_and_told_in_one_line(
     assert [(sent, values[: len(params)]) for sent, values in vehicle.commands] == [(number, params)]
 
 
-def test_takeoff_counts_from_sea_level_and_arms() -> None:
-    vehicle = FakeVehicle()
+def test_takeoff_counts_from_the_ground_below_and_arms() -> None:
+    vehicle = FakeVehicle()  # stands 3 m above its home, which is at 488 m
     result = told(vehicle, "takeoff", "--alt", "10")
     first, second = result.stdout.splitlines()
     assert (first, second[:12], result.returncode) == ("taking off to 10 m", "at 10 m afte", 0)
     (takeoff, values), (arm, _) = vehicle.commands
-    assert (takeoff, values[6], arm) == (22, 498.0, ARM)
+    assert (takeoff, values[6], arm) == (22, 501.0, ARM)
 
 
 def test_a_refusal_tells_the_vehicles_reason() -> None:
