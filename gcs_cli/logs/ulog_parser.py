@@ -11,18 +11,22 @@ import contextlib
 import io
 import os
 import struct
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from pyulog import ULog, ULogException
 
 from flightstack.core.errors import ConfigError
-from flightstack.flight_log.ulog import DATA_TYPE, HEADER_SIZE, MESSAGE_HEADER, MESSAGE_TYPES
+from flightstack.flight_log.ulog import DATA_TYPE, HEADER_SIZE, MESSAGE_HEADER
+from flightstack.flight_log.ulog_scan import message_positions
+
+IndexArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
 DAMAGE = (ULogException, struct.error, ValueError, KeyError, IndexError, OverflowError, TypeError)
 """Exceptions for a damaged log, raised by pyulog or by code that reads its result."""
 _ROW_AT = 5
 """Offset of the row in a message of data: behind size, type and subscription id."""
+_KIND_AT, _TIME_SIZE = 2, 8
 _SUBSCRIPTION_TYPE, _FLAG_TYPE = ord("A"), ord("B")
 _INCOMPATIBLE_AT = 8
 """Offset in the flag bits of the incompatible flags, and of the offsets of appended data."""
@@ -62,76 +66,85 @@ def parse_ulog(content: bytes, source: object, topics: list[str] | None = None) 
 
     Raise ConfigError, which names ``source``.
     """
-    rows = _Rows(topics)
-    is_whole = rows.gather(content)
+    rows = _Rows(content, topics)
     try:
         # pyulog reports damage on stdout, which belongs to the command's own output
         with contextlib.redirect_stdout(io.StringIO()):
-            log = ULog(LogBytes(rows.short_log(content)), topics) if is_whole and rows.are_regular else None
+            log = ULog(LogBytes(rows.short_log()), topics) if rows.are_regular else None
             if log is None or not rows.fill(log):
                 log = ULog(LogBytes(content), topics)
     except DAMAGE as error:
         raise ConfigError(source, "", f"is not a readable flight log: {error}") from error
-    return ParsedLog(log, bool(log.file_corruption) or not is_whole)
+    return ParsedLog(log, bool(log.file_corruption) or not rows.fill_file)
 
 
 class _Rows:
     """The rows of each subscription to the given topics, and the messages that define all the rest."""
 
-    def __init__(self, topics: list[str] | None) -> None:
+    def __init__(self, content: bytes, topics: list[str] | None) -> None:
+        self._content = content
         self._topics = None if topics is None else {topic.encode() for topic in topics}
-        self._others: set[int] = set()  # subscriptions to other topics
-        self.are_regular = True
-        """True if no subscription id is used twice, and no data is appended."""
-        self._rows: dict[int, list[bytes]] = {}
-        self._kept: set[tuple[int, int]] = set()  # begin and end of messages that pyulog reads
-
-    def gather(self, content: bytes) -> bool:
-        """Return True if messages of known types fill the file to its last byte.
+        positions = message_positions(content)
+        self._begins, self._ends = positions[:-1], positions[1:]
+        self.fill_file = bool(positions[-1] == len(content))
+        """True if messages of known types fill the file to its last byte.
 
         The format has no end mark and no checksums: damage inside a message is not detected.
         """
-        at, end, rows, latest, latest_time = HEADER_SIZE, len(content), self._rows, (0, 0), b""
-        while at + MESSAGE_HEADER.size <= end:
-            after = at + MESSAGE_HEADER.size + (content[at] | content[at + 1] << 8)
-            kind = content[at + 2]
-            if after > end or (kind == DATA_TYPE and after < at + _ROW_AT):
-                return False
-            if kind == DATA_TYPE:
-                number = content[at + 3] | content[at + 4] << 8
-                if number in self._others:
-                    at = after
-                    continue
-                row = content[at + _ROW_AT : after]
-                time = row[7::-1]  # big-endian, so that bytes compare as numbers do
-                if time > latest_time:
-                    latest, latest_time = (at, after), time
-                if number in rows:
-                    rows[number].append(row)
-                else:
-                    rows[number] = [row]
-                    self._kept.add((at, after))
-            elif kind in MESSAGE_TYPES:
-                self._kept |= {latest, (at, after)}  # a change of a parameter has the largest time before it
-                self._check(kind, content[at + MESSAGE_HEADER.size : after])
-            else:
-                return False
-            at = after
-        self._kept.add(latest)
-        return at == end
+        self.are_regular = self.fill_file
+        """True if also no subscription id is used twice, each row has a time, and no data is appended."""
+        if self.are_regular:
+            self._gather()
 
-    def _check(self, kind: int, message: bytes) -> None:
-        if kind == _SUBSCRIPTION_TYPE:
-            number = int.from_bytes(message[1:3], "little")
-            self.are_regular &= number not in self._rows and number not in self._others
-            if self._topics is not None and message[3:] not in self._topics:
-                self._others.add(number)
-        elif kind == _FLAG_TYPE:
-            self.are_regular &= not any(message[_INCOMPATIBLE_AT:])
+    def _gather(self) -> None:
+        """Find the wanted rows, and the messages that are not data. Messages are counted from 0."""
+        is_row = self._unaligned("u1", self._begins + _KIND_AT) == DATA_TYPE
+        self._rows, self._others = np.flatnonzero(is_row), np.flatnonzero(~is_row)
+        numbers = self._unaligned("<u2", self._begins[self._rows] + MESSAGE_HEADER.size)
+        self._of = _grouped(self._rows, numbers)
+        unwanted = self._unwanted()
+        if unwanted:
+            self._rows = self._rows[~np.isin(numbers, list(unwanted))]
+            self._of = {number: rows for number, rows in self._of.items() if number not in unwanted}
+        sizes = self._ends[self._rows] - self._begins[self._rows]
+        self.are_regular &= bool(np.all(sizes >= _ROW_AT + _TIME_SIZE))
 
-    def short_log(self, content: bytes) -> bytes:
-        """Return the log with the first row of each subscription, and the latest ones before other messages."""
-        return content[:HEADER_SIZE] + b"".join(content[at:after] for at, after in sorted(self._kept))
+    def _unwanted(self) -> set[int]:
+        """Return the ids of subscriptions to other topics, and check all messages that are not data."""
+        unwanted: set[int] = set()
+        for index in self._others.tolist():
+            at, after = self._begins[index], self._ends[index]
+            kind, message = self._content[at + _KIND_AT], self._content[at + MESSAGE_HEADER.size : after]
+            if kind == _SUBSCRIPTION_TYPE:
+                number = int.from_bytes(message[1:3], "little")
+                has_rows = number in self._of and self._of[number][0] < index
+                self.are_regular &= number not in unwanted and not has_rows
+                if self._topics is not None and message[3:] not in self._topics:
+                    unwanted.add(number)
+            elif kind == _FLAG_TYPE:
+                self.are_regular &= not any(message[_INCOMPATIBLE_AT:])
+        return unwanted
+
+    def _unaligned(self, kind: Any, at: IndexArray) -> np.ndarray[Any, Any]:
+        """Return the values of a type of fixed size at the given positions, which it need not be aligned to."""
+        size = np.dtype(kind).itemsize
+        return np.ndarray((len(self._content) - size + 1,), kind, self._content, strides=(1,))[at]
+
+    def short_log(self) -> bytes:
+        """Return the log with the first row of each subscription, and the latest ones before other messages.
+
+        A change of a parameter has the largest time before it, and so has the end of the log.
+        """
+        kept = {*self._others.tolist(), *(int(rows[0]) for rows in self._of.values())}
+        if len(self._rows):
+            times = self._unaligned("<u8", self._begins[self._rows] + _ROW_AT)
+            largest = np.maximum.accumulate(times)
+            before = np.searchsorted(self._rows, [*self._others, len(self._begins)])
+            latest = np.searchsorted(largest, largest[before[before > 0] - 1])
+            kept.update(self._rows[latest].tolist())
+        begins, ends = self._begins, self._ends
+        messages = (self._content[begins[index] : ends[index]] for index in sorted(kept))
+        return self._content[:HEADER_SIZE] + b"".join(messages)
 
     def fill(self, log: Any) -> bool:
         """Replace the arrays of ``log`` by those of all rows; return False if pyulog alone must read the log.
@@ -142,9 +155,18 @@ class _Rows:
             return False
         for item in log.data_list:
             row = np.dtype([(name, values.dtype) for name, values in item.data.items()])
-            rows = self._rows[item.msg_id]
-            if set(map(len, rows)) != {row.itemsize} or item.timestamp_idx != 0:
+            rows = self._of[item.msg_id]
+            begins = self._begins[rows] + _ROW_AT
+            if np.any(self._ends[rows] - begins != row.itemsize) or item.timestamp_idx != 0:
                 return False
-            table = np.frombuffer(b"".join(rows), row)
+            table = self._unaligned(f"V{row.itemsize}", begins).view(row)
             item.data = {name: table[name] for name in row.names or ()}
         return True
+
+
+def _grouped(rows: IndexArray, numbers: np.ndarray[Any, Any]) -> dict[int, IndexArray]:
+    """Return the rows of each number, in their order."""
+    counts = np.bincount(numbers)
+    found = np.flatnonzero(counts)
+    groups = np.split(rows[np.argsort(numbers, kind="stable")], np.cumsum(counts[found])[:-1])
+    return dict(zip(found.tolist(), groups, strict=False))  # without rows there is one empty group

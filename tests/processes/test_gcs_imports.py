@@ -21,7 +21,7 @@ from gcs_cli.commands.registry import (
     RallyGroup,
 )
 from gcs_cli.program import run
-from tests.support.sample_logs import small_tlog
+from tests.support.sample_logs import small_tlog, small_ulog
 
 HEAVY = ("numpy", "numba", "scipy", "matplotlib", "pyulog", "pymavlink", "rich", "jinja2", "plotly")
 LIGHT = (
@@ -182,3 +182,11 @@ def test_link_command_runs_without_numpy(words: list[str], tmp_path: Path) -> No
     recording.write_bytes(small_tlog())
     code = "import sys; from gcs_cli.__main__ import main; assert main(sys.argv[1:]) == 0"
     assert loaded_by(code, "--connect", str(recording), *words) == set()
+
+
+@pytest.mark.parametrize("words", [["log", "info"], ["report"]], ids=" ".join)
+def test_short_log_is_read_without_a_compiler(words: list[str], tmp_path: Path) -> None:
+    log = tmp_path / "small.ulg"
+    log.write_bytes(small_ulog())
+    code = "import sys; from gcs_cli.__main__ import main; assert main(sys.argv[1:]) == 0"
+    assert "numba" not in loaded_by(code, *words, str(log))

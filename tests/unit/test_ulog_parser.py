@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import random
 import struct
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from pyulog import ULog
 
 from flightstack.core.errors import ConfigError
-from flightstack.flight_log.ulog import HEADER_SIZE
+from flightstack.flight_log import ulog_scan
+from flightstack.flight_log.ulog import HEADER_SIZE, MESSAGE_HEADER
 from gcs_cli.logs.ulog_parser import LogBytes, parse_ulog
+from tests.support.sample_logs import small_ulog
 from tests.support.truth import World
 
 
@@ -107,3 +112,30 @@ def test_file_on_disk_equals_its_bytes(log: bytes, tmp_path: Path) -> None:
     path = tmp_path / "flight.ulg"
     path.write_bytes(log)
     assert parse_ulog(log, "log").log.data_list == ULog(str(path)).data_list
+
+
+def test_short_rows_of_other_topics_are_parsed_as_pyulog_does(log: bytes) -> None:
+    data = log + struct.pack("<HBH", 5, ord("D"), 0) + b"abc"
+    for topic in ("vehicle_attitude", "vehicle_status"):
+        ours, theirs = parse_ulog(data, "log", [topic]).log, ULog(LogBytes(data), [topic])
+        assert ours.data_list == theirs.data_list
+        assert ours.last_timestamp == theirs.last_timestamp
+
+
+def damaged(log: bytes, seed: int) -> bytes:
+    """Return a log that is cut off, lacks bytes, or has others."""
+    source = random.Random(seed)
+    at, count = source.randrange(len(log)), source.randrange(1, 60)
+    return (log[:at], log[:at] + log[at + count :], log[:at] + source.randbytes(count) + log[at:])[seed % 3]
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_messages_are_found_with_numba_as_without(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    content = damaged(small_ulog(), seed)
+    compiled = ulog_scan.message_positions(content)
+    monkeypatch.setattr(ulog_scan, "sys", SimpleNamespace(modules={}))
+    plain = ulog_scan.message_positions(content)
+    assert plain.tolist() == compiled.tolist()
+    assert plain[0] == HEADER_SIZE
+    sizes = [MESSAGE_HEADER.size + MESSAGE_HEADER.unpack_from(content, at)[0] for at in plain[:-1]]
+    assert np.diff(plain).tolist() == sizes

@@ -1,0 +1,53 @@
+"""Positions of the messages in a ULog file. Pure."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from flightstack.core.compiled import compiled
+from flightstack.flight_log.ulog import DATA_HEADER, DATA_TYPE, HEADER_SIZE, MESSAGE_HEADER, MESSAGE_TYPES
+
+Positions: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
+
+_MESSAGE_HEADER, _DATA_HEADER = MESSAGE_HEADER.size, DATA_HEADER.size
+_IS_KNOWN = bytes(kind in MESSAGE_TYPES for kind in range(256))
+_KNOWN = np.frombuffer(_IS_KNOWN, np.uint8)
+_COMPILED_BYTES = 50_000_000
+"""Size from which a file is worth the import of Numba, which takes as long as 2 million messages without it [B]."""
+
+
+@compiled
+def _scan_kernel(content: Any, is_known: Any, positions: Any) -> int:
+    """Write the position of each message and that behind the last one to ``positions``; return their number.
+
+    ``content`` and ``is_known``, by the type of a message, are bytes or arrays of uint8.
+    """
+    at, end, count = HEADER_SIZE, len(content), 0
+    while at + _MESSAGE_HEADER <= end:
+        after = at + _MESSAGE_HEADER + (content[at] | content[at + 1] << 8)
+        kind = content[at + 2]
+        if after > end or not is_known[kind] or (kind == DATA_TYPE and after < at + _DATA_HEADER):
+            break
+        positions[count] = at
+        count += 1
+        at = after
+    positions[count] = at
+    return count + 1
+
+
+def message_positions(content: bytes) -> Positions:
+    """Return the position of each message, shape (n + 1,): the last one is that behind the last message.
+
+    That is the size of the file if messages of known types fill it to its last byte. The format has no end mark and no
+    checksums: damage inside a message is not detected.
+    """
+    positions = np.empty(len(content) // _MESSAGE_HEADER + 1, np.int64)
+    if "numba" in sys.modules or len(content) >= _COMPILED_BYTES:
+        count = _scan_kernel(np.frombuffer(content, np.uint8), _KNOWN, positions)
+    else:
+        scan = getattr(_scan_kernel, "py_func", _scan_kernel)
+        count = scan(content, _IS_KNOWN, positions.data)
+    return positions[:count]
