@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import functools
 import math
 import random
 import struct
@@ -48,6 +49,7 @@ def codec(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     return load(tmp_path_factory.mktemp("codec"))
 
 
+@functools.cache
 def c_struct(kind: Any) -> type[ctypes.Structure]:
     """Return a message's structure as the header promises it: fields in the XML's order."""
     fields: list[tuple[str, Any]] = []

@@ -15,7 +15,7 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from tests.mutation.judge import EQUAL, FIRMWARE, INVALID, SURVIVED, TESTS, UNTRIED, Judge, with_tests
+from tests.mutation.judge import EQUAL, FIRMWARE, INVALID, KILLED, SURVIVED, TESTS, UNTRIED, Judge, with_tests
 from tests.mutation.mutants import Mutant, mutants
 from tests.mutation.results import Result, Results, path_for_present_tests
 
@@ -23,7 +23,7 @@ ELSEWHERE = {"mavlink/fs_constants.h": "app"}
 """The application alone uses these values."""
 TABLES = ("fs_param_table.c", "fs_messages.c", "fs_messages.h")
 """Generated, their lines alike: tried last."""
-NO_FAULT = {EQUAL, INVALID}
+NO_FAULT, TESTED = {EQUAL, INVALID}, {KILLED, SURVIVED}
 
 
 def all_mutants() -> dict[str, list[Mutant]]:
@@ -55,8 +55,12 @@ def chosen(only: str, number: int, seed: int) -> dict[tuple[bool, str], list[Mut
 
 def run(part: str, waiting: list[Mutant], results: Results, end_s: float) -> None:
     """Try mutants of a part until all are tried or the time is over."""
+    known = [(mutant, results.of(mutant)) for mutant in all_mutants()[part]]
 
     def try_all(judge: Judge) -> None:
+        for mutant, result in known:
+            if result is not None and result.fate in TESTED:
+                judge.remember(mutant, result.test)
         for number, mutant in enumerate(waiting, start=1):
             if time.monotonic() > end_s:
                 return

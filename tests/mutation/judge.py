@@ -49,7 +49,7 @@ BESIDE = ("laws", "sensing", "ports/host")
 """What the application's tests compile beside the mutated parts."""
 SLOW = "not clang and not compiler and not compiles and not sanitizers and not fresh and not own_no_memory"
 """Without these, of which each compiles everything again."""
-KEPT = re.compile(r"flight|filled_stack|stream|\w+_in_python")
+KEPT = re.compile(r"flight|flown|filled_stack|stream|\w+_in_python")
 """Caches that hold nothing that the sources made: what Python makes of the same inputs."""
 LEAST_LIMIT_S, TIMES = 1.0, 10.0
 """CPU time after which a test is taken for an endless loop: so many times what it takes without a mutant."""
@@ -152,13 +152,19 @@ class Judge:
         """Run each test twice without a mutant; return the CPU time of the second run [s]."""
         costs = []
         for item in self.items:
-            is_broken = _fails(item)
+            failure = _failure(item)
             start_s = _cpu_s()
-            if is_broken or _fails(item):
-                pytest.exit(f"{item.nodeid} fails without any mutant")
+            if failure := failure or _failure(item):
+                pytest.exit(f"{item.nodeid} fails without any mutant: {failure}")
             costs.append(_cpu_s() - start_s)
         _forget()
         return costs
+
+    def remember(self, mutant: Mutant, test: str) -> None:
+        """Learn from an earlier run that ``test`` found a mutant, empty: that none did."""
+        found_by = next((index for index, item in enumerate(self.items) if item.nodeid == test), -1)
+        if found_by >= 0 or not test:
+            self.order.learn(mutant, np.array(self._costs), found_by)
 
     def judged(self, mutant: Mutant) -> Verdict:
         """Return what becomes of a mutant; the sources are as before afterwards."""
@@ -217,16 +223,17 @@ class Judge:
             self._spent[-1] = index
             signal.setitimer(signal.ITIMER_PROF, LEAST_LIMIT_S + TIMES * self._costs[index])
             start_s = _cpu_s()
-            fails = _fails(self.items[index])
+            failure = _failure(self.items[index])
             self._spent[index] = _cpu_s() - start_s
-            if fails:
+            if failure:
                 return KILLED
         return SURVIVED
 
 
-def _fails(item: pytest.Item) -> bool:
-    """Run a test with the fixtures it needs and none kept; tell whether it fails."""
-    return any(report.failed for report in runtestprotocol(item, log=False, nextitem=None))
+def _failure(item: pytest.Item) -> str:
+    """Run a test with the fixtures it needs and none kept; return why it fails, empty if it does not."""
+    reports = runtestprotocol(item, log=False, nextitem=None)
+    return next((f"{report.when}: {report.longreprtext}" for report in reports if report.failed), "")
 
 
 def _cpu_s() -> float:
