@@ -256,6 +256,17 @@ class FailsafeMonitor:
         conditions = self._conditions(breached, mode)
         return conditions if conditions or entries else None
 
+    @property
+    def is_nominal(self) -> bool:
+        """True if ``update`` returns None for a new state in which fence and detectors find nothing."""
+        self._update_battery_level()
+        holds = self._memory.entries or self._estimate or self.battery_level or self.links.gcs_lost
+        return self.states.is_new and not (holds or self.fence.is_breached)
+
+    def pass_by(self, time_us: int, found: int) -> None:
+        """Follow updates up to ``time_us`` that returned None; ``found`` are the last bits of ``detect``."""
+        self._time_us, self.faults.found = time_us, found
+
     def evaluate(self, conditions: frozenset[Failsafe], phase: Phase) -> tuple[Announcement, ...]:
         """Evaluate the failsafes for the conditions from ``update``; sets ``decision``."""
         self._phase = phase

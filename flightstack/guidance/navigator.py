@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -22,7 +22,7 @@ from flightstack.core.enums import STREAM_MODES, Mode
 from flightstack.core.portable_math import atan2, distance
 from flightstack.guidance.kernels import (
     TRAJECTORY_SIZE,
-    GuidanceMemory,
+    GoalArrays,
     goal_kernel,
     levelling_kernel,
     mode_numbers,
@@ -90,6 +90,7 @@ class Navigator:
         """Attitude target that replaces the outer loop's while ``flies_attitude``; array form."""
         self._plan: RecordArray = np.zeros(0, PLAN_ITEM)
         self._jumps_left = np.zeros(0)
+        self._goal: GoalArrays | None = None
         self.set_plan(self._plan, self._jumps_left)
         state, target = np.zeros(STATE_SIZE), np.zeros(ATTITUDE_TARGET_SIZE)
         self._levelling_target = np.zeros(ATTITUDE_TARGET_SIZE)
@@ -153,9 +154,20 @@ class Navigator:
     # ------------------------------------------------------------------ state
 
     @property
-    def memory(self) -> GuidanceMemory:
-        """The arrays in which guidance keeps its state."""
-        return GuidanceMemory(self._trajectory, self._mission, self._mode_target, self._land)
+    def goal(self) -> GoalArrays:
+        """The arguments of ``goal_kernel`` that are guidance's own: another object after a new plan."""
+        goal = self._goal
+        if goal is None or goal.plan is not self._plan or goal.jumps_left is not self._jumps_left:
+            goal = self._goal = GoalArrays(
+                self._trajectory, self._mission, self._plan, self._jumps_left, self._mode_target, self._land,
+                self._params_array, self._dt_s,
+            )  # fmt: skip
+        return goal
+
+    @property
+    def modes(self) -> Mapping[Mode, int]:
+        """Numbers of the modes, for ``goal_kernel``."""
+        return self._numbers
 
     @property
     def landed(self) -> bool:

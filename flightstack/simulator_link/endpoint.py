@@ -106,7 +106,8 @@ class SimulatorEndpoint:
         """True if a state with a new time arrived since the last call of ``freshness``."""
         self._arrived_us = 0
         self._changed_us = 0
-        self._seen = b""
+        self.seen = b""
+        """Bytes of the state at the last call of ``freshness``."""
         self.has_state = False
         self.request_refused = False
         self._requests: list[bytes] = []
@@ -190,6 +191,11 @@ class SimulatorEndpoint:
         self._state_us += count * self._interval_us
         self.time_us += count * self._interval_us
         self.has_arrived = True
+
+    def pass_outer(self, time_us: int, seen: bytes) -> None:
+        """Count a call of ``freshness`` at ``time_us``, which found a new state with the bytes ``seen``."""
+        self.has_arrived, self.seen = False, seen
+        self._arrived_us = self._changed_us = time_us
 
     @property
     def frame(self) -> memoryview:
@@ -311,8 +317,8 @@ class SimulatorEndpoint:
             self.has_arrived = False
             self._arrived_us = now_us
             content = self.state.tobytes()
-            if content != self._seen:
-                self._seen = content
+            if content != self.seen:
+                self.seen = content
                 self._changed_us = now_us
                 return NEW_STATE
         frozen_us = 0 if self._uses_hil else now_us - self._changed_us  # coarse HIL values may stay the same

@@ -28,6 +28,8 @@ from gcs_cli.report.flight_outcome import Outcome, with_log
 
 GROUND = "gcs"
 """Name of the ground station that each world has."""
+_ROUNDING = 1e-6
+"""Share of a period that is no further period."""
 _REQUEST_LIMIT_S = 120.0
 _CONNECT_LIMIT_S = 10.0
 """Longest wait for the first heartbeat, which a bad link may delay or lose."""
@@ -157,17 +159,47 @@ class World:
         """Run for ``seconds`` of simulated time."""
         self._run(round(seconds * self.engine.stack.rates.inner_hz))
 
+    def run_on(self, most_s: float) -> None:
+        """Run as ``step``, and on until there are messages to exchange, for ``most_s`` at most.
+
+        What the vehicle does by events, such as to disarm or to reach an item, ends it too. The time is a number of
+        whole periods, at least one.
+        """
+        rates = self.engine.stack.rates
+        periods = max(1, math.ceil(most_s * rates.outer_hz - _ROUNDING))
+        self._run_period(periods * rates.divisor, self._idle_until_s)
+
     def _run(self, ticks: int) -> None:
-        """Run inner ticks, and exchange messages after each outer one."""
+        """Run inner ticks, and exchange messages when some are due, at the end of an outer period."""
+        until_s = -math.inf
         while ticks > 0:
+            ticks -= self._run_period(ticks, until_s)
+            until_s = self._idle_until_s if ticks > 0 else until_s
+
+    def _run_period(self, most: int, until_s: float) -> int:
+        """Run up to the end of a period, and on until ``until_s`` if nothing happens; ``most`` inner ticks at most."""
+        left = most
+        while left > 0:
             engine = self.engine
-            count, is_outer = engine.run(ticks)
-            ticks -= count
+            count, is_outer = engine.run(left, until_s)
+            left -= count
             if is_outer:
                 engine.pass_requests()
                 self._network.exchange(engine.stack.ground, engine.time_s)
                 self._call_due()
             engine.advance()
+            if is_outer:
+                break
+        return most - left
+
+    @property
+    def _idle_until_s(self) -> float:
+        """Time from which messages are due, or a call of ``watch`` or ``after``."""
+        if self._watches or not self.engine.was_ready:
+            return -math.inf
+        now_s = self.time_s
+        until_s = now_s + self._network.idle_s(self.engine.stack.ground, now_s)
+        return min(until_s, *(at_s for at_s, _ in self._timers)) if self._timers else until_s
 
     def run_until(self, condition: Callable[[State], object] | str, timeout_s: float = 120.0) -> State:
         """Run until ``condition`` of the state is true; return that state.
