@@ -89,17 +89,14 @@ class Navigator:
         self.attitude_target = np.eye(1, ATTITUDE_TARGET_SIZE)[0]
         """Attitude target that replaces the outer loop's while ``flies_attitude``; array form."""
         self._plan: RecordArray = np.zeros(0, PLAN_ITEM)
-        self._jumps_left = np.zeros(0)
-        self._goal: GoalArrays | None = None
-        self.set_plan(self._plan, self._jumps_left)
+        self.set_plan(self._plan, np.zeros(0))
         state, target = np.zeros(STATE_SIZE), np.zeros(ATTITUDE_TARGET_SIZE)
-        self._levelling_target = np.zeros(ATTITUDE_TARGET_SIZE)
+        self._levelling_target = target.copy()
         self._rest = direct(rest_kernel, state, self._trajectory, self._land, self.setpoint)
         self._level = direct(levelling_kernel, target, 1.0, 1.0, self._levelling_target)
         self._fly_goal = direct(
-            goal_kernel, 0, state, self._trajectory, self._mission, self._plan, self._jumps_left, self._mode_target,
-            self._land, target, 0.0, self._params_array, self._dt_s, self.setpoint,
-        )  # fmt: skip
+            goal_kernel, 0, state, *self.goal[:6], target, 0.0, self._params_array, self._dt_s, self.setpoint
+        )
 
     @cached_property
     def _fly_stream(self) -> Callable[..., Any]:
@@ -155,14 +152,11 @@ class Navigator:
 
     @property
     def goal(self) -> GoalArrays:
-        """The arguments of ``goal_kernel`` that are guidance's own: another object after a new plan."""
-        goal = self._goal
-        if goal is None or goal.plan is not self._plan or goal.jumps_left is not self._jumps_left:
-            goal = self._goal = GoalArrays(
-                self._trajectory, self._mission, self._plan, self._jumps_left, self._mode_target, self._land,
-                self._params_array, self._dt_s,
-            )  # fmt: skip
-        return goal
+        """The arguments of ``goal_kernel`` that are guidance's own; a new plan has other arrays."""
+        return GoalArrays(
+            self._trajectory, self._mission, self._plan, self._jumps_left, self._mode_target, self._land,
+            self._params_array, self._dt_s,
+        )  # fmt: skip
 
     @property
     def modes(self) -> Mapping[Mode, int]:

@@ -143,16 +143,10 @@ class SimulatorEndpoint:
 
     def heartbeat(self, armed: bool, leaving: bool = False) -> bytes:
         """Return a heartbeat; ``leaving`` announces a shutdown."""
-        return self._link.encode(
-            mavlink.MAVLink_heartbeat_message(
-                self._system_type,
-                mavlink.MAV_AUTOPILOT_PX4,
-                HIL_ARMED if armed else HIL_DISARMED,
-                0,
-                mavlink.MAV_STATE_POWEROFF if leaving else mavlink.MAV_STATE_ACTIVE,
-                3,
-            )
-        )
+        mode = HIL_ARMED if armed else HIL_DISARMED
+        state = mavlink.MAV_STATE_POWEROFF if leaving else mavlink.MAV_STATE_ACTIVE
+        kind = self._system_type, mavlink.MAV_AUTOPILOT_PX4
+        return self._link.encode(mavlink.MAVLink_heartbeat_message(*kind, mode, 0, state, 3))
 
     def receive(self, data: memoryview) -> bool:
         """Process received bytes; return True if they held a new state.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from operator import is_not
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 from flightstack.commander.fault_detector import detect
 from flightstack.control.loops import PythonLoops
 from flightstack.core.arrays import store_outer_row
-from flightstack.core.contract import LoopFlags, RecordArray
+from flightstack.core.contract import LoopFlags
 from flightstack.core.enums import Mode
 from flightstack.core.kernel_calls import address_of
 from flightstack.flight_log.flight_log import DEFAULT_CAPACITY, FlightLog, Trace
@@ -59,7 +58,7 @@ class QuietOuter:
         self._control = loops.outer_arrays
         columns = OUTER.size + len(self._recorder.estimate)
         self._no_log = Trace(DEFAULT_CAPACITY, columns, lambda: None)
-        self._key: tuple[Any, ...] = (None,) * 8
+        self._key: tuple[Any, ...] = (None,) * 9
         self._arguments: tuple[Any, ...] = ()
         self._seen_bytes = b""
         self._progress_is: MissionProgress | None = None
@@ -113,24 +112,17 @@ class QuietOuter:
         if now.progress is not self._progress_is:
             self._progress_is = now.progress
             self._progress[:] = now.progress
+        goal = self._navigator.goal
         key = (
-            now.status.mode, self._navigator.goal, self._navigator.modes, self._fence.arguments, self._faults.limits,
-            trace, self._takeoff.altitude_m, now.behaviour,
+            goal.plan, goal.jumps_left, self._navigator.modes, self._fence.arguments, self._faults.limits, trace,
+            now.status.mode, self._takeoff.altitude_m, now.behaviour,
         )  # fmt: skip
         if any(map(is_not, key, self._key)):
-            self._key, self._arguments = key, self._made(*key[:6])
+            self._key, self._arguments = key, self._made(now.status.mode, goal, trace)
         return self._arguments
 
-    def _made(
-        self,
-        mode: Mode,
-        goal: GoalArrays,
-        modes: Mapping[Mode, int],
-        fence: Any,
-        limits: RecordArray,
-        trace: Trace,
-    ) -> tuple[Any, ...]:
-        setpoint, faults = self._now.setpoint, self._faults
+    def _made(self, mode: Mode, goal: GoalArrays, trace: Trace) -> tuple[Any, ...]:
+        setpoint, faults, fence = self._now.setpoint, self._faults, self._fence.arguments
         memories = (
             goal.trajectory, goal.mission, goal.mode_target, goal.land, goal.jumps_left, setpoint, faults.detectors,
             faults.rotors, fence[-1],
@@ -145,10 +137,10 @@ class QuietOuter:
                 self._progress, False,
             ),
             fence,
-            (faults.rotors, faults.detectors, limits),
+            (faults.rotors, faults.detectors, faults.limits),
             (
-                modes[mode], goal.trajectory, goal.mission, goal.plan, goal.jumps_left, goal.mode_target, goal.land,
-                goal.params, goal.dt_s, setpoint,
+                self._navigator.modes[mode], goal.trajectory, goal.mission, goal.plan, goal.jumps_left,
+                goal.mode_target, goal.land, goal.params, goal.dt_s, setpoint,
             ),
             self._control,
             (trace.rows, trace.times_us, OUTER.size, self._recorder.estimate, _FLAGS),

@@ -56,7 +56,7 @@ class QuietTicks:
         time_us, done = self._now.time_us + self._interval_us, 0
         if self._estimation is not None:
             self._estimation.update(time_us)
-        if self._autopilot.is_nominal:
+        if self._autopilot.is_nominal():
             most = min(most, 1 + self._quiet_intervals(simulator, time_us), block.outer.room(time_us))
             done = block.run(most, is_taken=True)
         self.is_idle = done > 0 and not block.waited

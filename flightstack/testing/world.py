@@ -14,6 +14,7 @@ from flightstack.core.enums import Mode
 from flightstack.core.geodesy import LocalFrame
 from flightstack.plan import MissionItem, MissionType, Plan
 from flightstack.testing.client import Client, ConditionTimeoutError, Network, RefusedError
+from flightstack.testing.clock import Clock
 from flightstack.testing.engine import Engine
 from flightstack.testing.faults import apply_fault
 from flightstack.testing.flight import Event, Flight
@@ -28,8 +29,6 @@ from gcs_cli.report.flight_outcome import Outcome, with_log
 
 GROUND = "gcs"
 """Name of the ground station that each world has."""
-_ROUNDING = 1e-6
-"""Share of a period that is no further period."""
 _REQUEST_LIMIT_S = 120.0
 _CONNECT_LIMIT_S = 10.0
 """Longest wait for the first heartbeat, which a bad link may delay or lose."""
@@ -49,6 +48,7 @@ class World:
     >>> world.run_until("altitude_m > 2.5", timeout_s=10.0).armed
     True
     >>> world.goto(2.0, 0.0)
+    >>> world.run_on(0.5)
     >>> world.run_for(3.0)
     >>> abs(world.state.north_m - 2.0) < 1.0, world.state.mode, world.texts
     (True, 'HOLD', ['Armed', 'Takeoff detected'])
@@ -99,8 +99,7 @@ class World:
         """The plan that was uploaded last."""
         self._network = Network(self.setup.seed)
         self._failsafes: tuple[Failsafe, ...] = ()
-        self._watches: list[Callable[[], None]] = []
-        self._timers: list[tuple[float, Callable[[], None]]] = []
+        self._clock = Clock(self.engine, self._network, self._note_failsafes)
         self.gcs: Client = self.add_client(GROUND)
         """The ground station."""
         self.sender = self.gcs
@@ -149,15 +148,15 @@ class World:
 
     def tick(self) -> None:
         """Run one inner tick, and exchange messages after an outer tick."""
-        self._run(1)
+        self._clock.run(1)
 
     def step(self) -> None:
         """Run for one period of the outer loop: the shortest time between two exchanges of messages."""
-        self._run(self.engine.stack.rates.divisor)
+        self._clock.run(self.engine.stack.rates.divisor)
 
     def run_for(self, seconds: float) -> None:
         """Run for ``seconds`` of simulated time."""
-        self._run(round(seconds * self.engine.stack.rates.inner_hz))
+        self._clock.run(round(seconds * self.engine.stack.rates.inner_hz))
 
     def run_on(self, most_s: float) -> None:
         """Run as ``step``, and on until there are messages to exchange, for ``most_s`` at most.
@@ -165,41 +164,7 @@ class World:
         What the vehicle does by events, such as to disarm or to reach an item, ends it too. The time is a number of
         whole periods, at least one.
         """
-        rates = self.engine.stack.rates
-        periods = max(1, math.ceil(most_s * rates.outer_hz - _ROUNDING))
-        self._run_period(periods * rates.divisor, self._idle_until_s)
-
-    def _run(self, ticks: int) -> None:
-        """Run inner ticks, and exchange messages when some are due, at the end of an outer period."""
-        until_s = -math.inf
-        while ticks > 0:
-            ticks -= self._run_period(ticks, until_s)
-            until_s = self._idle_until_s if ticks > 0 else until_s
-
-    def _run_period(self, most: int, until_s: float) -> int:
-        """Run up to the end of a period, and on until ``until_s`` if nothing happens; ``most`` inner ticks at most."""
-        left = most
-        while left > 0:
-            engine = self.engine
-            count, is_outer = engine.run(left, until_s)
-            left -= count
-            if is_outer:
-                engine.pass_requests()
-                self._network.exchange(engine.stack.ground, engine.time_s)
-                self._call_due()
-            engine.advance()
-            if is_outer:
-                break
-        return most - left
-
-    @property
-    def _idle_until_s(self) -> float:
-        """Time from which messages are due, or a call of ``watch`` or ``after``."""
-        if self._watches or not self.engine.was_ready:
-            return -math.inf
-        now_s = self.time_s
-        until_s = now_s + self._network.idle_s(self.engine.stack.ground, now_s)
-        return min(until_s, *(at_s for at_s, _ in self._timers)) if self._timers else until_s
+        self._clock.run_on(most_s)
 
     def run_until(self, condition: Callable[[State], object] | str, timeout_s: float = 120.0) -> State:
         """Run until ``condition`` of the state is true; return that state.
@@ -225,27 +190,19 @@ class World:
 
     def watch(self, callback: Callable[[], None]) -> None:
         """Call ``callback`` after every outer tick."""
-        self._watches.append(callback)
+        self._clock.watch(callback)
 
     def after(self, seconds: float, callback: Callable[[], None]) -> None:
         """Call ``callback`` once, ``seconds`` of simulated time from now."""
-        self._timers.append((self.time_s + seconds, callback))
+        self._clock.after(seconds, callback)
 
-    def _call_due(self) -> None:
-        self.engine.note_readiness()
+    def _note_failsafes(self) -> None:
         active = self.engine.stack.parts.failsafes.active
         if active != self._failsafes:
             for failsafe in active:
                 if failsafe not in self._failsafes:
                     self.happened(f"failsafe_{failsafe.name}")
             self._failsafes = active
-        for watch in self._watches:
-            watch()
-        if self._timers:
-            due = [call for at_s, call in self._timers if at_s <= self.time_s + 1e-9]
-            self._timers = [timer for timer in self._timers if timer[0] > self.time_s + 1e-9]
-            for call in due:
-                call()
 
     def _last_texts(self) -> str:
         return f"; texts: {'; '.join(self.texts[-3:])}" if self.texts else ""

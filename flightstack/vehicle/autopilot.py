@@ -96,12 +96,11 @@ class Autopilot:
         """Number of the next ticks that run no outer loop, and do not hold the rotors."""
         return 0 if self._failsafes.states.holds_rotors else self.next_outer
 
-    @property
     def is_nominal(self) -> bool:
-        """True if the next outer tick does nothing but guide and control, unless the new state makes an event."""
+        """Return True if the next outer tick only guides and controls, unless the new state makes an event."""
         now = self.now
         flies = now.flying and not (now.rests or now.loops_reset or now.attitude_is_given)
-        return flies and self._monitor.is_nominal
+        return flies and self._monitor.is_nominal()
 
     def pass_outer(self, time_us: int, row: FloatArray, found: int, fell_us: int) -> None:
         """Follow nominal outer ticks, whose kernels ran. The last was at ``time_us`` and wrote ``row``.

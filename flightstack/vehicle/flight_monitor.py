@@ -72,11 +72,10 @@ class FlightMonitor:
         elif now.landed and mode in STREAM_MODES and self._modes.takes_off() is not now.flying:
             self._modes.choose_loops()
 
-    @property
     def is_nominal(self) -> bool:
-        """True if the next update does nothing, unless the new state makes an event: in the air, without failsafes."""
+        """Return True if the next update does nothing unless the new state makes an event: in the air, no failsafe."""
         armed, mode = self._now.status
-        return armed and not self._now.landed and mode not in STREAM_MODES and self._failsafes.is_nominal
+        return armed and not self._now.landed and mode not in STREAM_MODES and self._failsafes.is_nominal()
 
     def pass_by(self, time_us: int, found: int, fell_us: int) -> None:
         """Follow updates up to ``time_us`` that did nothing; arguments as in ``Autopilot.pass_outer``."""
