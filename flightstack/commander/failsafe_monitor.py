@@ -245,16 +245,27 @@ class FailsafeMonitor:
             return None
         if not states.holds_rotors:
             faults.update(setpoint, row, self.position_is_controlled, self.on_ground)
-        entries = self._memory.entries
-        if (
-            faults.is_quiet
-            and not (breached or entries or states.is_stale or self.battery_level or self.links.gcs_lost)
-            and not self._estimate
-            and mode not in STREAM_MODES
+        if faults.is_quiet and not (
+            breached or states.is_stale or mode in STREAM_MODES or self._has_conditions
         ):
             return None
         conditions = self._conditions(breached, mode)
-        return conditions if conditions or entries else None
+        return conditions if conditions or self._memory.entries else None
+
+    @property
+    def _has_conditions(self) -> bool:
+        """True if a failsafe is active, or a condition holds that fence and detectors do not find in the state."""
+        links, memory = self.links, self._memory
+        return bool(memory.entries or self._estimate or self.battery_level or links.gcs_lost)
+
+    def is_nominal(self) -> bool:
+        """Return True if ``update`` returns None for a new state in which fence and detectors find nothing."""
+        self._update_battery_level()
+        return self.states.is_new and not (self.fence.is_breached or self._has_conditions)
+
+    def pass_by(self, time_us: int, found: int) -> None:
+        """Follow updates up to ``time_us`` that returned None; ``found`` are the last bits of ``detect``."""
+        self._time_us, self.faults.found = time_us, found
 
     def evaluate(self, conditions: frozenset[Failsafe], phase: Phase) -> tuple[Announcement, ...]:
         """Evaluate the failsafes for the conditions from ``update``; sets ``decision``."""

@@ -285,7 +285,8 @@ class FaultDetector:
         self._vehicle = vehicle
         self._state = state
         self._dt_s = 1.0 / outer_hz
-        self._detectors: RecordArray = np.zeros(1, DETECTORS)
+        self.detectors: RecordArray = np.zeros(1, DETECTORS)
+        """Memory of the detectors, for ``detect``, as ``limits``."""
         self.rotors: RecordArray = np.zeros(1, ROTOR_SPEEDS)
         """Expected and measured speeds of the rotors, for ``follow_rotors``, as ``lags``."""
         self._no_error_setpoint = np.zeros(SETPOINT_SIZE)
@@ -303,19 +304,19 @@ class FaultDetector:
             self._no_error_setpoint,
             row,
             self.rotors,
-            self._detectors,
-            self._limits,
+            self.detectors,
+            self.limits,
             False,
             self._dt_s,
         )
 
     def set_behaviour(self, behaviour: Behaviour) -> None:
         """Set new limits, from the next update on."""
-        self._limits = detector_limits(behaviour, self._vehicle)
+        self.limits = detector_limits(behaviour, self._vehicle)
 
     def begin(self) -> None:
         """Reset all detectors at the start of a flight."""
-        self._detectors[:] = np.zeros(1, DETECTORS)
+        self.detectors[:] = np.zeros(1, DETECTORS)
         self.rotors[:] = np.zeros(1, ROTOR_SPEEDS)
         self._unmeasured.clear()
         self.found = 0
@@ -336,7 +337,7 @@ class FaultDetector:
             self._no_error_setpoint[:3] = self._state[:3]
             setpoint = self._no_error_setpoint
         self.found = self._detect(
-            self._state, setpoint, row, self.rotors, self._detectors, self._limits, on_ground, self._dt_s
+            self._state, setpoint, row, self.rotors, self.detectors, self.limits, on_ground, self._dt_s
         )
         return self.found
 

@@ -58,8 +58,8 @@ class GroundMonitor:
         if abs(down_m_s) > FALL_M_S:
             self._fell_us = time_us
 
-    def disarmed_in_air(self, time_us: int) -> None:
-        """Record that the vehicle was disarmed in the air."""
+    def fell(self, time_us: int) -> None:
+        """Record that the vehicle fell or rose, or was disarmed in the air."""
         self._fell_us = time_us
 
     def is_at_rest(self, time_us: int) -> bool:

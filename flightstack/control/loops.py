@@ -127,6 +127,19 @@ class PythonLoops:
         except Exception as error:  # a user's controller may fail in any way
             raise compile_error(name, error) from error
 
+    @property
+    def outer_kernel(self) -> Callable[..., Any]:
+        """Kernel of the outer loop."""
+        return self._outer_kernel
+
+    @property
+    def outer_arrays(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, float]:
+        """Attitude target, last target, memory, parameters and last error of the outer loop, and its step [s]."""
+        return (
+            self.attitude_target, self._last_target, self.outer_memory, self._outer_params, self._last,
+            self._outer_dt_s,
+        )  # fmt: skip
+
     def get_parameter(self, name: str) -> float:
         """Return the parameter's value in the loops; raise KeyError if unknown."""
         return self._parameters.get(name)

@@ -84,6 +84,11 @@ class FlightRecorder:
         return self._log
 
     @property
+    def battery_due_us(self) -> int:
+        """Time from which the next outer tick records the battery."""
+        return self._battery_due_us
+
+    @property
     def is_logging(self) -> bool:
         """True while a log is open."""
         return self._log is not None

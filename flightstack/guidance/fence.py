@@ -190,8 +190,9 @@ class FenceEvaluator:
     """Evaluates the fence; ``flags`` and ``margin_m`` are from the last step. No I/O, no clock."""
 
     def __init__(self) -> None:
-        self._limits: RecordArray = np.zeros(1, LIMITS)
-        self._breach = _no_breach()
+        self.limits: RecordArray = np.zeros(1, LIMITS)
+        self.breach = _no_breach()
+        """Limits and memory of ``fence_step``."""
         self._flags = 0  # of ``_breach``: reading a record takes longer
         self.configure(NO_FENCE)
 
@@ -210,25 +211,28 @@ class FenceEvaluator:
         """
         self.fence = fence
         shape = fence.shape
-        self._areas, self._vertices, self._groups = shape.areas, shape.vertices, shape.groups
-        self._limits[0] = (max_distance_m, max_altitude_m, home_ned_m, *(decelerations_m_s2 or (0.0, 0.0)))
+        self.areas = shape.areas, shape.vertices, shape.groups
+        """Areas, vertices and number of groups, for ``fence_step``."""
+        self.limits[0] = (max_distance_m, max_altitude_m, home_ned_m, *(decelerations_m_s2 or (0.0, 0.0)))
         self.is_active = not fence.is_empty or max_distance_m > 0.0 or max_altitude_m > 0.0
+        self.arguments = self.is_active, *self.areas, self.limits, self.breach
+        """``is_active``, and the arguments of ``fence_step`` but for the state; replaced by ``configure``."""
 
     def step(self, state: FloatArray) -> int:
         """Evaluate ``state`` (13,), once per outer tick; return the flags of ``FenceBreach``."""
         if self.is_active:
-            fence_step(self._areas, self._vertices, self._groups, self._limits, state, self._breach)
-            self._flags = int(self._breach["flags"][0])
+            fence_step(*self.areas, self.limits, state, self.breach)
+            self._flags = int(self.breach["flags"][0])
         elif self._flags:
-            self._breach["flags"] = self._flags = 0
+            self.breach["flags"] = self._flags = 0
         return self._flags
 
     def flags_at(self, state: FloatArray) -> int:
         """Return the flags that ``step`` would return for ``state`` (13,), without a change of the evaluator."""
         if not self.is_active:
             return 0
-        breach = self._breach.copy()
-        fence_step(self._areas, self._vertices, self._groups, self._limits, state, breach)
+        breach = self.breach.copy()
+        fence_step(*self.areas, self.limits, state, breach)
         return int(breach["flags"][0])
 
     @property
@@ -244,7 +248,7 @@ class FenceEvaluator:
     @property
     def margin_m(self) -> float:
         """Distance to the nearest limit [m]: negative if breached, infinite without limits."""
-        return float(self._breach["margins"].min()) if self.is_active else NO_MARGIN
+        return float(self.breach["margins"].min()) if self.is_active else NO_MARGIN
 
     def refusal(self, north_m: float, east_m: float, altitude_m: float = 0.0) -> str | None:
         """Return why a position (altitude above home) is not allowed, as the end of a sentence, or None.
@@ -279,17 +283,17 @@ class FenceEvaluator:
     def _at(self, north_m: float, east_m: float, altitude_m: float) -> Record | None:
         """Return the ``BREACH`` of a position without prediction, or None if it is not finite."""
         state, breach = np.zeros(STATE_SIZE), _no_breach()
-        limits = self._limits.copy()
+        limits = self.limits.copy()
         limits["deceleration"] = limits["vertical_deceleration"] = 0.0
         state[:3] = north_m, east_m, limits["home"][0, 2] - altitude_m
         if not np.isfinite(state).all():
             return None
-        fence_step(self._areas, self._vertices, self._groups, limits, state, breach)
+        fence_step(*self.areas, limits, state, breach)
         return breach[0]
 
     def text(self, flags: int) -> str:
         """Return ``flags`` as the end of a sentence, such as "is outside the geofence"; empty for none."""
-        distance_m, altitude_m = self._limits["distance"][0], self._limits["altitude"][0]
+        distance_m, altitude_m = self.limits["distance"][0], self.limits["altitude"][0]
         parts = {
             FenceBreach.OUTSIDE: "outside the geofence",
             FenceBreach.EXCLUDED: "inside an exclusion area of the geofence",

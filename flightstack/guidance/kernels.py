@@ -58,13 +58,20 @@ PRESS_1_S, PRESSED_LIFT = 7.0, 0.45
 It reduces the thrust independently of the gains: a vehicle in the air then sinks."""
 
 
-class GuidanceMemory(NamedTuple):
-    """State of guidance: reference, mission, goal of the other modes, land detector."""
+class GoalArrays(NamedTuple):
+    """Arguments of ``goal_kernel`` that are guidance's own: its state, plan and parameters."""
 
     trajectory: FloatArray
+    """The reference."""
     mission: RecordArray
+    plan: RecordArray
+    jumps_left: FloatArray
     mode_target: RecordArray
+    """Goal of the other modes."""
     land: FloatArray
+    """Memory of the land detector."""
+    params: FloatArray
+    dt_s: float
 
 
 def mode_numbers(position: bool, velocity: bool) -> Mapping[Mode, int]:

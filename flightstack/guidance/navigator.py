@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -22,7 +22,7 @@ from flightstack.core.enums import STREAM_MODES, Mode
 from flightstack.core.portable_math import atan2, distance
 from flightstack.guidance.kernels import (
     TRAJECTORY_SIZE,
-    GuidanceMemory,
+    GoalArrays,
     goal_kernel,
     levelling_kernel,
     mode_numbers,
@@ -89,16 +89,14 @@ class Navigator:
         self.attitude_target = np.eye(1, ATTITUDE_TARGET_SIZE)[0]
         """Attitude target that replaces the outer loop's while ``flies_attitude``; array form."""
         self._plan: RecordArray = np.zeros(0, PLAN_ITEM)
-        self._jumps_left = np.zeros(0)
-        self.set_plan(self._plan, self._jumps_left)
+        self.set_plan(self._plan, np.zeros(0))
         state, target = np.zeros(STATE_SIZE), np.zeros(ATTITUDE_TARGET_SIZE)
-        self._levelling_target = np.zeros(ATTITUDE_TARGET_SIZE)
+        self._levelling_target = target.copy()
         self._rest = direct(rest_kernel, state, self._trajectory, self._land, self.setpoint)
         self._level = direct(levelling_kernel, target, 1.0, 1.0, self._levelling_target)
         self._fly_goal = direct(
-            goal_kernel, 0, state, self._trajectory, self._mission, self._plan, self._jumps_left, self._mode_target,
-            self._land, target, 0.0, self._params_array, self._dt_s, self.setpoint,
-        )  # fmt: skip
+            goal_kernel, 0, state, *self.goal[:6], target, 0.0, self._params_array, self._dt_s, self.setpoint
+        )
 
     @cached_property
     def _fly_stream(self) -> Callable[..., Any]:
@@ -153,9 +151,17 @@ class Navigator:
     # ------------------------------------------------------------------ state
 
     @property
-    def memory(self) -> GuidanceMemory:
-        """The arrays in which guidance keeps its state."""
-        return GuidanceMemory(self._trajectory, self._mission, self._mode_target, self._land)
+    def goal(self) -> GoalArrays:
+        """The arguments of ``goal_kernel`` that are guidance's own; a new plan has other arrays."""
+        return GoalArrays(
+            self._trajectory, self._mission, self._plan, self._jumps_left, self._mode_target, self._land,
+            self._params_array, self._dt_s,
+        )  # fmt: skip
+
+    @property
+    def modes(self) -> Mapping[Mode, int]:
+        """Numbers of the modes, for ``goal_kernel``."""
+        return self._numbers
 
     @property
     def landed(self) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from functools import partial
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from flightstack import __version__
 from flightstack.core.contract import Vector3
@@ -63,6 +63,15 @@ class Service(Protocol):
         ...
 
 
+@runtime_checkable
+class CountsVehicleTime(Protocol):
+    """A service whose poll is due by the vehicle's clock."""
+
+    def idle_s(self) -> float:
+        """Return the vehicle time for which ``poll`` does nothing, if no message arrives [s]."""
+        ...
+
+
 OWN_MESSAGES = frozenset({"MISSION_ITEM", "MISSION_ITEM_INT", "MISSION_REQUEST", "MISSION_REQUEST_INT"})
 """Messages that come by the thousand in a transfer, and change no service but their own."""
 
@@ -89,6 +98,17 @@ class Schedule:
             self._due_s.update(dict.fromkeys(self._own[message_type], -math.inf))
             return
         self._due_s = dict.fromkeys(range(len(self._services)), -math.inf)
+
+    def idle_s(self, now_s: float) -> float:
+        """Return the time for which no service is due, if link clock and vehicle clock run alike [s]."""
+        idle_s = math.inf
+        for index, due_s in self._due_s.items():
+            service = self._services[index]
+            if due_s == -math.inf and isinstance(service, CountsVehicleTime):
+                idle_s = min(idle_s, service.idle_s())
+            else:
+                idle_s = min(idle_s, due_s - now_s)
+        return idle_s
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
         """Return the messages to send now, each with its peer; None stands for every peer that was heard."""

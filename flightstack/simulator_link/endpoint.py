@@ -106,7 +106,8 @@ class SimulatorEndpoint:
         """True if a state with a new time arrived since the last call of ``freshness``."""
         self._arrived_us = 0
         self._changed_us = 0
-        self._seen = b""
+        self.seen = b""
+        """Bytes of the state at the last call of ``freshness``."""
         self.has_state = False
         self.request_refused = False
         self._requests: list[bytes] = []
@@ -142,16 +143,10 @@ class SimulatorEndpoint:
 
     def heartbeat(self, armed: bool, leaving: bool = False) -> bytes:
         """Return a heartbeat; ``leaving`` announces a shutdown."""
-        return self._link.encode(
-            mavlink.MAVLink_heartbeat_message(
-                self._system_type,
-                mavlink.MAV_AUTOPILOT_PX4,
-                HIL_ARMED if armed else HIL_DISARMED,
-                0,
-                mavlink.MAV_STATE_POWEROFF if leaving else mavlink.MAV_STATE_ACTIVE,
-                3,
-            )
-        )
+        mode = HIL_ARMED if armed else HIL_DISARMED
+        state = mavlink.MAV_STATE_POWEROFF if leaving else mavlink.MAV_STATE_ACTIVE
+        kind = self._system_type, mavlink.MAV_AUTOPILOT_PX4
+        return self._link.encode(mavlink.MAVLink_heartbeat_message(*kind, mode, 0, state, 3))
 
     def receive(self, data: memoryview) -> bool:
         """Process received bytes; return True if they held a new state.
@@ -190,6 +185,11 @@ class SimulatorEndpoint:
         self._state_us += count * self._interval_us
         self.time_us += count * self._interval_us
         self.has_arrived = True
+
+    def pass_outer(self, time_us: int, seen: bytes) -> None:
+        """Count a call of ``freshness`` at ``time_us``, which found a new state with the bytes ``seen``."""
+        self.has_arrived, self.seen = False, seen
+        self._arrived_us = self._changed_us = time_us
 
     @property
     def frame(self) -> memoryview:
@@ -311,8 +311,8 @@ class SimulatorEndpoint:
             self.has_arrived = False
             self._arrived_us = now_us
             content = self.state.tobytes()
-            if content != self._seen:
-                self._seen = content
+            if content != self.seen:
+                self.seen = content
                 self._changed_us = now_us
                 return NEW_STATE
         frozen_us = 0 if self._uses_hil else now_us - self._changed_us  # coarse HIL values may stay the same

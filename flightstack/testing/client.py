@@ -111,6 +111,14 @@ class Client:
         outbox, self._outbox = self._outbox, []
         return outbox + self.session.poll(now_s)
 
+    def idle_s(self, now_s: float) -> float:
+        """Return the time for which it sends and receives nothing, if the vehicle sends nothing [s]."""
+        if self._outbox or self.streams or self.session.heartbeat_is_due(now_s):
+            return 0.0
+        deadline_s = self.session.next_deadline()
+        arrival_s = min(self.link.to_vehicle.next_arrival_s, self.link.from_vehicle.next_arrival_s)
+        return (arrival_s if deadline_s is None else min(arrival_s, deadline_s)) - now_s
+
     def receive(self, data: bytes, now_s: float) -> None:
         """Process a datagram from the vehicle."""
         self.session.receive(data, self.address[1:], now_s)
@@ -263,6 +271,10 @@ class Network:
                 client.receive(data, now_s)
                 arrived = True
         return arrived
+
+    def idle_s(self, hub: GroundHub, now_s: float) -> float:
+        """Return the time for which ``exchange`` does nothing, unless the vehicle has an event [s]."""
+        return min(hub.idle_s(now_s), *(client.idle_s(now_s) for client in self.clients.values()))
 
     def settle(self, hub: GroundHub, now_s: float) -> None:
         """Exchange messages until none is left at this instant."""

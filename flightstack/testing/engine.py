@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Callable
 
 from flightstack.control.backend import ControlBackend
@@ -25,6 +26,8 @@ from sim_bridge.simulator import SIMULATOR_COMPONENT, Simulator
 _PLANT = "flightstack.testing.setup:compile_plant"
 _TIMING_US = 1_000_000
 """Interval of ``loop_timing`` in the log."""
+_MARGIN_S = 1e-6
+"""Above the rounding of times in seconds, below their resolution."""
 
 
 _BYTES = ("tick", "advance", "states", "take_answer")
@@ -154,22 +157,50 @@ class Engine:
             self._record_timing()
         return True
 
-    def run(self, most: int) -> tuple[int, bool]:
+    def run(self, most: int, until_s: float = -math.inf) -> tuple[int, bool]:
         """Run a tick and the quiet ones that follow it, ``most`` at most, up to the end of the outer period.
 
-        Return their number, and True after an outer tick. As after ``tick``, the newest answer is not applied yet.
+        If nothing happens, run on up to the end of the period at ``until_s``. Return their number, and True after an
+        outer tick. As after ``tick``, the newest answer is not applied yet.
         """
-        if self.tick():
-            return 1, True
-        if self._changes_bytes or self.loses_states or self._missed_us:
-            return 1, False
-        count = min(most - 1, -self._ticks % self._divisor, self._quiet.count(self.simulator))
-        if count <= 0:
-            return 1, False
-        count = self._quiet.run(self.simulator, self.actuators, count)
-        self._ticks += count
-        self.machine_ns += count * self._interval_us * 1000
-        return 1 + count, self._ends_period()
+        exchanges = self._changes_bytes or self.loses_states or self._missed_us > 0
+        done = 0 if exchanges else self._run_from_outer(most, until_s)
+        if done and not self._left:
+            return done, self._ends_period() and not (
+                self._quiet.is_idle and self.time_s < until_s - _MARGIN_S
+            )
+        if not done:
+            if self.tick():
+                return 1, True
+            done = 1
+        count = 0 if exchanges else min(most - done, self._left, self._quiet.count(self.simulator))
+        if count > 0:
+            count = self._quiet.run(self.simulator, self.actuators, count)
+            self._count(count, count)
+            return done + count, self._ends_period()
+        return done, False
+
+    @property
+    def _left(self) -> int:
+        """Ticks up to the end of the outer period."""
+        return -self._ticks % self._divisor
+
+    def _run_from_outer(self, most: int, until_s: float) -> int:
+        """Run an outer tick that exchanges no bytes, with the quiet ones that follow it; return their number, or 0."""
+        if self._left or not self._endpoint.answers_exactly:
+            return 0
+        period_s = self._divisor * self._interval_us * 1e-6
+        until_timing_s = (self._next_timing_us - self._now.time_us) * 1e-6
+        idle_s = min(until_s - self.time_s, until_timing_s)
+        periods = 1 + math.floor((idle_s - _MARGIN_S) / period_s) if idle_s > period_s else 1
+        done = self._quiet.run_periods(self.simulator, self.actuators, min(most, periods * self._divisor))
+        if done:
+            self._count(done, done - 1)
+        return done
+
+    def _count(self, ticks: int, intervals: int) -> None:
+        self._ticks += ticks
+        self.machine_ns += intervals * self._interval_us * 1000
 
     def _record_timing(self) -> None:
         time_us = self._now.time_us

@@ -88,6 +88,11 @@ class Channel:
             arrived.append(heapq.heappop(self._queue)[2])
         return arrived
 
+    @property
+    def next_arrival_s(self) -> float:
+        """Time at which the next datagram arrives [s]; infinite without one."""
+        return self._queue[0][0] if self._queue else math.inf
+
     def _push(self, arrival_s: float, data: bytes) -> None:
         self._count += 1
         heapq.heappush(self._queue, (arrival_s, self._count, data))

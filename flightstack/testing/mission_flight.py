@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from flightstack.core.enums import Mode
 from flightstack.mavlink.dialect import mavlink
@@ -17,31 +17,31 @@ from gcs_cli.vehicle.view_types import MISSION_COMPLETE, Mission, VehicleView
 if TYPE_CHECKING:
     from flightstack.testing.world import World
 
+Step: TypeAlias = Callable[[float], bool | None]
+"""Runs for a time at most [s]; may return True to end the flight."""
 READY_S = 60.0
 """Longest wait for the state, after which the vehicle refuses to arm."""
 
 
-def fly_plan(
-    world: World, plan: Plan, limit_s: float | None = None, step: Callable[[], bool | None] | None = None
-) -> Outcome:
-    """Fly a plan with ``step`` in place of ``World.step``; it may return True to end the flight early."""
+def fly_plan(world: World, plan: Plan, limit_s: float | None = None, step: Step | None = None) -> Outcome:
+    """Fly a plan with ``step`` in place of ``World.run_on``; it may return True to end the flight early."""
     world.plan = plan
     try:
         world.upload(plan)
         if limit_s is None:  # of an accepted plan: one with an idle loop never ends
             limit_s = flight_limit_s(plan.items, world.setup.home, world.engine.stack.now.behaviour)
-        await_state(world, step or world.step)
+        await_state(world, step or world.run_on)
         world.arm()
         world.start_mission()
     except RefusedError as error:
         return Outcome(Code.VEHICLE_LOST if error.is_silent else Code.REFUSED, str(error))
-    return _flown(world, limit_s, step or world.step)
+    return _flown(world, limit_s, step or world.run_on)
 
 
-def await_state(world: World, step: Callable[[], bool | None]) -> None:
+def await_state(world: World, step: Step) -> None:
     """Run until the vehicle may fly on its state, as one on sensors does after seconds, or for ``READY_S``."""
     end_s = world.time_s + READY_S
-    while not world.engine.stack.is_ready and world.time_s < end_s and not step():
+    while not world.engine.stack.is_ready and world.time_s < end_s and not step(0.0):
         pass
 
 
@@ -52,7 +52,7 @@ def await_first_state(world: World) -> None:
         world.step()
 
 
-def _flown(world: World, limit_s: float, step: Callable[[], bool | None]) -> Outcome:
+def _flown(world: World, limit_s: float, step: Step) -> Outcome:
     """Fly to the end, and return to launch after a mission that ends in the air."""
     end_s = world.time_s + limit_s
     items, is_returning = world.plan.items, not ends_in_air(world.plan.items)
@@ -63,7 +63,7 @@ def _flown(world: World, limit_s: float, step: Callable[[], bool | None]) -> Out
             is_returning = True
             with contextlib.suppress(RefusedError):  # it hovers until the limit
                 world.rtl()
-        if step():
+        if step(end_s - world.time_s):
             break
     return judged(_view(world), items)
 

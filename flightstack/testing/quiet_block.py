@@ -23,6 +23,7 @@ from flightstack.estimation.memory import ALIGNED, FLAGS, POSITION_RESET, RESETS
 from flightstack.flight_log.flight_log import DEFAULT_CAPACITY, Trace
 from flightstack.process.assembly import Stack
 from flightstack.simulator_link.hot_frames import ActuatorsFrame
+from flightstack.testing.quiet_outer import QuietOuter
 from flightstack.vehicle.quiet_kernel import (
     ADVANCE,
     CALLS,
@@ -105,14 +106,17 @@ class QuietBlock:
         self._loops, self._plant = loops, plant
         self._sensors, self._estimation = simulator.sensors, stack.estimation
         self._estimates = _estimates(stack)
-        self._interval_us = simulator.interval_us
+        self.outer = QuietOuter(stack, loops)
+        self._interval_us, self._divisor = simulator.interval_us, stack.rates.divisor
+        self.waited = False
+        """True if the last tick of ``run`` waited for Python."""
         self._counters = np.zeros(COUNTERS, np.int64)
         self._fraction, self._idle = np.zeros(1), np.zeros(LoopRow.SIZE)
         self._no_log = Trace(DEFAULT_CAPACITY, LoopRow.SIZE, lambda: None)
         self._no_imu_log = Trace(DEFAULT_CAPACITY, RECORD_SIZE, lambda: None)
         sensing = _sensing(stack, simulator)
         constant = self._constant(self._addresses(sensing), sensing)
-        changing = self._changing(0, self._no_log, self._no_imu_log)
+        changing = self._changing(0, False, self._no_log, self._no_imu_log)
         self._fly = partial(direct(fly_quiet_ticks, *constant, *changing), *constant)
 
     def _addresses(self, sensing: _Arguments) -> Any:
@@ -146,14 +150,16 @@ class QuietBlock:
             now.state, now.rotor_speed, _bytes(loops.memory), self._fraction, loops.fraction_step, self._idle,
             _bytes(faults.rotors), _bytes(faults.lags),
         )  # fmt: skip
-        return calls, self._counters, self._interval_us, plant_part, sensing, control
+        return (
+            calls, self.outer.calls, self._counters, self._interval_us, self._divisor, plant_part, sensing, control
+        )  # fmt: skip
 
-    def _changing(self, count: int, log: Trace, imu_log: Trace) -> _Arguments:
+    def _changing(self, count: int, is_taken: bool, log: Trace, imu_log: Trace) -> _Arguments:
         """Return the other arguments of the kernel."""
         now, estimation = self._stack.now, self._estimation
         return (
-            count, now.time_us, self._actuators.flags, self._flies,
-            self._estimates[0 if estimation is None else estimation.feed.selected],
+            count, is_taken, self._stack.parts.autopilot.next_outer, now.time_us, self._actuators.flags, self._flies,
+            now.row, self._estimates[0 if estimation is None else estimation.feed.selected], self.outer.arguments(),
             (log.rows, log.times_us, log.n), (imu_log.rows, imu_log.times_us, imu_log.n),
         )  # fmt: skip
 
@@ -169,45 +175,58 @@ class QuietBlock:
             and simulator.sensors is self._sensors
         )
 
-    def run(self, count: int) -> int:
+    def run(self, count: int, is_taken: bool = False) -> int:
         """Run ``count`` ticks, or fewer, at least one unless a log is full or a fault acts between steps.
 
-        Return their number. Raise PlantDivergedError.
+        With ``is_taken``, vehicle and estimator have the state of the first one. Return their number. Raise
+        PlantDivergedError.
         """
         stack, sensors, estimation = self._stack, self._sensors, self._estimation
         recorded = stack.recorder.log
         log = self._no_log if recorded is None else recorded.inner
         imu_log = (None if estimation is None else estimation.imu_trace) or self._no_imu_log
-        room = min(log.capacity - log.n, imu_log.capacity - imu_log.n)
-        count = min(count, room, self._plant.quiet_steps() // self._simulator.steps)
+        advances = min(
+            count - is_taken, self._plant.quiet_steps() // self._simulator.steps, imu_log.capacity - imu_log.n
+        )
         if sensors is not None:
-            count = min(count, sensors.imus.rows_left())
+            advances = min(advances, sensors.imus.rows_left())
+        count = min(advances + is_taken, log.capacity - log.n)
         if count <= 0:
             return 0
         now, flies = stack.now, self._flies
         self._fraction[0] = self._loops.fraction
         if not flies:
             self._loops.idle(now.state, now.rotor_speed, now.status.armed, self._idle)
-        self._fly(*self._changing(count, log, imu_log))
-        ticks, flown, result, sensed = self._counters.tolist()
+        self._fly(*self._changing(count, is_taken, log, imu_log))
+        ticks, _, _, sensed, _ = self._counters.tolist()
         self._loops.fraction = float(self._fraction[0])
-        row_at = log.n + ticks - 1
+        rows = log.rows[log.n :]
         if recorded is not None:
             log.n += ticks
         if imu_log is not self._no_imu_log:
             imu_log.n += sensed
-        self._count(ticks, flown, result, log.rows[row_at])
-        return int(flown)
+        return self._count(rows)
 
-    def _count(self, ticks: int, flown: int, result: int, row: FloatArray) -> None:
-        """Bring all parts to the time of the kernel, and end a tick that waits after a reset of the estimate."""
+    def _count(self, rows: FloatArray) -> int:
+        """Bring all parts to the time of the kernel, and run a tick that waits; return the number of ticks.
+
+        ``rows`` are those of the ticks. A tick waits after a reset of the estimate, or for an event of the outer loop.
+        """
         stack, interval_us, began_us = self._stack, self._interval_us, self._stack.now.time_us
-        time_us = began_us + flown * interval_us
-        stack.simulator.pass_by(flown)
+        ticks, flown, result, sensed, waits = self._counters.tolist()
+        self.waited = waits > 0
+        if flown:
+            stack.simulator.pass_by(flown)
+        last_outer = self.outer.pass_by(stack.recorder.log, began_us, interval_us, rows)
+        if waits or last_outer != ticks - 1:
+            stack.simulator.has_arrived = True
         if ticks:
-            stack.parts.autopilot.pass_by(ticks, began_us + ticks * interval_us, row)
-        self._simulator.pass_by(flown, result)
-        if self._estimation is not None:
-            self._estimation.pass_by(time_us, interval_us)
-        if flown > ticks:
-            self._actuators.rotor_speed_rad_s[:] = stack.parts.autopilot.tick(time_us)
+            stack.parts.autopilot.pass_by(ticks, began_us + ticks * interval_us, rows[ticks - 1])
+        if flown:
+            self._simulator.pass_by(flown, result)
+        if self._estimation is not None and sensed:
+            self._estimation.pass_by(began_us + (ticks + waits) * interval_us, interval_us)
+        if waits:
+            commands = stack.parts.autopilot.tick(began_us + (ticks + 1) * interval_us)
+            self._actuators.rotor_speed_rad_s[:] = commands
+        return int(ticks + waits)

@@ -24,17 +24,46 @@ class QuietTicks:
         self._autopilot, self._estimation = stack.parts.autopilot, stack.estimation
         self._inbox = stack.simulator.sensors
         self._now, self._interval_us = stack.now, stack.rates.interval_us
+        self.is_idle = False
+        """True if all ticks of the last call of ``run_periods`` were compiled ones: the vehicle had no event."""
         self._block = QuietBlock(stack, simulator, actuators) if compiles(stack, simulator) else None
 
     def count(self, simulator: Simulator) -> int:
         """Return how many of the next ticks are quiet. The last tick's answer was taken and is not applied yet."""
         if simulator.interval_us != self._interval_us or not self._lockstep.is_quiet:
             return 0
-        count = min(self._autopilot.quiet_ticks, simulator.quiet_intervals())
+        return min(self._autopilot.quiet_ticks, self._quiet_intervals(simulator, self._now.time_us))
+
+    def _quiet_intervals(self, simulator: Simulator, time_us: int) -> int:
+        """Return after how many of the next intervals there is nothing but the loops to run; ``time_us`` is now."""
+        count = simulator.quiet_intervals()
         if self._estimation is not None:
-            until_us = self._estimation.quiet_until_us
-            count = min(count, (until_us - 1 - self._now.time_us) // self._interval_us)
-        return count
+            count = min(count, (self._estimation.quiet_until_us - 1 - time_us) // self._interval_us)
+        return max(0, count)
+
+    def run_periods(self, simulator: Simulator, actuators: ActuatorsFrame, most: int) -> int:
+        """Run the outer tick on the newest state and the ticks that follow it while nothing happens, ``most`` at most.
+
+        Return their number; 0 if vehicle and simulator are not in step, or not compiled.
+        """
+        block = self._block
+        if block is None or not (
+            simulator.interval_us == self._interval_us
+            and self._lockstep.is_due
+            and block.fits(simulator, actuators)
+        ):
+            return 0
+        time_us, done = self._now.time_us + self._interval_us, 0
+        if self._estimation is not None:
+            self._estimation.update(time_us)
+        if self._autopilot.is_nominal():
+            most = min(most, 1 + self._quiet_intervals(simulator, time_us), block.outer.room(time_us))
+            done = block.run(most, is_taken=True)
+        self.is_idle = done > 0 and not block.waited
+        if not done:
+            actuators.rotor_speed_rad_s[:] = self._autopilot.tick(time_us)
+        self._answer(simulator, actuators, done - 1)
+        return done or 1
 
     def run(self, simulator: Simulator, actuators: ActuatorsFrame, count: int) -> int:
         """Run ``count`` ticks, as many as ``count`` returned at most, and return how many; set ``actuators``.
@@ -42,10 +71,14 @@ class QuietTicks:
         There are fewer after a reset of the estimate, which may change what is quiet.
         """
         done = self._run_block(simulator, actuators, count) or self._run_ticks(simulator, actuators, count)
-        actuators.flags = self._link.flags(self._now.status.armed) | VALID_FLAG
-        if self._inbox is not None:
-            self._inbox.pass_by(self._now.time_us, simulator.stamp_us)
+        self._answer(simulator, actuators, done)
         return done
+
+    def _answer(self, simulator: Simulator, actuators: ActuatorsFrame, intervals: int) -> None:
+        """End a call of ``intervals`` of the simulator: the newest commands are the answer to the newest state."""
+        actuators.flags = self._link.flags(self._now.status.armed) | VALID_FLAG
+        if self._inbox is not None and intervals > 0:
+            self._inbox.pass_by(self._now.time_us, simulator.stamp_us)
 
     def _run_block(self, simulator: Simulator, actuators: ActuatorsFrame, count: int) -> int:
         """Run the ticks as one compiled call; return 0 if a part of them is not compiled, or not ready for it."""

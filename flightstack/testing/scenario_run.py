@@ -85,7 +85,8 @@ class _Run:
         self._waiting = [(event, _trigger(world, event)) for event in scenario.event]
         self._due: list[tuple[float, Event]] = []
         self._requests: list[Event] = []
-        world.watch(self._fire)  # time goes on while a request waits for its answer
+        if self._waiting:
+            world.watch(self._fire)  # time goes on while a request waits for its answer
 
     def fly(self) -> Outcome | None:
         world, scenario = self._world, self._scenario
@@ -98,7 +99,7 @@ class _Run:
         flew = False
         while world.time_s < end_s and (world.engine.stack.now.status.armed or not flew):
             flew = flew or world.engine.stack.now.status.armed
-            if self._step():
+            if self._step(end_s - world.time_s):
                 break
         return None
 
@@ -125,15 +126,18 @@ class _Run:
             else:
                 self._requests.append(event)
 
-    def _step(self) -> bool:
-        """Make the requests that are due, and run one outer tick; return True at the end of the scenario's duration."""
+    def _step(self, most_s: float) -> bool:
+        """Make the requests that are due, and run on; return True at the end of the scenario's duration."""
         world = self._world
         self._fire()
         while self._requests:
             _happen(world, self._requests.pop(0))
-        world.step()
         duration_s = self._scenario.duration_s
-        return duration_s is not None and world.time_s >= duration_s
+        if duration_s is None:
+            world.run_on(most_s)
+            return False
+        world.run_on(min(most_s, duration_s - world.time_s))
+        return world.time_s >= duration_s
 
 
 def _trigger(world: World, event: Event) -> Callable[[State], bool]:

@@ -14,6 +14,7 @@ from flightstack.core.enums import Mode
 from flightstack.core.geodesy import LocalFrame
 from flightstack.plan import MissionItem, MissionType, Plan
 from flightstack.testing.client import Client, ConditionTimeoutError, Network, RefusedError
+from flightstack.testing.clock import Clock
 from flightstack.testing.engine import Engine
 from flightstack.testing.faults import apply_fault
 from flightstack.testing.flight import Event, Flight
@@ -47,6 +48,7 @@ class World:
     >>> world.run_until("altitude_m > 2.5", timeout_s=10.0).armed
     True
     >>> world.goto(2.0, 0.0)
+    >>> world.run_on(0.5)
     >>> world.run_for(3.0)
     >>> abs(world.state.north_m - 2.0) < 1.0, world.state.mode, world.texts
     (True, 'HOLD', ['Armed', 'Takeoff detected'])
@@ -97,8 +99,7 @@ class World:
         """The plan that was uploaded last."""
         self._network = Network(self.setup.seed)
         self._failsafes: tuple[Failsafe, ...] = ()
-        self._watches: list[Callable[[], None]] = []
-        self._timers: list[tuple[float, Callable[[], None]]] = []
+        self._clock = Clock(self.engine, self._network, self._note_failsafes)
         self.gcs: Client = self.add_client(GROUND)
         """The ground station."""
         self.sender = self.gcs
@@ -147,27 +148,23 @@ class World:
 
     def tick(self) -> None:
         """Run one inner tick, and exchange messages after an outer tick."""
-        self._run(1)
+        self._clock.run(1)
 
     def step(self) -> None:
         """Run for one period of the outer loop: the shortest time between two exchanges of messages."""
-        self._run(self.engine.stack.rates.divisor)
+        self._clock.run(self.engine.stack.rates.divisor)
 
     def run_for(self, seconds: float) -> None:
         """Run for ``seconds`` of simulated time."""
-        self._run(round(seconds * self.engine.stack.rates.inner_hz))
+        self._clock.run(round(seconds * self.engine.stack.rates.inner_hz))
 
-    def _run(self, ticks: int) -> None:
-        """Run inner ticks, and exchange messages after each outer one."""
-        while ticks > 0:
-            engine = self.engine
-            count, is_outer = engine.run(ticks)
-            ticks -= count
-            if is_outer:
-                engine.pass_requests()
-                self._network.exchange(engine.stack.ground, engine.time_s)
-                self._call_due()
-            engine.advance()
+    def run_on(self, most_s: float) -> None:
+        """Run as ``step``, and on until there are messages to exchange, for ``most_s`` at most.
+
+        What the vehicle does by events, such as to disarm or to reach an item, ends it too. The time is a number of
+        whole periods, at least one.
+        """
+        self._clock.run_on(most_s)
 
     def run_until(self, condition: Callable[[State], object] | str, timeout_s: float = 120.0) -> State:
         """Run until ``condition`` of the state is true; return that state.
@@ -193,27 +190,19 @@ class World:
 
     def watch(self, callback: Callable[[], None]) -> None:
         """Call ``callback`` after every outer tick."""
-        self._watches.append(callback)
+        self._clock.watch(callback)
 
     def after(self, seconds: float, callback: Callable[[], None]) -> None:
         """Call ``callback`` once, ``seconds`` of simulated time from now."""
-        self._timers.append((self.time_s + seconds, callback))
+        self._clock.after(seconds, callback)
 
-    def _call_due(self) -> None:
-        self.engine.note_readiness()
+    def _note_failsafes(self) -> None:
         active = self.engine.stack.parts.failsafes.active
         if active != self._failsafes:
             for failsafe in active:
                 if failsafe not in self._failsafes:
                     self.happened(f"failsafe_{failsafe.name}")
             self._failsafes = active
-        for watch in self._watches:
-            watch()
-        if self._timers:
-            due = [call for at_s, call in self._timers if at_s <= self.time_s + 1e-9]
-            self._timers = [timer for timer in self._timers if timer[0] > self.time_s + 1e-9]
-            for call in due:
-                call()
 
     def _last_texts(self) -> str:
         return f"; texts: {'; '.join(self.texts[-3:])}" if self.texts else ""

@@ -87,12 +87,31 @@ class Autopilot:
         return commands
 
     @property
+    def next_outer(self) -> int:
+        """Number of ticks before that of the next outer loop."""
+        return -self._tick % self._divisor
+
+    @property
     def quiet_ticks(self) -> int:
         """Number of the next ticks that run no outer loop, and do not hold the rotors."""
-        return 0 if self._failsafes.states.holds_rotors else -self._tick % self._divisor
+        return 0 if self._failsafes.states.holds_rotors else self.next_outer
+
+    def is_nominal(self) -> bool:
+        """Return True if the next outer tick only guides and controls, unless the new state makes an event."""
+        now = self.now
+        flies = now.flying and not (now.rests or now.loops_reset or now.attitude_is_given)
+        return flies and self._monitor.is_nominal()
+
+    def pass_outer(self, time_us: int, row: FloatArray, found: int, fell_us: int) -> None:
+        """Follow nominal outer ticks, whose kernels ran. The last was at ``time_us`` and wrote ``row``.
+
+        ``found`` are its bits of ``detect``; ``fell_us`` is the time of the last fall, 0 for none.
+        """
+        self._good_row[:] = row
+        self._monitor.pass_by(time_us, found, fell_us)
 
     def pass_by(self, count: int, time_us: int, row: FloatArray) -> None:
-        """Count inner ticks without an outer one, whose kernels ran up to ``row`` at ``time_us``."""
+        """Count inner ticks whose kernels ran up to ``row`` at ``time_us``."""
         now = self.now
         self._tick += count
         now.time_us, now.row = time_us, row

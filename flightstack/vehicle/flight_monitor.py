@@ -72,6 +72,17 @@ class FlightMonitor:
         elif now.landed and mode in STREAM_MODES and self._modes.takes_off() is not now.flying:
             self._modes.choose_loops()
 
+    def is_nominal(self) -> bool:
+        """Return True if the next update does nothing unless the new state makes an event: in the air, no failsafe."""
+        armed, mode = self._now.status
+        return armed and not self._now.landed and mode not in STREAM_MODES and self._failsafes.is_nominal()
+
+    def pass_by(self, time_us: int, found: int, fell_us: int) -> None:
+        """Follow updates up to ``time_us`` that did nothing; arguments as in ``Autopilot.pass_outer``."""
+        if fell_us:
+            self._ground.fell(fell_us)
+        self._failsafes.pass_by(time_us, found)
+
     def _apply_failsafes(self, conditions: frozenset[Failsafe]) -> None:
         """Evaluate the failsafes and apply their decision."""
         now, failsafes = self._now, self._failsafes

@@ -95,6 +95,11 @@ class Journal:
         self.failsafe_acts = False
         """True from the action of a failsafe to its end, or until a user overrides it."""
 
+    @property
+    def has_events(self) -> bool:
+        """True if ``take_events`` has events to return."""
+        return bool(self._events)
+
     def take_events(self) -> list[Event]:
         """Return the events since the last call, oldest first."""
         if not self._events:  # the usual case

@@ -40,6 +40,12 @@ class Lockstep:
         return self._catch_up(now_ns)
 
     @property
+    def is_due(self) -> bool:
+        """True if the next tick is that of the newest state, one interval after the last, and nothing else waits."""
+        time_us = self._now.time_us + self._interval_us
+        return self._begun and not self._lead_us and self._link.is_quiet(time_us)
+
+    @property
     def is_quiet(self) -> bool:
         """True if the last tick was that of the newest state, and the vehicle's clock is the simulator's."""
         return self._begun and not self._lead_us and self._link.is_quiet(self._now.time_us)

@@ -1,4 +1,4 @@
-"""The quiet ticks of a period as one compiled call: plant, inertial sensors, filter, inner loop and rotor monitor.
+"""Quiet ticks as one compiled call: plant, inertial sensors, filter, inner loop, rotor monitor, nominal outer ticks.
 
 It calls the kernels that each part runs in any other tick, at their addresses, on the same arrays and in the same
 order. Records are passed as bytes, so that this kernel is compiled once for all of them. A module of its own, with few
@@ -12,21 +12,17 @@ from typing import Any
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, LoopRow
 from flightstack.core.kernel_calls import call_kernel, call_kernel_int
+from flightstack.vehicle.outer_kernel import FELL_US, FOUND, OUTERS, copy_all, guide, note_outer
 
 ADVANCE, MEASURE, TAKE, ESTIMATE, CONTROL, FOLLOW, CALLS = range(7)
 """Kernels by their index in ``calls``."""
-TICKS, FLOWN, RESULT, SENSED, COUNTERS = range(5)
-"""Counters: ticks of the vehicle, advances of the plant, the last result of these, and samples of the sensors."""
+TICKS, FLOWN, RESULT, SENSED, WAITS, COUNTERS = range(6)
+"""Counters: ticks of the vehicle, advances of the plant, the last result of these, samples of the sensors, and 1 if a
+tick is begun that must be run in Python."""
 _REFERENCE, _COMMAND, _SPEED = (
     columns.start for columns in (LoopRow.REFERENCE_ATTITUDE, LoopRow.ROTOR_COMMAND, LoopRow.ROTOR_SPEED)
 )
 _QUATERNION_AT = 6
-
-
-@compiled
-def _copy(source: Any, target: Any) -> None:
-    for i in range(len(source)):
-        target[i] = source[i]
 
 
 @compiled
@@ -55,11 +51,11 @@ def _sense(
 @compiled
 def _rest(row: FloatArray, idle: FloatArray, state: FloatArray, speeds: Any) -> None:
     """Write the row of a vehicle that must not fly: ``idle`` with the present state."""
-    _copy(idle, row)
-    _copy(state, row)
+    copy_all(idle, row)
+    copy_all(state, row)
     for i in range(4):
         row[_REFERENCE + i] = state[_QUATERNION_AT + i]
-    _copy(speeds, row[_SPEED:])
+    copy_all(speeds, row[_SPEED:])
 
 
 @compiled
@@ -77,37 +73,68 @@ def _control(calls: Any, control: Any, flies: bool, row: FloatArray, commands: F
 
 
 @compiled
+def _advance(
+    calls: Any, counters: Any, interval_us: int, plant: Any, sensing: Any, state: FloatArray,
+    time_us: int, flags: int, estimate: Any, imu_log: Any,
+) -> bool:  # fmt: skip
+    """Advance plant, sensors and estimate to ``time_us``; return False if no tick is to follow."""
+    memory, commands, steps, output, largest_result, sent, taken = plant
+    selected, known, is_known, resets, reset_counts = estimate
+    records, record_times, record_at = imu_log
+    result = call_kernel_int(calls[ADVANCE], (memory, commands, flags, steps, output))
+    counters[FLOWN] += 1
+    counters[RESULT] = result
+    if result > largest_result:
+        return False
+    copy_all(sent, taken)
+    if len(sensing[1]) > 0:
+        resets_before = _sum_at(resets, reset_counts)
+        at = record_at + counters[SENSED]
+        record_times[at] = time_us
+        _sense(calls, sensing, time_us, interval_us, selected, records[at])
+        counters[SENSED] += 1
+        if is_known[0] != 0:
+            copy_all(known, state)
+        if _sum_at(resets, reset_counts) != resets_before:
+            counters[WAITS] = 1
+            return False
+    return True
+
+
+@compiled
 def fly_quiet_ticks(
-    calls: Any, counters: Any, interval_us: int, plant: Any, sensing: Any, control: Any,
-    count: int, time_us: int, flags: int, flies: bool, estimate: Any, log: Any, imu_log: Any,
+    calls: Any, outer_calls: Any, counters: Any, interval_us: int, divisor: int, plant: Any, sensing: Any, control: Any,
+    count: int, is_taken: bool, outer_in: int, time_us: int, flags: int, flies: bool, last_row: FloatArray,
+    estimate: Any, outer: Any, log: Any, imu_log: Any,
 ) -> None:  # fmt: skip
     """Run ``count`` ticks, or fewer: what was done is in ``counters``.
 
-    It stops when the result of the plant is larger than ``largest_result``, and after a reset of the estimate, counted
-    in the columns ``reset_counts``: its tick waits for guidance. Records and frames are bytes. ``tracks``, ``counters``
-    and ``filters`` of ``sensing`` have an element for each inertial sensor; on the true state there are no ``imus``.
+    The state of the first tick ``is_taken``, or the plant advances to it. The first outer tick is that after
+    ``outer_in`` ticks. It stops when the result of the plant is larger than ``largest_result``, after a reset of the
+    estimate, counted in the columns ``reset_counts``, and at an outer tick that is not nominal: their tick waits.
+    Records and frames are bytes. ``tracks``, ``counters`` and ``filters`` of ``sensing`` have an element for each
+    inertial sensor; on the true state there are no ``imus``.
     """
-    memory, commands, steps, output, largest_result, sent, taken = plant
-    selected, known, is_known, resets, reset_counts = estimate
     rows, row_times, row_at = log
-    records, record_times, record_at = imu_log
-    resets_before, has_sensors = _sum_at(resets, reset_counts), len(sensing[1]) > 0
-    counters[TICKS], counters[SENSED] = 0, 0
+    state, row, marks = control[0], last_row, outer[0]
+    for i in range(len(counters)):
+        counters[i] = 0
+    marks[OUTERS], marks[FELL_US], marks[FOUND] = 0, 0, 0
     for i in range(count):
-        result = call_kernel_int(calls[ADVANCE], (memory, commands, flags, steps, output))
-        counters[FLOWN], counters[RESULT] = i + 1, result
-        if result > largest_result:
-            return
         time_us += interval_us
-        _copy(sent, taken)
-        if has_sensors:
-            record_times[record_at + i] = time_us
-            _sense(calls, sensing, time_us, interval_us, selected, records[record_at + i])
-            counters[SENSED] = i + 1
-            if is_known[0] != 0:
-                _copy(known, control[0])
-            if _sum_at(resets, reset_counts) != resets_before:
+        if (i > 0 or not is_taken) and not _advance(
+            calls, counters, interval_us, plant, sensing, state, time_us, flags, estimate, imu_log
+        ):
+            return
+        outer_due = (i - outer_in) % divisor == 0
+        if outer_due:
+            if not guide(outer_calls, outer, i, time_us, state, row):
+                counters[WAITS] = 1
                 return
+            control[3][0] = 0.0
+        row = rows[row_at + i]
         row_times[row_at + i] = time_us
-        _control(calls, control, flies, rows[row_at + i], commands)
+        _control(calls, control, flies, row, plant[1])
+        if outer_due:
+            note_outer(outer_calls, outer, time_us, state)
         counters[TICKS] = i + 1

@@ -8,6 +8,7 @@ from flightstack.testing import World
 from flightstack.testing.engine import Engine
 from flightstack.testing.quiet_block import QuietBlock
 from sim_bridge.errors import PlantDivergedError
+from tests.support.bytes_engine import BytesEngine
 from tests.support.inertial_sensors import x_quad_with_imus
 
 CONDITIONS = (
@@ -16,13 +17,6 @@ CONDITIONS = (
     {"state": "truth", "vehicle": "x_quad", "gust": 1.0, "torque_gust": 0.01, "inner_hz": 1000.0},
     {"state": "estimated", "vehicle": "x_quad", "wind": (3.0, -1.0), "gust": 1.0, "seed": 3},
 )
-
-
-class BytesEngine(Engine):
-    """Exchanges the bytes of every state and every answer."""
-
-    def states(self) -> bytes | memoryview:
-        return super().states()
 
 
 def flown(world: World) -> tuple[bytes, list[str], int]:
@@ -60,8 +54,8 @@ def test_a_reset_of_the_estimate_ends_a_compiled_call(monkeypatch: pytest.Monkey
     shorter: list[int] = []
     run = QuietBlock.run
 
-    def counted(block: QuietBlock, count: int) -> int:
-        done = run(block, count)
+    def counted(block: QuietBlock, count: int, is_taken: bool = False) -> int:
+        done = run(block, count, is_taken)
         shorter.append(count - done)
         return done
 

@@ -67,7 +67,7 @@ class PerfectVehicle:
         """Place the vehicle in the air, at rest and not landed."""
         self.state[:3] = north, east, down
         self.navigator.reset_on_ground(self.state)
-        self.navigator.memory.land[:] = LandMemory(0.0, 0.0, 0.0, down)
+        self.navigator.goal.land[:] = LandMemory(0.0, 0.0, 0.0, down)
 
     def tick(self) -> None:
         setpoint = self.navigator.setpoint

@@ -37,7 +37,7 @@ def test_hold_stops_ahead_and_never_goes_back_far(north: float, east: float, sin
     """The hold's point is where the reference comes to rest."""
     vehicle = in_air(down=-50.0)
     vehicle.state[3:6] = north, east, sink
-    vehicle.navigator.memory.trajectory[3:6] = north, east, sink
+    vehicle.navigator.goal.trajectory[3:6] = north, east, sink
     vehicle.enter(Mode.HOLD)
     vehicle.run(15.0)
     path = np.array(vehicle.path)

@@ -137,7 +137,7 @@ def test_heading_rate_or_neither(yaw: float, rate: float, after_8_s: float) -> N
 def test_without_any_setpoint_it_stops() -> None:
     vehicle = PerfectVehicle()
     vehicle.airborne_at(0.0, 0.0, -5.0)
-    vehicle.navigator.memory.trajectory[3:6] = 3.0, 0.0, 0.0
+    vehicle.navigator.goal.trajectory[3:6] = 3.0, 0.0, 0.0
     vehicle.enter(Mode.OFFBOARD)
     vehicle.run(5.0)
     assert np.abs(vehicle.state[3:6]).max() < 1e-3

@@ -231,6 +231,21 @@ class GroundHub:
             yield from self._forwarded(now_s)
         self._forget_silent(now_s)
 
+    def idle_s(self, now_s: float) -> float:
+        """Return the time for which ``poll`` sends nothing, unless a message arrives or an event happens [s].
+
+        The link clock and the vehicle clock must run alike.
+        """
+        if self._to_forward or self._texts or self._journal.has_events:
+            return 0.0
+        vehicle_s = self._now.time_us * 1e-6
+        idle_s = min(self._schedule.idle_s(now_s), self._forget_due_s - now_s)
+        for peer in self._peers.values():
+            if peer.outbox:
+                return 0.0
+            idle_s = min(idle_s, peer.heartbeat_due_s - now_s, peer.streams.idle_s(vehicle_s))
+        return idle_s
+
     def _forwarded(self, now_s: float) -> Iterator[tuple[PeerAddress, bytes]]:
         """Yield queued frames to forward, at most FORWARDED_A_POLL."""
         for _ in range(min(FORWARDED_A_POLL, len(self._to_forward))):

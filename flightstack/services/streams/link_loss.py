@@ -30,9 +30,13 @@ class SilenceTimer:
         """Restart the timer."""
         self._heard_us = time_us
 
+    def silent_s(self, time_us: int) -> float:
+        """Return for how long the link has been silent [s]; infinite if it was never heard."""
+        return math.inf if self._heard_us is None else (time_us - self._heard_us) * 1e-6
+
     def silent(self, time_us: int, limit_s: float) -> bool:
         """Return True if the link was silent for ``limit_s``, or was never heard."""
-        return self._heard_us is None or (time_us - self._heard_us) * 1e-6 > limit_s
+        return self.silent_s(time_us) > limit_s
 
     def lost(self, time_us: int, limit_s: float) -> bool:
         """Return True if the link was heard and is silent now."""
@@ -125,3 +129,11 @@ class GroundLinkMonitor:
     def next_deadline(self) -> float | None:
         """Return −inf: the timeout counts vehicle time, and before the first heartbeat NAV_DLL_ACT decides."""
         return -math.inf
+
+    def idle_s(self) -> float:
+        """Return the vehicle time for which ``poll`` changes nothing, if no message arrives [s]."""
+        links, behaviour = self._links, self._now.behaviour
+        if links.gcs_heard and not links.gcs_lost:
+            return behaviour.gcs_loss_s - self._timer.silent_s(self._now.time_us)
+        is_settled = links.gcs_heard or links.gcs_lost is (behaviour.gcs_loss_action > 0)
+        return math.inf if is_settled else 0.0

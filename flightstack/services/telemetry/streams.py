@@ -184,6 +184,10 @@ class Streams:
         for message_id in members:
             self.set_interval(message_id, interval_us)
 
+    def idle_s(self, vehicle_s: float) -> float:
+        """Return the time for which nothing is due, from the time ``vehicle_s`` of the last call of ``due`` [s]."""
+        return self._soonest_s - vehicle_s
+
     def due(self, telemetry: Telemetry, link_now_s: float) -> list[Message]:
         """Return the messages that are due on both the vehicle clock and the link clock."""
         now_s = telemetry.time_us * 1e-6

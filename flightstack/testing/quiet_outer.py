@@ -1,0 +1,164 @@
+"""Hands the arrays of monitor, guidance and outer loop to the kernel of nominal outer ticks."""
+
+from __future__ import annotations
+
+from operator import is_not
+from typing import Any
+
+import numpy as np
+
+from flightstack.commander.fault_detector import detect
+from flightstack.control.loops import PythonLoops
+from flightstack.core.arrays import store_outer_row
+from flightstack.core.contract import LoopFlags
+from flightstack.core.enums import Mode
+from flightstack.core.kernel_calls import address_of
+from flightstack.flight_log.flight_log import DEFAULT_CAPACITY, FlightLog, Trace
+from flightstack.flight_log.topics import OUTER
+from flightstack.guidance.fence import fence_step
+from flightstack.guidance.kernels import GoalArrays, goal_kernel
+from flightstack.guidance.mission import MissionProgress
+from flightstack.process.assembly import Stack
+from flightstack.vehicle.outer_kernel import (
+    AT,
+    COMMAND,
+    DETECT,
+    FENCE,
+    GUIDE,
+    MARKS,
+    OUTER_CALLS,
+    PROGRESS,
+    STORE,
+)
+
+_NEVER_M = -1.0
+"""A distance to the takeoff altitude that is never reached."""
+_FLAGS = int(LoopFlags.OUTER_DUE)
+
+
+def _bytes(memory: Any) -> Any:
+    return memory.reshape(-1).view(np.uint8)
+
+
+class QuietOuter:
+    """Nominal outer ticks of a vehicle whose loops are compiled Python."""
+
+    def __init__(self, stack: Stack, loops: PythonLoops) -> None:
+        parts, now = stack.parts, stack.now
+        self._now, self._recorder = now, stack.recorder
+        self._divisor = stack.rates.divisor
+        self._period_us = self._divisor * stack.rates.interval_us
+        self._navigator, self._autopilot = parts.navigator, parts.autopilot
+        self._fence, self._faults = parts.failsafes.fence, parts.failsafes.faults
+        self._takeoff, self._link = parts.takeoff, stack.simulator
+        self._marks = np.zeros(MARKS, np.int64)
+        self._state = _bytes(now.state)
+        self._seen = np.zeros_like(self._state)
+        self._progress = np.zeros(PROGRESS, np.int64)
+        self._control = loops.outer_arrays
+        columns = OUTER.size + len(self._recorder.estimate)
+        self._no_log = Trace(DEFAULT_CAPACITY, columns, lambda: None)
+        self._key: tuple[Any, ...] = (None,) * 9
+        self._arguments: tuple[Any, ...] = ()
+        self._seen_bytes = b""
+        self._progress_is: MissionProgress | None = None
+        self.calls = self._addresses(loops)
+        """Addresses of the kernels."""
+
+    def _addresses(self, loops: PythonLoops) -> Any:
+        now, faults, fence, goal = self._now, self._faults, self._fence, self._navigator.goal
+        target, _last_target, memory, parameters, last, outer_dt_s = self._control
+        calls = np.zeros(OUTER_CALLS, np.int64)
+        calls[FENCE] = address_of(fence_step, *fence.areas, fence.limits, now.state, fence.breach)
+        calls[DETECT] = address_of(
+            detect,
+            now.state,
+            now.setpoint,
+            now.row,
+            faults.rotors,
+            faults.detectors,
+            faults.limits,
+            False,
+            1.0,
+        )
+        calls[GUIDE] = address_of(
+            goal_kernel, 0, now.state, goal.trajectory, goal.mission, goal.plan, goal.jumps_left, goal.mode_target,
+            goal.land, target, 1.0, goal.params, 1.0, now.setpoint,
+        )  # fmt: skip
+        calls[COMMAND] = address_of(
+            loops.outer_kernel, now.state, now.setpoint, memory, parameters, last, outer_dt_s, target
+        )
+        calls[STORE] = address_of(
+            store_outer_row, self._no_log.rows[0], now.state, now.setpoint, target, _FLAGS
+        )
+        return calls
+
+    def room(self, time_us: int) -> int:
+        """Return for how many ticks from the outer tick at ``time_us`` the open log takes rows without other work."""
+        log = self._recorder.log
+        if log is None:
+            return self._no_log.capacity
+        until_battery = -((time_us - self._recorder.battery_due_us) // self._period_us)
+        return self._divisor * min(until_battery, log.outer.capacity - log.outer.n)
+
+    def arguments(self) -> tuple[Any, ...]:
+        """Return the kernel's argument ``outer``."""
+        now, log, link = self._now, self._recorder.log, self._link
+        trace = self._no_log if log is None else log.outer
+        self._marks[AT] = trace.n
+        if link.seen is not self._seen_bytes:
+            self._seen_bytes = link.seen
+            self._seen[:] = np.frombuffer(link.seen, np.uint8) if link.seen else 0
+        if now.progress is not self._progress_is:
+            self._progress_is = now.progress
+            self._progress[:] = now.progress
+        goal = self._navigator.goal
+        key = (
+            goal.plan, goal.jumps_left, self._navigator.modes, self._fence.arguments, self._faults.limits, trace,
+            now.status.mode, self._takeoff.altitude_m, now.behaviour,
+        )  # fmt: skip
+        if any(map(is_not, key, self._key)):
+            self._key, self._arguments = key, self._made(now.status.mode, goal, trace)
+        return self._arguments
+
+    def _made(self, mode: Mode, goal: GoalArrays, trace: Trace) -> tuple[Any, ...]:
+        setpoint, faults, fence = self._now.setpoint, self._faults, self._fence.arguments
+        memories = (
+            goal.trajectory, goal.mission, goal.mode_target, goal.land, goal.jumps_left, setpoint, faults.detectors,
+            faults.rotors, fence[-1],
+        )  # fmt: skip
+        views = tuple(_bytes(memory) for memory in memories)
+        acceptance_m = self._now.behaviour.altitude_acceptance_m if mode is Mode.TAKEOFF else _NEVER_M
+        is_mission = mode is Mode.MISSION
+        return (
+            self._marks,
+            (
+                self._state, self._seen, float(self._takeoff.altitude_m), float(acceptance_m), is_mission,
+                self._progress, False,
+            ),
+            fence,
+            (faults.rotors, faults.detectors, faults.limits),
+            (
+                self._navigator.modes[mode], goal.trajectory, goal.mission, goal.plan, goal.jumps_left,
+                goal.mode_target, goal.land, goal.params, goal.dt_s, setpoint,
+            ),
+            self._control,
+            (trace.rows, trace.times_us, OUTER.size, self._recorder.estimate, _FLAGS),
+            (views, tuple(np.zeros_like(view) for view in views)),
+        )  # fmt: skip
+
+    def pass_by(self, log: FlightLog | None, began_us: int, interval_us: int, rows: Any) -> int | None:
+        """Bring monitor, link and log to the time of the kernel; ``rows`` are those of the inner loop.
+
+        Return the index of the last outer tick among the ticks, None without one.
+        """
+        _at, outers, last, fell_us, found = self._marks.tolist()
+        if not outers:
+            return None
+        time_us = began_us + (last + 1) * interval_us
+        if log is not None:
+            log.outer.n += outers
+        self._seen_bytes = self._seen.tobytes()
+        self._link.pass_outer(time_us, self._seen_bytes)
+        self._autopilot.pass_outer(time_us, rows[last], found, fell_us)
+        return int(last)

@@ -1,0 +1,126 @@
+"""A nominal outer tick as compiled code: failsafe detectors, guidance and outer loop, for the kernel of quiet ticks.
+
+It calls the kernels that monitor, guidance and loops run in any other tick, on the same arrays and in the same order.
+If one of them finds an event, such as a breached fence, a reached mission item or ground contact, it puts their
+memories back as they were: the tick is then run in Python, which knows what follows from the event.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flightstack.commander.fault_detector import MOVING
+from flightstack.commander.ground_monitor import FALL_M_S
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import FloatArray
+from flightstack.core.kernel_calls import call_kernel, call_kernel_int
+from flightstack.guidance.land_detector import CONTACT_M_S
+
+FENCE, DETECT, GUIDE, COMMAND, STORE, OUTER_CALLS = range(6)
+"""Kernels by their index in ``calls``."""
+AT, OUTERS, LAST, FELL_US, FOUND, MARKS = range(6)
+"""Marks: index of the first row of the log, number of outer ticks, index of the last one among all ticks, time of the
+last fall or 0, bits of ``detect``."""
+CURRENT, REACHED, FINISHED, WANTS_RETURN, PROGRESS = range(5)
+"""Progress of the mission, by its index."""
+
+
+@compiled
+def copy_all(source: Any, target: Any) -> None:
+    """Copy an array of one dimension."""
+    for i in range(len(source)):
+        target[i] = source[i]
+
+
+@compiled
+def _are_equal(left: Any, right: Any) -> bool:
+    for i in range(len(left)):  # noqa: SIM110  # compiled code has no ``all``
+        if left[i] != right[i]:
+            return False
+    return True
+
+
+@compiled
+def _touches(land: FloatArray) -> bool:
+    """Return True if the land detector reports landed, or ground contact."""
+    return bool(land[0] > 0.0 or land[1] >= CONTACT_M_S)
+
+
+@compiled
+def _has_progress(mission: Any, progress: Any) -> bool:
+    """Return True if the mission has reached an item since ``progress``, or is at its end."""
+    m = mission[0]
+    is_over = m["finished"] or m["wants_return"]
+    return bool(is_over or m["current"] != progress[CURRENT] or m["reached"] != progress[REACHED])
+
+
+@compiled
+def _leaves_fence(calls: Any, fence: Any, state: FloatArray) -> bool:
+    is_active, areas, vertices, groups, limits, breach = fence
+    if not is_active:
+        return False
+    call_kernel(calls[FENCE], (areas, vertices, groups, limits, state, breach))
+    return bool(breach[0]["flags"] != 0)
+
+
+@compiled
+def _is_nominal(calls: Any, outer: Any, state: FloatArray, row: FloatArray) -> bool:
+    """Advance fence, detectors and guidance; return False after an event, when memories may have changed."""
+    marks, watch, fence, faults, guidance, control, _log, _saved = outer
+    state_bytes, seen, altitude_m, acceptance_m, is_mission, progress, on_ground = watch
+    number, trajectory, mission, plan, jumps_left, mode_target, land, params, dt_s, setpoint = guidance
+    rotors, detectors, limits = faults
+    if _are_equal(state_bytes, seen) or _touches(land) or (is_mission and _has_progress(mission, progress)):
+        return False
+    if abs(state[2] + altitude_m) <= acceptance_m or _leaves_fence(calls, fence, state):
+        return False
+    found = call_kernel_int(calls[DETECT], (state, setpoint, row, rotors, detectors, limits, on_ground, dt_s))
+    if found & ~MOVING != 0:
+        return False
+    marks[FOUND] = found
+    call_kernel(
+        calls[GUIDE],
+        (
+            number, state, trajectory, mission, plan, jumps_left, mode_target, land, control[0], rotors[0]["thrust"],
+            params, dt_s, setpoint,
+        ),
+    )  # fmt: skip
+    return not _touches(land)
+
+
+@compiled
+def guide(calls: Any, outer: Any, tick: int, time_us: int, state: FloatArray, row: FloatArray) -> bool:
+    """Run the outer tick ``tick`` up to the outer loop; return False, with nothing changed, if it is not nominal.
+
+    ``row`` is the newest row of the inner loop.
+    """
+    marks, watch, _fence, _faults, guidance, control, _log, saved = outer
+    memories, copies = saved
+    for k in range(len(memories)):
+        copy_all(memories[k], copies[k])
+    if not _is_nominal(calls, outer, state, row):
+        for k in range(len(memories)):
+            copy_all(copies[k], memories[k])
+        return False
+    copy_all(watch[0], watch[1])
+    if abs(state[5]) > FALL_M_S:
+        marks[FELL_US] = time_us
+    marks[LAST] = tick
+    target, last_target, memory, parameters, last, outer_dt_s = control
+    copy_all(target, last_target)
+    call_kernel(calls[COMMAND], (state, guidance[9], memory, parameters, last, outer_dt_s, target))
+    return True
+
+
+@compiled
+def note_outer(calls: Any, outer: Any, time_us: int, state: FloatArray) -> None:
+    """Record the outer tick, after its inner loop."""
+    marks, _watch, _fence, _faults, guidance, control, log, _saved = outer
+    rows, times_us, size, estimate, flags = log
+    at = marks[AT] + marks[OUTERS]
+    row = rows[at]
+    times_us[at] = time_us
+    call_kernel(calls[STORE], (row, state, guidance[9], control[0], flags))
+    for i in range(len(estimate)):
+        row[size + i] = estimate[i]
+    marks[OUTERS] += 1

@@ -1,0 +1,97 @@
+"""Outer periods of a world in which nothing happens are flown in one call; events come at the same tick as without."""
+
+from collections.abc import Callable
+
+import pytest
+
+from flightstack.testing import World
+from flightstack.testing.quiet_block import QuietBlock
+from tests.support.bytes_engine import BytesEngine
+
+
+def mission(world: World) -> None:
+    """Fly a mission to its end."""
+    world.upload("square")
+    assert world.fly().completed
+
+
+def fence(world: World) -> None:
+    """Fly out of a fence, and find that it has become smaller."""
+    world.param_set("GF_MAX_HOR_DIST", 6.0)
+    world.param_set("GF_ACTION", 3)
+    world.takeoff(3.0)
+    world.run_for(5.0)
+    world.goto(5.0, 0.0)
+    world.run_for(4.0)
+    world.param_set("GF_MAX_HOR_DIST", 3.0)
+    world.run_for(10.0)
+
+
+def lost_link(world: World) -> None:
+    """Lose the ground station, and find it again."""
+    world.param_set("NAV_DLL_ACT", 2)
+    world.takeoff(3.0)
+    world.run_for(3.0)
+    world.link.cut()
+    world.run_for(20.0)
+    world.link.restore()
+    world.run_for(3.0)
+
+
+def bad_link(world: World) -> None:
+    """Order over a link with delay, loss and duplicates."""
+    world.takeoff(3.0)
+    world.run_for(2.0)
+    world.link.delay_s(0.0731)
+    world.link.loss(0.2)
+    world.link.duplication(0.2)
+    world.goto(1.0, 1.0)
+    world.run_for(2.0)
+    world.rtl()
+    world.run_for(8.0)
+
+
+def empty_battery(world: World) -> None:
+    """Fly until the charge is low."""
+    world.takeoff(3.0)
+    world.run_for(2.0)
+    world.fault("battery:level=0.1")
+    world.run_for(8.0)
+
+
+def timer(world: World) -> None:
+    """Act at a time between two exchanges."""
+    world.takeoff(3.0)
+    world.after(3.333, lambda: world.fault("rotor:1:weak=0.8"))
+    world.run_for(5.0)
+    world.run_on(0.5)
+
+
+@pytest.mark.parametrize("fly", [mission, fence, lost_link, bad_link, empty_battery, timer])
+@pytest.mark.parametrize("state", ["truth", "estimated"])
+def test_a_flight_is_the_same_as_by_single_ticks_with_bytes(fly: Callable[[World], None], state: str) -> None:
+    def flown(world: World) -> tuple[bytes, list[str], list[int], dict[str, int], float]:
+        world.wait_until_ready()
+        fly(world)
+        return world.engine.newest_log(), world.texts, world.reached, world.gcs.counts, world.time_s
+
+    conditions = {"state": state, "vehicle": "x_quad", "seed": 5}
+    with World(**conditions) as quiet, World(make_engine=BytesEngine, **conditions) as exchanged:
+        assert flown(quiet) == flown(exchanged)
+
+
+def test_one_call_flies_many_periods(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[int] = []
+    run = QuietBlock.run
+
+    def counted(block: QuietBlock, count: int, is_taken: bool = False) -> int:
+        calls.append(run(block, count, is_taken))
+        return calls[-1]
+
+    with World(state="truth") as world:
+        world.takeoff(2.0)
+        world.run_for(4.0)
+        monkeypatch.setattr(QuietBlock, "run", counted)
+        world.run_for(1.0)
+    assert sum(calls) >= 0.99 * 500
+    assert len(calls) <= 500 / 20  # the battery reports ten times a second: 50 ticks at most
