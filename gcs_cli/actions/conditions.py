@@ -42,7 +42,8 @@ def _battery_percent(view: VehicleView) -> float | None:
     return None if remaining is None else remaining * 100.0
 
 
-def _distance_home_m(view: VehicleView) -> float | None:
+def distance_home_m(view: VehicleView) -> float | None:
+    """Return the horizontal distance from home [m]; None if unknown."""
     if view.home is None or view.geo is None:
         return None
     return horizontal_m(view.geo, view.home)
@@ -58,7 +59,7 @@ QUANTITIES: Mapping[str, _Quantity] = {
     "altitude": _Quantity(lambda view: view.relative_altitude_m, "m"),
     "speed": _Quantity(lambda view: view.ground_speed_m_s, "m/s"),
     "heading": _Quantity(_heading_deg, "deg"),
-    "distance": _Quantity(_distance_home_m, "m"),
+    "distance": _Quantity(distance_home_m, "m"),
     "battery": _Quantity(_battery_percent, "%"),
     "item": _Quantity(lambda view: view.mission.current),
     "reached": _Quantity(lambda view: view.mission.reached),

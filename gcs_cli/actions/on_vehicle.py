@@ -30,7 +30,9 @@ def disarm(*, force: bool = False) -> Action:
     """Disarm the vehicle; with ``force`` in the air too."""
     command = common_commands.FORCE_DISARM if force else common_commands.DISARM
     step = Step("disarming", command, lambda view: not view.armed, "is still armed")
-    return Action("disarm", lambda _view: (step,), "disarming", "disarmed", {"force": force})
+    return Action(
+        "disarm", lambda _view: (step,), "disarming", "disarmed", {"force": force}, stops_rotors=True
+    )
 
 
 def select_mode(name: str) -> Action:
@@ -117,7 +119,8 @@ def terminate() -> Action:
         lambda view: view.terminated or not view.armed,
         "is still armed",
     )
-    return Action("terminate", lambda _view: (step,), "terminating the flight", "flight terminated")
+    doing, done = "terminating the flight", "flight terminated"
+    return Action("terminate", lambda _view: (step,), doing, done, stops_rotors=True)
 
 
 def inject_failure(unit: str, failure: str, instance: int = 0) -> Action:

@@ -25,14 +25,18 @@ from flightstack.mavlink.ftp_messages import (
     read_packet,
 )
 from flightstack.mavlink.link import Address, Message, is_for, is_from
+from gcs_cli.clients.answer_timeout import AnswerTimeout
 
 RETRY_S = 0.3
 """Time after which a request is sent again, before a round trip was measured."""
-SOONEST_RETRY_S = 0.1
+SOONEST_RETRY_S, LATEST_RETRY_S = 0.1, 4.0
 SILENCE_S = 6.0
-"""Longest time without progress before an operation fails."""
+"""Longest time without progress before an operation fails; at least ``SILENT_ROUND_TRIPS``."""
+SILENT_ROUND_TRIPS = 10
 BURST_BYTES = 500 * MAX_DATA
 """Largest burst. If more than a tenth of it is missing, another burst is requested."""
+BURST_NUMBERS = 1000
+"""Sequence numbers between two bursts: a late answer shows which burst it belongs to."""
 FEW = 50
 MAX_READS = 16
 """Largest number of pending single requests."""
@@ -61,7 +65,7 @@ class FtpFailed(NamedTuple):
 class FtpClient:
     """One operation at a time with one vehicle; a new one replaces the current one.
 
-    An operation fails after ``silence_s`` without progress.
+    An operation fails after ``silence_s`` without progress, later on a link whose round trip takes seconds.
     """
 
     def __init__(self, vehicle: Address, own: Address, silence_s: float = SILENCE_S) -> None:
@@ -80,14 +84,18 @@ class FtpClient:
         self._entries: list[Entry] = []
         self._offset = 0
         self._burst: Packet | None = None
+        self._bursts: dict[int, float] = {}
+        """Sequence number of the first answer → time of the request, of this burst and of late ones."""
         self._reads: dict[int, tuple[int, int, float]] = {}
         """Sequence number of the answer → offset, count and time of the request."""
         self._path = b""
         self._retry_s: float | None = None
         self._progress_s = math.inf
-        self._sent_s: float | None = None
-        """Time of the pending request if it was sent once, so that its answer measures the round trip."""
-        self._timeout_s = RETRY_S
+        self._sent_s = -math.inf
+        """Time of the pending request."""
+        self._is_repeated = False
+        """True if that was sent again, so that its answer does not measure the round trip."""
+        self._timeout = AnswerTimeout(RETRY_S, SOONEST_RETRY_S, LATEST_RETRY_S)
 
     def start_download(self, path: str) -> None:
         """Download the file at ``path``."""
@@ -127,12 +135,15 @@ class FtpClient:
         """Return the messages to send now."""
         if self.result is None and self._retry_s is not None and now_s >= self._retry_s:
             self._progress_s = min(self._progress_s, now_s)  # counted from the first poll
-            if now_s - self._progress_s >= self._silence_s:
+            silence_s = max(self._silence_s, SILENT_ROUND_TRIPS * self._timeout.round_trip_s)
+            if now_s - self._progress_s >= silence_s:
                 self._end(FtpFailed(f"the vehicle (system {self.vehicle.system}) does not answer"))
             elif self._request is not None:
+                self._is_repeated = self._retry_s != -math.inf
+                if not self._is_repeated:
+                    self._sent_s = now_s
                 self._outbox.append(self._request)
-                self._sent_s = now_s if self._retry_s == -math.inf else None
-                self._retry_s = now_s + self._timeout_s
+                self._retry_s = now_s + max(RETRY_S, self._timeout.round_trip_s)
             elif self._file is not None:
                 self._burst = None
                 self._fetch(self._file, now_s)
@@ -151,7 +162,7 @@ class FtpClient:
         if self.result is None and self._session is not None:
             self._end(FtpFailed("the operation was cancelled"))
         self.result, self._file, self._session, self._burst = None, None, None, None
-        self._entries, self._offset, self._reads = [], 0, {}
+        self._entries, self._offset, self._reads, self._bursts = [], 0, {}, {}
         self._path = path.encode()[:MAX_DATA]
         self._progress_s = math.inf
 
@@ -167,8 +178,8 @@ class FtpClient:
                 self._ask(Opcode(request.opcode))  # it answers an earlier client: use another number
             return
         self._progress_s = now_s
-        if self._sent_s is not None:
-            self._learn(now_s - self._sent_s)
+        if not self._is_repeated:
+            self._timeout.measure(now_s - self._sent_s)
         if packet.opcode == Opcode.NAK:
             self._on_refusal(request, packet)
         elif request.opcode == Opcode.LIST_DIRECTORY:
@@ -211,12 +222,12 @@ class FtpClient:
 
     def _on_data(self, file: PartialFile, packet: Packet, now_s: float) -> None:
         if packet.request == Opcode.BURST_READ_FILE:
-            is_over = self._on_burst(packet)
+            is_over = self._on_burst(packet, now_s)
             if is_over is None:
                 return
         elif packet.request == Opcode.READ_FILE and packet.sequence in self._reads:
             _, _, asked_s = self._reads.pop(packet.sequence)
-            self._learn(now_s - asked_s)
+            self._timeout.measure(now_s - asked_s)
             is_over = True
         else:
             return
@@ -229,14 +240,17 @@ class FtpClient:
         if is_over or not file.left:
             self._fetch(file, now_s)
         else:
-            self._retry_s = now_s + self._timeout_s
+            self._retry_s = now_s + self._timeout.value_s
 
-    def _on_burst(self, packet: Packet) -> bool | None:
-        """Return True if the burst is complete; None if the packet belongs to an older one."""
-        burst = self._burst
-        if burst is None or packet.offset < burst.offset:
-            return None
-        if (packet.sequence - next_sequence(burst.sequence)) % (2 * _HALF) >= _HALF:
+    def _on_burst(self, packet: Packet, now_s: float) -> bool | None:
+        """Return True if the burst is complete, False if there is more; None if the packet is an older one's."""
+        burst, sent_s = self._burst, self._bursts.get(packet.sequence)
+        if sent_s is not None:
+            self._timeout.measure(now_s - sent_s)
+        if burst is None or (packet.sequence - next_sequence(burst.sequence)) % (2 * _HALF) >= _HALF:
+            is_late = any((packet.sequence - first) % (2 * _HALF) < BURST_NUMBERS for first in self._bursts)
+            return False if is_late else None
+        if packet.offset < burst.offset:
             return None
         if (packet.sequence - self._sequence) % (2 * _HALF) < _HALF:
             self._sequence = next_sequence(packet.sequence)  # no later request shares numbers with this burst
@@ -257,28 +271,31 @@ class FtpClient:
 
     def _fetch(self, file: PartialFile, now_s: float) -> None:
         """Request missing data: many blocks in a burst, few one by one."""
-        self._retry_s = now_s + self._timeout_s
+        self._retry_s = now_s + self._timeout.value_s
         if not file.left:
             self._end(FtpDone(bytes(file.content)))
         elif self._burst is None:
             first = file.first
             if file.within(first, first + BURST_BYTES) > FEW * MAX_DATA:
                 self._reads.clear()
+                self._bursts = {key: s for key, s in self._bursts.items() if now_s < s + LATEST_RETRY_S}
                 self._burst = self._packet(Opcode.BURST_READ_FILE, size=MAX_DATA, offset=first)
                 self._outbox.append(self._burst)
+                self._bursts[next_sequence(self._burst.sequence)] = now_s
+                self._sequence = (self._burst.sequence + BURST_NUMBERS) % (2 * _HALF)
             else:
                 self._read_pieces(file, now_s)
 
     def _read_pieces(self, file: PartialFile, now_s: float) -> None:
-        self._reads = {key: read for key, read in self._reads.items() if now_s < read[2] + self._timeout_s}
-        asked = {(offset, count) for offset, count, _ in self._reads.values()}
+        self._reads = {key: read for key, read in self._reads.items() if now_s < read[2] + LATEST_RETRY_S}
+        waiting = [read for read in self._reads.values() if now_s < read[2] + self._timeout.value_s]
+        asked = {(offset, count) for offset, count, _ in waiting}
         for offset, count in self._wanted(file, asked):
             read = self._packet(Opcode.READ_FILE, size=count, offset=offset)
-            self._reads[next_sequence(read.sequence)] = (offset, count, now_s)
+            waiting.append((offset, count, now_s))
+            self._reads[next_sequence(read.sequence)] = waiting[-1]
             self._outbox.append(read)
-        self._retry_s = (
-            min((asked_s for _, _, asked_s in self._reads.values()), default=now_s) + self._timeout_s
-        )
+        self._retry_s = min((asked_s for _, _, asked_s in waiting), default=now_s) + self._timeout.value_s
 
     def _wanted(self, file: PartialFile, asked: set[tuple[int, int]]) -> Iterator[tuple[int, int]]:
         room = MAX_READS - len(asked)
@@ -290,11 +307,6 @@ class FtpClient:
                 yield piece
 
     # -- helpers
-
-    def _learn(self, answer_s: float) -> None:
-        """Set the timeout to three round trips; the influence of a slow one decays."""
-        wanted_s = min(RETRY_S, max(SOONEST_RETRY_S, 3.0 * answer_s))
-        self._timeout_s = max(wanted_s, 0.5 * self._timeout_s + 0.5 * wanted_s)
 
     def _packet(self, opcode: Opcode, *, size: int = 0, offset: int = 0, data: bytes = b"") -> Packet:
         packet = Packet(self._sequence, self._session or 0, opcode, size, offset=offset, data=data)

@@ -63,6 +63,7 @@ class MissionClient:
         self._sends_left = 0
         self._is_settling = False
         self._busy_s = -math.inf  # time of the last message of the protocol
+        self._ended_s: float | None = None  # time of the last one since the end of the operation
 
     def start_upload(self, items: Sequence[MissionItem]) -> None:
         """Replace the vehicle's mission by ``items``; without items, clear it."""
@@ -125,6 +126,8 @@ class MissionClient:
                 return
         elif kind != "MISSION_CURRENT":
             return
+        if operation.result is not None and self._belongs_to_others(kind, now_s):
+            return
         self._busy_s = now_s
         if self._is_settling:
             self._receive_early(kind, now_s)
@@ -157,6 +160,8 @@ class MissionClient:
                 if operation.waits_for_item:
                     self._item_timeout.asked(now_s, again=True)
                 self._wait(operation, now_s)
+        if operation is not None and operation.result is not None and self._ended_s is None:
+            self._ended_s = now_s
         outbox, self._outbox = self._outbox, []
         if outbox:
             self._busy_s = now_s
@@ -168,7 +173,7 @@ class MissionClient:
 
     def _start(self, operation: Operation) -> None:
         self.cancel()
-        before, self._operation = self._operation, operation
+        before, self._operation, self._ended_s = self._operation, operation, None
         self._item_timeout = ItemTimeout(self._timing.item_timeout_s)
         self._deadline_s = -math.inf  # the first poll sends the request and starts the clock
         quiet_s = operation.quiet_after(before, self._timing) if before is not None else 0.0
@@ -176,6 +181,19 @@ class MissionClient:
             self._deadline_s = self._busy_s + quiet_s
         self._is_settling = quiet_s > 0.0
         self._sends_left = self._timing.retries + 1
+
+    def _belongs_to_others(self, kind: str, now_s: float) -> bool:
+        """Return True if the message came too late after the end of the operation to belong to it.
+
+        Another program may use the same address, such as ``gcs mission upload`` on the link of ``gcs watch``: the
+        requests of its upload are not to be answered with items of this one.
+        """
+        if kind == "MISSION_CURRENT":
+            return True
+        is_late = self._ended_s is not None and now_s > self._ended_s + self._timing.settle_s
+        if not is_late:
+            self._ended_s = now_s
+        return is_late
 
     def _receive_early(self, kind: str, now_s: float) -> None:
         """Process a message of the previous operation: cancel it if the vehicle still requests items."""

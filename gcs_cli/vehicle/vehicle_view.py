@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.portable_math import euler_angles
 from flightstack.mavlink.dialect import NAME_IN_VERSION, mavlink
 from gcs_cli.vehicle import mission_fold
@@ -28,6 +29,7 @@ from gcs_cli.vehicle.view_types import (
 _NO_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID: a ground station, a camera …
 _ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 _IGNORE_POSITION, _IGNORE_VELOCITY, _IGNORE_YAW = 0b111, 0b111000, 1 << 10  # POSITION_TARGET_TYPEMASK
+_RELATIVE_FRAMES = (3, 6)  # MAV_FRAME_GLOBAL_RELATIVE_ALT and its twin for integers
 _IGNORE_ATTITUDE = 128  # ATTITUDE_TARGET_TYPEMASK
 _PREARM_CHECK = 1 << 28  # MAV_SYS_STATUS_PREARM_CHECK: no sensor
 _MOST_ROTORS = 16
@@ -92,6 +94,8 @@ def _euler(q: Any) -> Euler | None:
 def _heartbeat(view: VehicleView, message: Any, now_s: float) -> VehicleView:
     armed = bool(message.base_mode & _ARMED)
     mode = mode_name(view, message.custom_mode)
+    if view.setpoint is not None and view.setpoint.is_global and (mode, armed) != (view.mode, view.armed):
+        view = view._replace(setpoint=None)  # sent only in modes that have one
     return view._replace(
         last_heartbeat_s=now_s,
         mode=mode,
@@ -259,6 +263,20 @@ def _position_target(view: VehicleView, message: Any, _now_s: float) -> VehicleV
     return view._replace(setpoint=Setpoint(position, velocity, yaw), time_s=message.time_boot_ms / 1e3)
 
 
+def _global_target(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+    """Take the setpoint of a vehicle that does not send it in its local frame (ArduPilot)."""
+    now, geo = view.position_ned_m, view.geo
+    is_local = view.setpoint is not None and not view.setpoint.is_global
+    if is_local or message.type_mask & _IGNORE_POSITION or now is None or geo is None:
+        return view
+    is_relative = message.coordinate_frame in _RELATIVE_FRAMES
+    height_m = geo.relative_altitude_m if is_relative else geo.altitude_m
+    frame = LocalFrame(GeoPoint(geo.latitude_deg, geo.longitude_deg, height_m))
+    ahead = frame.to_ned(GeoPoint(message.lat_int / 1e7, message.lon_int / 1e7, message.alt))
+    place = _vector(now.x + ahead.x, now.y + ahead.y, now.z + ahead.z)
+    return view._replace(setpoint=Setpoint(place, is_global=True), time_s=message.time_boot_ms / 1e3)
+
+
 def _hud(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     return view._replace(heading_deg=float(message.heading % 360), throttle=message.throttle / 100)
 
@@ -327,6 +345,7 @@ FOLDS: dict[str, Callable[[VehicleView, Any, float], VehicleView]] = {
     "GLOBAL_POSITION_INT": _global_position,
     "HOME_POSITION": _home,
     "POSITION_TARGET_LOCAL_NED": _position_target,
+    "POSITION_TARGET_GLOBAL_INT": _global_target,
     "VFR_HUD": _hud,
     "EXTENDED_SYS_STATE": _extended_state,
     "MISSION_CURRENT": mission_fold.after_current,

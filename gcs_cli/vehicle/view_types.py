@@ -83,6 +83,8 @@ class Setpoint(NamedTuple):
     position_ned_m: Vector | None = None
     velocity_ned_m_s: Vector | None = None
     yaw_rad: float | None = None
+    is_global: bool = False
+    """True if the vehicle sent it as latitude and longitude; the message then ends with the mode."""
 
 
 class Mission(NamedTuple):

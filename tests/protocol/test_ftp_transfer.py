@@ -78,6 +78,32 @@ def test_a_file_is_identical_over_a_link_that_loses_a_third(seed: int) -> None:
     assert download("big.bin", LOSSY, seed, limit_s=25.0) == FtpDone(BIG)
 
 
+@pytest.mark.parametrize(("delay_s", "loss", "most_s"), [(0.3, 0.0, 4.0), (1.0, 0.0, 12.0), (1.0, 0.1, 30.0)])
+def test_a_file_is_identical_over_a_link_with_delay(delay_s: float, loss: float, most_s: float) -> None:
+    # 2.9 s, 10 s and 20 s: a round trip to open, one for each of three bursts, and those of repeated requests
+    assert download("big.bin", Conditions(loss, delay_s=delay_s), 1, limit_s=most_s) == FtpDone(BIG)
+
+
+def test_directory_is_listed_over_a_link_with_delay() -> None:
+    client = FtpClient(VEHICLE, GCS)
+    client.start_list("@MAV_LOG")
+    ether = Ether(FtpServer(VEHICLE, tree()), Station(client, Conditions(delay_s=1.0)))
+    assert ether.run(lambda: client.result is not None) == pytest.approx(4.0, abs=0.3)
+    assert client.result == FtpDone(entries=(Entry("one.ulg", 5), Entry("two.ulg", 1000)))
+
+
+def test_download_continues_as_the_delay_of_the_link_grows() -> None:
+    client = FtpClient(VEHICLE, GCS)
+    client.start_download("big.bin")
+    station = Station(client, Conditions(delay_s=0.02))
+    ether = Ether(FtpServer(VEHICLE, tree()), station)
+    ether.run(lambda: client.progress[0] > 50_000)
+    for end in (station.wire.one, station.wire.two):
+        end.conditions = Conditions(delay_s=1.0)
+    ether.run(lambda: client.result is not None, 12.0)
+    assert client.result == FtpDone(BIG)
+
+
 @pytest.mark.parametrize("seed", range(4 if NIGHTLY else 2))
 def test_half_of_all_packets_may_get_lost(seed: int) -> None:
     conditions = LOSSY._replace(loss=0.5)

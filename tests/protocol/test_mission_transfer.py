@@ -6,7 +6,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from flightstack.mavlink.mission_messages import ItemTimeout
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.mission_messages import DEFAULT_TIMING, ItemTimeout
 from flightstack.plan import Command, Frame, MissionItem, MissionResult, MissionType, check_mission, load_plan
 from flightstack.services.mission.mission_store import (
     CurrentRequested,
@@ -142,6 +143,22 @@ def test_a_second_uploader_is_denied_and_does_no_harm() -> None:
     assert two.result.result == MissionResult.DENIED
     assert world.server.items() == mission(5, mark=1)
     assert any(isinstance(event, MissionRefused) and "another" in event.reason for event in world.events)
+
+
+@pytest.mark.parametrize(
+    "items", [mission(8), (waypoint(), waypoint(altitude_m=-9.0))], ids=["done", "refused"]
+)
+def test_an_ended_upload_answers_no_requests_to_others_at_its_address(items: tuple[MissionItem, ...]) -> None:
+    """As ``gcs watch`` and ``gcs mission upload``, which share a link."""
+    station = GroundStation("a")
+    world = World(station)
+    result = world.upload("a", items)
+    assert isinstance(result, Done) == (len(items) == 8)
+    for seq in range(2):
+        request = mavlink.MAVLink_mission_request_int_message(255, 190, seq, MissionType.MISSION)
+        (received,) = station.codec.decode(station.vehicle_codec.encode(request))
+        station.client.receive(received, world.now_s + DEFAULT_TIMING.settle_s + 0.01)
+        assert station.client.poll(world.now_s) == []
 
 
 def test_a_download_during_a_replacement_is_all_old() -> None:

@@ -117,6 +117,8 @@ def drive(
     size=(80, 24),
     values=VALUES,
     infos=INFOS,
+    *,
+    downloads=True,
 ) -> None:
     app = WatchApp(StillFeed(VIEW))
 
@@ -127,8 +129,9 @@ def drive(
         assert isinstance(screen, ParamScreen)
         screen.show(VIEW, 10.0)
         await pilot.pause()
-        app.feed.jobs[-1][1].set_result((params(values), infos))
-        await pilot.pause()
+        if downloads:
+            app.feed.jobs[-1][1].set_result((params(values), infos))
+            await pilot.pause()
         await story(pilot, app, screen)
 
     run_story(app, begin, size=size)
@@ -171,6 +174,22 @@ def test_search_and_changed_only_filter_the_table():
         assert screen.names_shown == ["MPC_XY_CRUISE"]
 
     drive(story)
+
+
+def test_search_opens_while_the_parameters_are_downloaded():
+    """Else the letters typed after ``/`` were keys: a capital R returns to launch."""
+
+    async def story(pilot, app, screen):
+        screen.show(VIEW, 10.0)
+        await pilot.press("slash", "r", "t", "l", "R", "T", "L")
+        assert screen.query_one(Input).value == "rtlRTL"
+        assert len(app.feed.jobs) == 1  # the download
+        await pilot.press(*["backspace"] * 3)
+        app.feed.jobs[-1][1].set_result((params(), INFOS))
+        await pilot.pause()
+        assert screen.names_shown == ["RTL_RETURN_ALT"]
+
+    drive(story, downloads=False)
 
 
 def test_edit_shows_the_value_that_the_vehicle_confirms():

@@ -8,6 +8,7 @@ import pytest
 from typer.core import TyperGroup
 from typer.main import get_command
 
+from flightstack.mavlink.link import Address
 from gcs_cli.actions import in_flight, in_mission, on_vehicle
 from gcs_cli.actions.action import Action
 from gcs_cli.actions.conditions import ConditionError, parse_condition
@@ -15,6 +16,7 @@ from gcs_cli.actions.run import ActionRun, Outcome, Result
 from gcs_cli.clients.command_client import ModeClient
 from gcs_cli.commands import actions
 from gcs_cli.vehicle.view_types import VehicleView
+from tests.support.folded_vehicle import Vehicle, heartbeat
 from tests.support.truth import World
 
 LIMIT_S = 200.0
@@ -144,6 +146,26 @@ def test_a_refused_start_names_the_item_where_the_mission_continues(world: World
     )
     assert perform(world, in_mission.jump(0)).outcome is Outcome.DONE
     assert perform(world, in_flight.start_mission()).outcome is Outcome.DONE
+
+
+@pytest.mark.parametrize(
+    "action", [on_vehicle.terminate(), on_vehicle.disarm(force=True)], ids=lambda a: a.name
+)
+def test_rotors_are_stopped_also_without_a_heartbeat(action: Action) -> None:
+    """The vehicle may still receive: a busy ground station, or a link that fails in one direction."""
+    vehicle = Vehicle()
+    vehicle.send(heartbeat(base=129))
+    run = ActionRun(action, lambda: vehicle.view, 1.0, Address(255, 190))
+    for now_s in range(20, 60):
+        if run.result is None:
+            sent = run.poll(float(now_s))
+            assert now_s > 20 or [message.get_type() for message in sent] == ["COMMAND_LONG"]
+    assert run.result is not None
+    assert run.result.outcome is Outcome.SILENT
+    run = ActionRun(in_flight.takeoff(5.0), lambda: vehicle.view, 1.0, Address(255, 190))
+    assert run.poll(20.0) == []
+    assert run.result is not None
+    assert run.result.sentence == "takeoff: the vehicle was lost"
 
 
 def test_termination_ends_when_the_vehicle_reports_it(flying: World) -> None:

@@ -155,6 +155,21 @@ def test_cursor_shows_its_time_and_the_values_there():
     assert "−29.80 s" in rows[-1]
 
 
+@pytest.mark.parametrize("cursor_s", [29.0, 30.0, 31.0, 45.0])
+def test_time_at_the_cursor_covers_no_part_of_a_label(cursor_s: float):
+    labels = drawn([RAMP], Span(0.0, 60.0, cursor_s))[-1].split("s")[:-1]
+    assert {float(label.replace("−", "-")) for label in labels} <= {
+        -60,
+        -50,
+        -40,
+        -30,
+        -20,
+        -10,
+        0,
+        cursor_s - 60,
+    }
+
+
 def test_column_of_the_cursor_gives_its_time():
     gutter = gutter_of([RAMP], SPAN, 14)
     assert cell_time(gutter, SPAN, gutter, 60 + gutter) == pytest.approx(0.5)

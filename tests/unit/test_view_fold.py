@@ -15,7 +15,7 @@ from flightstack.mavlink.link import Link
 from gcs_cli.vehicle.status_texts import PIECE_TIMEOUT_S
 from gcs_cli.vehicle.vehicle_view import update
 from gcs_cli.vehicle.view_types import TEXTS_KEPT, VehicleView
-from tests.support.folded_vehicle import Vehicle, heartbeat
+from tests.support.folded_vehicle import HOLD_MODE, Vehicle, heartbeat
 
 NAN, INF = math.nan, math.inf
 
@@ -80,10 +80,38 @@ def test_setpoint_leaves_out_what_the_mask_ignores(vehicle: Vehicle) -> None:
         )
 
     view = vehicle.send(target(0))
-    assert view.setpoint == ((1, 2, 3), (4, 5, 6), 0.5)
-    assert vehicle.send(target(0b111)).setpoint == (None, (4, 5, 6), 0.5)
-    assert vehicle.send(target(0b111 << 3 | 1 << 10)).setpoint == ((1, 2, 3), None, None)
-    assert vehicle.send(target(0, NAN)).setpoint == (None, (4, 5, 6), 0.5)
+    assert view.setpoint == ((1, 2, 3), (4, 5, 6), 0.5, False)
+    assert vehicle.send(target(0b111)).setpoint == (None, (4, 5, 6), 0.5, False)
+    assert vehicle.send(target(0b111 << 3 | 1 << 10)).setpoint == ((1, 2, 3), None, None, False)
+    assert vehicle.send(target(0, NAN)).setpoint == (None, (4, 5, 6), 0.5, False)
+
+
+def test_setpoint_of_ardupilot_is_global_and_ends_with_the_mode(vehicle: Vehicle) -> None:
+    def target(frame: int, altitude_m: float, mask: int = 0xFFF8) -> Any:
+        return mavlink.MAVLink_position_target_global_int_message(
+            0, frame, mask, 473980000, 85460000, altitude_m, 0, 0, 0, 0, 0, 0, 0, 0
+        )
+
+    assert vehicle.send(target(0, 500.0)).setpoint is None  # the vehicle's own position is unknown
+    vehicle.send(mavlink.MAVLink_local_position_ned_message(0, 10, 20, -5, 0, 0, 0))
+    vehicle.send(
+        mavlink.MAVLink_global_position_int_message(0, 473970000, 85450000, 493_000, 3_000, 0, 0, 0, 0)
+    )
+    assert vehicle.send(target(0, 500.0, 7)).setpoint is None
+    for frame, altitude_m in ((0, 500.0), (5, 500.0), (3, 10.0), (6, 10.0)):
+        setpoint = vehicle.send(target(frame, altitude_m)).setpoint
+        assert setpoint is not None
+        # 1e-3 degrees at 47 degrees north: 111.18 m and 75.49 m
+        assert setpoint.position_ned_m == pytest.approx((121.18, 95.49, -12.0), abs=0.01)
+        assert setpoint.velocity_ned_m_s is None
+    assert vehicle.send(heartbeat()).setpoint is not None
+    assert vehicle.send(heartbeat(mode=HOLD_MODE)).setpoint is None
+    vehicle.send(
+        mavlink.MAVLink_position_target_local_ned_message(0, 1, 0, 1, 2, 3, 4, 5, 6, 0, 0, 0, 0.5, 0)
+    )
+    local = vehicle.view.setpoint
+    assert vehicle.send(target(0, 500.0)).setpoint == local
+    assert vehicle.send(heartbeat()).setpoint == local
 
 
 def test_attitude_target_is_shown_as_angles(vehicle: Vehicle) -> None:
@@ -268,8 +296,8 @@ def _raw_frame(message_id: int, payload: bytes) -> Any:
 
 ardupilot_dialect()
 FOLDED = [
-    0, 1, 2, 24, 30, 32, 33, 39, 42, 44, 46, 73, 74, 83, 85, 147, 148, 162, 168, 193, 230, 231, 242, 245, 253, 291, 435,
-    11030, 11031, 53002,
+    0, 1, 2, 24, 30, 32, 33, 39, 42, 44, 46, 73, 74, 83, 85, 87, 147, 148, 162, 168, 193, 230, 231, 242, 245, 253, 291,
+    435, 11030, 11031, 53002,
 ]  # fmt: skip
 
 

@@ -144,6 +144,18 @@ def test_tape_marks_the_setpoint_and_centres_the_value() -> None:
     assert "◂" in drawn(flight_display, far, 60, 14).splitlines()[0]
 
 
+def test_target_altitude_and_distance_from_home_count_from_home() -> None:
+    """The local origin is where the estimator began: neither below nor beside a home that was set later."""
+    assert FULL.geo is not None
+    moved = FULL._replace(
+        geo=FULL.geo._replace(relative_altitude_m=2.0),
+        home=FULL.geo._replace(latitude_deg=FULL.geo.latitude_deg - 1e-3, altitude_m=491.0),
+    )
+    middle = drawn(flight_display, moved, 60, 14).splitlines()[6]
+    assert "◀ 2.0" in middle  # value and setpoint, 5 m above the origin, are at one place
+    assert "from home  111.2 m" in drawn(position_panel, moved, height=9)
+
+
 def test_trends_show_the_newest_value_and_the_range() -> None:
     series = partial(flown_history().series, system_id=1)
     text = plain(trends_panel(series, 10.0, 40, 30, DARK))

@@ -25,13 +25,14 @@ def flight_display(view: VehicleView, _now_s: float, width: int, height: int, co
     rows = max(1, height - 1 - len(figures))
     picture = horizon(view.attitude, max(1, width - 2 * _TAPE), rows, colours)
     speed_m_s, target_m_s = ground_speed(view.velocity_ned_m_s), None
-    target_height_m = None
+    now_height_m, target_height_m = height_m(view), None
     if view.setpoint is not None:
         target_m_s = ground_speed(view.setpoint.velocity_ned_m_s)
-        place = view.setpoint.position_ned_m
-        target_height_m = None if place is None else -place.z
+        wanted, now = view.setpoint.position_ned_m, view.position_ned_m
+        if wanted is not None and now is not None and now_height_m is not None:
+            target_height_m = now_height_m + now.z - wanted.z  # the local origin is not at home
     speeds = _tape(speed_m_s, target_m_s, rows, 0.5 if (speed_m_s or 0.0) < _FAST_M_S else 1.0, colours)
-    heights = _tape(height_m(view), target_height_m, rows, 1.0, colours, on_right=True)
+    heights = _tape(now_height_m, target_height_m, rows, 1.0, colours, on_right=True)
     lines = [
         Runs((*left, *middle, *right)) for left, middle, right in zip(speeds, picture, heights, strict=True)
     ]

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from rich.text import Text
 
+from gcs_cli.actions.conditions import distance_home_m
 from gcs_cli.tui.palette import DARK, Palette
 from gcs_cli.vehicle.field_units import UNKNOWN, number
 from gcs_cli.vehicle.view_types import Setpoint, StatusText, Vector, VehicleView
@@ -92,8 +93,8 @@ def position_panel(view: VehicleView, _now_s: float, width: int, height: int, co
     if geo is not None:
         lines.append(Text(f"{geo.latitude_deg:.6f}° {geo.longitude_deg:.6f}°", colours.muted))
         lines.append(row_of("above sea", f"{geo.altitude_m:.1f} m", colours.text, colours))
-    if view.home is not None and position is not None:
-        distance_m = math.hypot(position.x, position.y)
+    distance_m = distance_home_m(view)
+    if distance_m is not None:
         lines.append(row_of("from home", f"{number(distance_m, 1)} m", colours.text, colours))
     return lines[:height]
 

@@ -108,7 +108,7 @@ class ParamScreen(JobScreen):
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Return False for keys that have no effect now."""
-        if action in ("search", "changed_only", "edit", "reset", "save", "load", "compare"):
+        if action in ("changed_only", "edit", "reset", "save", "load", "compare"):
             return bool(self._params.parameters)
         return True
 

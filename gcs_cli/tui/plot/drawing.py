@@ -239,16 +239,22 @@ def _draw_times(canvas: Canvas, span: Span, gutter: int, row: int, colours: Pale
     step_s = round_step(length_s / max(1, cells // _TIME_LABEL_CELLS))
     canvas.label(gutter - 1, row, "└" + "─" * cells, colours.muted)
     ticks = np.arange(0, math.floor(length_s / step_s + 1e-9) + 1) * step_s
+    cursor = range(0)
+    if span.cursor_s is not None:
+        column = gutter + int((span.cursor_s - span.start_s) / length_s * cells)
+        text = f" −{span.end_s - span.cursor_s:.2f} s "
+        cursor = _centred(canvas, column, text)
+        canvas.label(cursor.start, row + 1, text, f"bold {colours.text}")
     for ago_s in ticks.tolist():
         column = min(canvas.width - 1, gutter + int((length_s - ago_s) / length_s * cells))
         text = "0 s" if not ago_s else f"−{ago_s:g} s"
         canvas.label(column, row, "┴", colours.muted)
-        _label_centred(canvas, column, row + 1, text, colours.muted)
-    if span.cursor_s is not None:
-        column = gutter + int((span.cursor_s - span.start_s) / length_s * cells)
-        text = f" −{span.end_s - span.cursor_s:.2f} s "
-        _label_centred(canvas, column, row + 1, text, f"bold {colours.text}")
+        place = _centred(canvas, column, text)
+        if place.stop <= cursor.start or place.start >= cursor.stop:
+            canvas.label(place.start, row + 1, text, colours.muted)
 
 
-def _label_centred(canvas: Canvas, column: int, row: int, text: str, style: str) -> None:
-    canvas.label(max(0, min(canvas.width - len(text), column - len(text) // 2)), row, text, style)
+def _centred(canvas: Canvas, column: int, text: str) -> range:
+    """Return the columns of a text centred at ``column``, within the canvas."""
+    start = max(0, min(canvas.width - len(text), column - len(text) // 2))
+    return range(start, start + len(text))
