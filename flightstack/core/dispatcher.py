@@ -38,6 +38,8 @@ _array_types: dict[tuple[Any, ...], numba.types.Type] = {}
 
 def _type_of(example: Any) -> numba.types.Type:
     """Return Numba's type of ``example``; that of an array of records takes Numba a millisecond, so it is kept."""
+    if isinstance(example, tuple):
+        return numba.types.BaseTuple.from_types([_type_of(item) for item in example], type(example))
     if type(example) is not np.ndarray:
         return numba.typeof(example)
     dtype, flags = example.dtype, example.flags

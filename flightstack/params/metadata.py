@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from functools import lru_cache
 from typing import Any
 
 from flightstack.params.spec import ParamSpec
@@ -23,6 +24,12 @@ def parameter_metadata(specs: Iterable[ParamSpec]) -> dict[str, Any]:
 
 def parameters_json(specs: Iterable[ParamSpec]) -> str:
     """Return the text of the file; it depends on the declarations alone."""
+    return _json(tuple(specs))
+
+
+@lru_cache(maxsize=16)
+def _json(specs: tuple[ParamSpec, ...]) -> str:
+    """Return the text of ``parameters_json``, made once for all flights of a campaign."""
     return json.dumps(parameter_metadata(specs), separators=(",", ":"), allow_nan=False)
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import re
 import tomllib
+from copy import deepcopy
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -131,15 +133,34 @@ class Table:
 
 def read_toml(path: Path) -> Table:
     """Read a TOML file; raise ConfigError when it is missing or malformed."""
+    return parse_toml(path, read_text(path))
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a TOML file; raise ConfigError when it is missing or not UTF-8."""
     try:
-        return Table(path, tomllib.loads(path.read_text(encoding="utf-8")))
+        return path.read_text(encoding="utf-8")
     except OSError as error:
         raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise ConfigError(path, "", f"is not valid TOML: {error}") from error
+
+
+def parse_toml(path: Path, text: str) -> Table:
+    """Parse the text of the TOML file ``path``; raise ConfigError when it is malformed."""
+    try:
+        return Table(path, deepcopy(_parsed(text)))
+    except tomllib.TOMLDecodeError as error:
         raise ConfigError(path, "", f"is not valid TOML: {error}") from error
     except (RecursionError, ValueError) as error:  # deep nesting, numbers of thousands of digits
         problem = "is not usable TOML: its nesting is too deep or a number too long"
         raise ConfigError(path, "", problem) from error
+
+
+@lru_cache(maxsize=16)
+def _parsed(text: str) -> dict[str, Any]:
+    """Return the values of a text: each flight of a campaign reads the same files."""
+    return tomllib.loads(text)
 
 
 _STEP = re.compile(r"\.?([^.\[\]]+)|\[(\d+)\]")

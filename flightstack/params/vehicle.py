@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from copy import deepcopy
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,16 @@ from flightstack.core.errors import ConfigError
 from flightstack.core.linear_algebra import pseudo_inverse
 from flightstack.params.battery import Battery, read_battery
 from flightstack.params.sensors import NO_SENSORS, Sensors, read_sensors
-from flightstack.params.toml_file import Table, built_in_names, find_file, hidden_file, read_toml, set_value
+from flightstack.params.toml_file import (
+    Table,
+    built_in_names,
+    find_file,
+    hidden_file,
+    parse_toml,
+    read_text,
+    read_toml,
+    set_value,
+)
 from flightstack.params.vehicle_parts import Part, read_parts
 
 BUILT_IN = Path(__file__).parent / "vehicles"
@@ -162,7 +171,14 @@ def hidden_vehicle(name_or_path: str) -> str | None:
 
 def load_vehicle(name_or_path: str) -> Vehicle:
     """Read a built-in vehicle by name or a TOML file by path; raise ConfigError."""
-    return _vehicle(read_toml(find_file(name_or_path, BUILT_IN, KIND)))
+    file = find_file(name_or_path, BUILT_IN, KIND)
+    return _loaded(file, read_text(file))
+
+
+@lru_cache(maxsize=16)
+def _loaded(file: Path, text: str) -> Vehicle:
+    """Return the vehicle of a file with this text."""
+    return _vehicle(parse_toml(file, text))
 
 
 def load_vehicle_with(name_or_path: str, numbers: Mapping[str, float]) -> Vehicle:
@@ -174,9 +190,11 @@ def load_vehicle_with(name_or_path: str, numbers: Mapping[str, float]) -> Vehicl
     1.8
     """
     file = find_file(name_or_path, BUILT_IN, KIND)
-    values = deepcopy(read_toml(file).values())
-    _set_numbers(file, values, {path: number for path, number in numbers.items() if path == _RATIO})
-    speed_rad_s = _vehicle(Table(file, values)).rotors[0].max_speed_rad_s
+    values = read_toml(file).values()
+    ratio = {path: number for path, number in numbers.items() if path == _RATIO}
+    _set_numbers(file, values, ratio)
+    base = _vehicle(Table(file, values)) if ratio else load_vehicle(name_or_path)
+    speed_rad_s = base.rotors[0].max_speed_rad_s
     values["rotor_type"].pop("thrust_to_weight", None)
     values["rotor_type"]["max_speed_rad_s"] = speed_rad_s
     _set_numbers(file, values, {path: number for path, number in numbers.items() if path != _RATIO})
