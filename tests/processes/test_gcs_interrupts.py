@@ -39,6 +39,12 @@ ELSEWHERE = {
 """Commands on files, or with a vehicle of their own, and the file that tests them."""
 
 
+_TRANSFERS = {
+    "FILE_TRANSFER_PROTOCOL", "LOG_ERASE", "LOG_REQUEST_LIST", "MISSION_REQUEST_LIST", "PARAM_REQUEST_LIST",
+    "PARAM_REQUEST_READ",
+}  # fmt: skip
+
+
 def names_of(command: Any, words: tuple[str, ...] = ()) -> Iterator[str]:
     """Yield the names of all commands that the help shows."""
     if not hasattr(command, "list_commands"):
@@ -79,6 +85,37 @@ def test_interrupted_search_ends_without_a_file(
         ended = gcs("--timeout=600", link, *name.split(), *ON_VEHICLE[name])
         thread.join()
     assert ended == ("", "gcs: interrupted\n", 1)
+    assert [path.name for path in tmp_path.iterdir()] == ["given.params"]
+
+
+class InterruptingVehicle(FakeVehicle):
+    """Interrupts this process at the first message of a transfer, and does not answer it."""
+
+    def receive(self, data: bytes, now_s: float = 0.0) -> None:
+        before = len(self.heard)
+        super().receive(data, now_s)
+        if _TRANSFERS.intersection(self.heard[before:]) and not _TRANSFERS.intersection(self.heard[:before]):
+            os.kill(os.getpid(), signal.SIGINT)
+
+    def poll(self, now_s: float) -> list[bytes]:
+        return [] if _TRANSFERS.intersection(self.heard) else super().poll(now_s)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["mission download", "mission verify", "fence show", "rally download", "param list", "param get", "param save",
+     "param load", "param diff", "log list", "log download", "log erase"],
+)  # fmt: skip
+def test_interrupted_transfer_ends_without_a_file(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("given.params").write_text("1\t1\tMPC_XY_CRUISE\t4.0\t9\n")
+    with tcp_server(InterruptingVehicle()) as port:
+        said, complaint, code = gcs(f"--connect=tcp:127.0.0.1:{port}", *name.split(), *ON_VEHICLE[name])
+    assert (said, code) == ("", 1)
+    assert "interrupted" in complaint
+    assert complaint.count("\n") == 1
     assert [path.name for path in tmp_path.iterdir()] == ["given.params"]
 
 
