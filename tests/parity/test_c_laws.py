@@ -104,6 +104,21 @@ def test_position_loop_integrates_at_exactly_the_limit_of_the_tilt() -> None:
     assert np.array_equal(target, py_target)
 
 
+@pytest.mark.parametrize(("limits_n", "down_m"), [((0.0, 9.81), -1.0), ((9.81, 20.0), 1.0)])
+def test_position_loop_holds_the_vertical_integral_at_exactly_a_limit(
+    limits_n: tuple[float, float], down_m: float
+) -> None:
+    """Of the thrust, which is the weight: no gain asks for more."""
+    states, setpoints, target = np.zeros((1, 13)), np.zeros((1, 11)), np.zeros((1, 5))
+    states[:, 6], setpoints[:, 2] = 1.0, down_m
+    params = np.array([[0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 9.81, *limits_n, 0.5, 5.0]])
+    memory, dt_s, saturation = np.zeros((1, 3)), np.full(1, 0.01), np.zeros(1)
+    advanced, py_target = memory.copy(), target.copy()
+    python.position(advanced, states, setpoints, params, dt_s, saturation, py_target)
+    core("double").call("drive_position", 1, memory, states, setpoints, params, dt_s, saturation, target)
+    assert memory.tolist() == advanced.tolist() == [[0.0, 0.0, 0.0]]
+
+
 # ------------------------------------------------------------------ attitude reference
 
 
