@@ -185,6 +185,8 @@ def test_finite_input_beyond_all_sense_is_the_loops_business(target: Target) -> 
     [
         (CYCLES, 200_000_000, 400_001, 1),  # the period of 500 Hz is 400 000 cycles
         (CYCLES, 200_000_000, 399_999, 0),
+        (CYCLES, 500, 1, 0),  # exactly a period, also in float
+        (CYCLES, 500, 2, 1),
         (CYCLES, 0, 4_000_000_000, 0),  # nobody knows how long a cycle is
         (NANOSECONDS, 0, 2_000_100, 1),
         (NANOSECONDS, 0, 1_999_900, 0),
@@ -253,6 +255,8 @@ def test_a_reboot_gives_the_loops_their_defaults_back_but_not_in_flight(target: 
     default = numbers(other.step(0, RESET | OUTER_DUE))
     target.ask(mavlink.MAVLink_param_set_message(1, 1, b"POS_Z_P", 3.0, 9))
     assert numbers(target.step(0, RESET | OUTER_DUE)) != default
+    for at in range(1, 9):
+        target.step(at)  # as many as are kept to be answered again
     (refusal,) = target.ask(reboot)
     assert refusal.result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
     target.poll(1_000)
@@ -260,9 +264,9 @@ def test_a_reboot_gives_the_loops_their_defaults_back_but_not_in_flight(target: 
     answers = target.ask(reboot)
     assert kinds(answers) == ["STATUSTEXT", "COMMAND_ACK"]
     assert answers[1].result == mavlink.MAV_RESULT_ACCEPTED
-    assert target.step(1).status == OUT_OF_ORDER
+    assert target.step(8).status == OUT_OF_ORDER
     assert numbers(target.step(0, RESET | OUTER_DUE)) == default
-    assert target.status().steps == 2
+    assert target.status().steps == 10
     for what in (0.0, 2.0, math.nan):
         target.poll(1_000)
         target.heard()

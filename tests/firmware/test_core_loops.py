@@ -72,6 +72,7 @@ def test_a_changed_gain_keeps_what_its_integral_gives() -> None:
     for name, value, factors in (
         ("PID_ROLL_I", 50.0, [4.0, 1.0, 1.0]),
         ("PID_ROLL_I", 1.0, [50.0, 1.0, 1.0]),
+        ("PID_ROLL_I", 2.0, [0.5, 1.0, 1.0]),
         ("PID_PITCH_I", 0.0, [1.0, 0.0, 1.0]),
         ("PID_YAW_P", 12.5, [1.0, 1.0, 1.0]),
         ("MPC_TILTMAX_AIR", 20.0, [1.0, 1.0, 1.0]),
@@ -174,17 +175,21 @@ def test_a_setpoint_that_is_no_number_keeps_the_target() -> None:
     assert np.array_equal(made[4, :5], made[2, :5])
 
 
+def with_own(file: str, instead_of: str, real: str, folder: Path) -> Core:
+    """Compile the core with a file of the tests instead of one of its own."""
+    define = ["-DFS_DOUBLE"] if real == "double" else []
+    files = [path for path in sources() if path.name != instead_of]
+    flags = ["-O1", f"-I{files[0].parent}", "-shared", "-fPIC", "-fno-math-errno"]
+    library = folder / "core.so"
+    own = DRIVER.with_name(file)
+    run_tool([compiler(), *EXACT, *define, *flags, *files, own, DRIVER, "-lm", "-o", library])
+    return Core(real, library)
+
+
 @pytest.fixture
 def without_nan(tmp_path: Path, request: pytest.FixtureRequest) -> Core:
     """Return the core for a processor on which sine and cosine are numbers for any angle."""
-    real: str = request.param
-    define = ["-DFS_DOUBLE"] if real == "double" else []
-    files = [path for path in sources() if path.name != "fs_math.c"]
-    own = DRIVER.with_name("math_without_nan.c")
-    flags = ["-O1", f"-I{CORE}", "-shared", "-fPIC", "-fno-math-errno"]
-    library = tmp_path / "core.so"
-    run_tool([compiler(), *EXACT, *define, *flags, *files, own, DRIVER, "-lm", "-o", library])
-    return Core(real, library)
+    return with_own("math_without_nan.c", "fs_math.c", request.param, tmp_path)
 
 
 @pytest.mark.parametrize("without_nan", ["float", "double"], indirect=True)
@@ -204,6 +209,19 @@ def test_a_yaw_without_a_sine_keeps_the_target_also_without_nan(without_nan: Cor
     flown, _ = run_python(python, ticks)
     assert not np.array_equal(flown[1, :5], flown[0, :5])
     assert all(np.array_equal(row, flown[1, :5]) for row in flown[2:, :5])
+
+
+def test_each_law_is_given_its_period_its_memory_and_the_attitude(tmp_path: Path) -> None:
+    core = with_own("laws_that_tell.c", "fs_controllers.c", "double", tmp_path)
+    ticks = level(DIVISOR + 1, 0)
+    ticks.flags[::DIVISOR] = OUTER_DUE
+    ticks.states[-1, 6:10] = 0.5
+    Loops(core, {"FS_INNER_HZ": 400.0}).run(*ticks)
+    told = core.unwritten(10)
+    core.call("laws_told", told)
+    assert told[:4].tolist() == [DIVISOR / 400.0, DIVISOR / 400.0, 1.0 / 400.0, 1.0 / 400.0]
+    assert told[4:6].tolist() == [2.0, DIVISOR + 1.0]  # steps of guidance and mixer
+    assert told[6:].tolist() == [0.5] * 4
 
 
 @pytest.mark.parametrize(("divisor", "period"), [(5, 5), (1, 1), (0, 1), (65_535, 65_535)])

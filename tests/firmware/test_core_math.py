@@ -70,3 +70,5 @@ def test_what_has_no_answer_is_not_a_number(real: str) -> None:
     assert np.isnan(made[0]).all()
     assert np.isnan(made[1]).all()
     assert np.isnan(made[2]).tolist() == [True, True, False, False, False, True]
+    _, made, _ = evaluate(real, np.ones(2), np.array([10_000.0, -10_000.0]))
+    assert np.isfinite(made[:2]).all()

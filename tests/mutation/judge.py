@@ -97,7 +97,9 @@ class Session:
 def with_tests(part: str, work: Callable[[Judge], None]) -> None:
     """Call ``work`` inside a pytest session of the tests of a part; SystemExit if they cannot be run."""
     options = ["-q", "-s", "--no-header", "--no-summary", "--assert=plain", "--tb=native"]
-    without = ["-p", "no:cacheprovider", "-p", "no:faulthandler", "-k", SLOW]
+    # the two last would blame a test for what the session before it has left to the garbage collector
+    plugins = ("cacheprovider", "faulthandler", "unraisableexception", "threadexception")
+    without = [*(word for name in plugins for word in ("-p", f"no:{name}")), "-k", SLOW]
     with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
         session = Session(Path(folder), work)
         files = [str(ROOT / name) for name in TESTS[part]]
@@ -275,8 +277,9 @@ def _forget() -> None:
 
 
 def _fate_of(status: int) -> str:
-    """Return what a child's wait status says."""
+    """Return what a child's wait status says; SIGKILL is the system's, which is short of memory."""
     if os.WIFSIGNALED(status):
-        return LOOPED if os.WTERMSIG(status) == signal.SIGPROF else KILLED
+        by = os.WTERMSIG(status)
+        return LOOPED if by == signal.SIGPROF else UNTRIED if by == signal.SIGKILL else KILLED
     code = os.waitstatus_to_exitcode(status)
     return _CODES[code] if code < len(_CODES) else KILLED

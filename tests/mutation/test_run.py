@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.firmware.codec_support import compiler
-from tests.mutation.judge import KILLED, SURVIVED, Verdict
+from tests.mutation.judge import KILLED, LOOPED, SURVIVED, UNTRIED, Verdict, _fate_of
 from tests.mutation.mutants import Mutant, mutants
 from tests.mutation.objects import CompileError, Objects, WarningError
 from tests.mutation.order import Order
@@ -100,6 +101,13 @@ def test_tests_that_found_mutants_nearby_come_first_and_cheap_ones_before_dear_o
         order.learn(mutant("g"), np.array([0.1, np.nan, 0.01]), 0)
     assert order.ranked(mutant("g"))[0] == 0
     assert order.ranked(mutant("f"))[0] == 1
+
+
+@pytest.mark.parametrize(
+    ("ended_by", "fate"), [(signal.SIGSEGV, KILLED), (signal.SIGPROF, LOOPED), (signal.SIGKILL, UNTRIED)]
+)
+def test_crash_is_a_find_and_a_kill_by_the_system_is_none(ended_by: int, fate: str) -> None:
+    assert _fate_of(ended_by) == fate
 
 
 def test_results_are_found_again_and_the_last_one_counts(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from flightstack.core.portable_math import tan
 from tests.firmware import core_reference as python
 from tests.firmware.core_samples import Samples
 from tests.firmware.core_support import Compared, Core
@@ -84,6 +85,38 @@ def test_position_loop_in_float_is_near() -> None:
     # an integral goes on or rests; where that hangs by a rounding the two may decide otherwise
     integral = made["integral"].full_scale_ulps()
     assert np.count_nonzero(integral > 2) < 10  # measured 0.6, and none decided otherwise
+
+
+def test_position_loop_integrates_at_exactly_the_limit_of_the_tilt() -> None:
+    """Where the horizontal demand is the largest that the tilt allows, and stops one rounding beyond."""
+    c, tilt_rad, gravity_m_s2 = core("double"), 0.5, 9.81
+    limit = tan(tilt_rad) * gravity_m_s2
+    states, setpoints, target = np.zeros((3, 13)), np.zeros((3, 11)), np.zeros((3, 5))
+    states[:, 6] = 1.0
+    setpoints[:, 0] = [np.nextafter(limit, 0.0), limit, np.nextafter(limit, np.inf)]
+    params = np.tile([1.0, 0.5, 0.0, 1.0, 0.0, 0.0, 1.0, gravity_m_s2, 0.0, 100.0, tilt_rad, 5.0], (3, 1))
+    memory, dt_s, saturation = np.zeros((3, 3)), np.full(3, 0.01), np.zeros(3)
+    advanced, py_target = memory.copy(), target.copy()
+    python.position(advanced, states, setpoints, params, dt_s, saturation, py_target)
+    c.call("drive_position", 3, memory, states, setpoints, params, dt_s, saturation, target)
+    assert (memory[:, 0] > 0.0).tolist() == [True, True, False]
+    assert np.array_equal(memory, advanced)
+    assert np.array_equal(target, py_target)
+
+
+@pytest.mark.parametrize(("limits_n", "down_m"), [((0.0, 9.81), -1.0), ((9.81, 20.0), 1.0)])
+def test_position_loop_holds_the_vertical_integral_at_exactly_a_limit(
+    limits_n: tuple[float, float], down_m: float
+) -> None:
+    """Of the thrust, which is the weight: no gain asks for more."""
+    states, setpoints, target = np.zeros((1, 13)), np.zeros((1, 11)), np.zeros((1, 5))
+    states[:, 6], setpoints[:, 2] = 1.0, down_m
+    params = np.array([[0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 9.81, *limits_n, 0.5, 5.0]])
+    memory, dt_s, saturation = np.zeros((1, 3)), np.full(1, 0.01), np.zeros(1)
+    advanced, py_target = memory.copy(), target.copy()
+    python.position(advanced, states, setpoints, params, dt_s, saturation, py_target)
+    core("double").call("drive_position", 1, memory, states, setpoints, params, dt_s, saturation, target)
+    assert memory.tolist() == advanced.tolist() == [[0.0, 0.0, 0.0]]
 
 
 # ------------------------------------------------------------------ attitude reference

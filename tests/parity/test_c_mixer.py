@@ -39,9 +39,8 @@ def askew() -> Vehicle:
     return multirotor(places, [1, -1, 1, -1, 1, -1])
 
 
-def with_other_rotor(index: int, **factors: float) -> Vehicle:
-    """Return four rotors, one of which has some of its numbers multiplied."""
-    vehicle = load_vehicle("x_quad")
+def with_other_rotor(vehicle: Vehicle, index: int, **factors: float) -> Vehicle:
+    """Return a vehicle one of whose rotors has some of its numbers multiplied."""
     rotors = list(vehicle.rotors)
     changed = {name: factor * getattr(rotors[index], name) for name, factor in factors.items()}
     rotors[index] = dataclasses.replace(rotors[index], **changed)
@@ -59,8 +58,8 @@ VEHICLES = {
     "ideal": lambda: load_vehicle("x_quad").with_ideal_rotors(),
     "askew": askew,
     "octo": lambda: ring(8, first_deg=22.5),
-    "weak": lambda: with_other_rotor(1, max_speed_rad_s=0.9),
-    "eager": lambda: with_other_rotor(3, min_speed_rad_s=2.0),
+    "weak": lambda: with_other_rotor(ring(8, first_deg=22.5), 1, max_speed_rad_s=0.9),
+    "eager": lambda: with_other_rotor(load_vehicle("x_quad"), 3, min_speed_rad_s=2.0),
     "unwilling": unwilling,
 }
 LIFTING = [name for name in VEHICLES if name != "unwilling"]
@@ -291,6 +290,9 @@ def test_a_rotor_that_lifts_nothing_bars_the_short_way(real: str) -> None:
     assert not undoes(real, rotors)
     share[3, 0] = 0.25
     assert undoes(real, rotors._replace(effectiveness=np.linalg.inv(share)))
+    share = share[::-1].copy()
+    share[0, 0] = 0.0
+    assert not undoes(real, rotors._replace(allocation=share, effectiveness=np.linalg.inv(share)))
 
 
 def test_the_mixers_samples_reach_every_limit_both_ways() -> None:
