@@ -6,13 +6,10 @@ import math
 from collections.abc import Callable, Sequence
 
 from flightstack.core.enums import CUSTOM_MODE, Mode
-from flightstack.core.port_numbers import API, GROUND
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.plan import MissionItem, MissionType, Plan
-from flightstack.services.routing.hub import GroundHub
 from flightstack.services.routing.peer import PeerAddress
-from flightstack.services.telemetry.streams import Streams
 from flightstack.testing.link import Link
 from gcs_cli.clients.param_client import ParamClient, ParamDone, ParamFailed
 from gcs_cli.link import calls
@@ -193,92 +190,3 @@ class ParamRequest:
         if isinstance(result, ParamFailed):
             return Answer(False, result.reason, silent=result.silent)
         return None
-
-
-_SETTLES = 10_000
-"""Most rounds of messages at one instant; a mission upload takes two for each item."""
-
-SLOW_RATES_HZ: dict[int, float] = {
-    mavlink.MAVLINK_MSG_ID_ATTITUDE: 4.0,
-    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 4.0,
-    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 4.0,
-    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 2.0,
-    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: 2.0,
-    mavlink.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
-    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
-    mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: 0.5,
-    mavlink.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
-}
-"""Telemetry without ``telemetry=True``: a flight with PX4's default rates takes three times as long."""
-
-
-class Network:
-    """Carries datagrams between the vehicle's hub and its clients."""
-
-    def __init__(self, seed: int) -> None:
-        self._seed = seed
-        self.clients: dict[str, Client] = {}
-        self._by_address: dict[PeerAddress, Client] = {}
-
-    def add(
-        self,
-        name: str,
-        hub: GroundHub,
-        telemetry: bool,
-        is_companion: bool = False,
-        system_id: int | None = None,
-    ) -> Client:
-        """Connect a client; its link has a seed of its own. Raise ValueError for a name in use or a bad system id."""
-        if name in self.clients:
-            raise ValueError(f"a client named {name!r} is there already")
-        if system_id is None:
-            system_id = self._free_system_id()
-        elif not 1 <= system_id <= SYSTEM_ID:
-            raise ValueError(f"system_id must be 1 to {SYSTEM_ID}, not {system_id}")
-        number = len(self.clients)
-        address = PeerAddress(API if is_companion else GROUND, "memory", number)
-        client = Client(name, address, Link(self._seed * 1000 + number), is_companion, system_id)
-        self.clients[name] = self._by_address[address] = client
-        self.connect(client, hub, telemetry)
-        return client
-
-    def _free_system_id(self) -> int:
-        """Return the largest system id that no client has."""
-        taken = {client.system_id for client in self.clients.values()}
-        return next(number for number in range(SYSTEM_ID, 0, -1) if number not in taken)
-
-    def connect(self, client: Client, hub: GroundHub, telemetry: bool) -> None:
-        """Add a client to a hub, that of a vehicle after a power cycle too."""
-        peer = hub.add_peer(client.address, permanent=True)
-        if not telemetry:
-            peer.streams = Streams(SLOW_RATES_HZ, peer.streams.available)
-
-    def exchange(self, hub: GroundHub, now_s: float) -> bool:
-        """Exchange the messages of this instant once; return True if any arrived."""
-        arrived = False
-        for client in self.clients.values():
-            for data in client.poll(now_s):
-                client.link.to_vehicle.send(data, now_s)
-            for data in client.link.to_vehicle.receive(now_s):
-                hub.receive(client.address, data, now_s)
-                arrived = True
-        for address, data in hub.poll(now_s):
-            receiver = self._by_address.get(address)
-            if receiver is not None:  # a test may add peers of its own
-                receiver.link.from_vehicle.send(data, now_s)
-        for client in self.clients.values():
-            for data in client.link.from_vehicle.receive(now_s):
-                client.receive(data, now_s)
-                arrived = True
-        return arrived
-
-    def idle_s(self, hub: GroundHub, now_s: float) -> float:
-        """Return the time for which ``exchange`` does nothing, unless the vehicle has an event [s]."""
-        return min(hub.idle_s(now_s), *(client.idle_s(now_s) for client in self.clients.values()))
-
-    def settle(self, hub: GroundHub, now_s: float) -> None:
-        """Exchange messages until none is left at this instant."""
-        for _ in range(_SETTLES):
-            if not self.exchange(hub, now_s):
-                return
-        raise AssertionError(f"clients and vehicle exchange messages without end at t = {now_s:.3f} s")

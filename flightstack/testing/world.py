@@ -13,14 +13,14 @@ from flightstack.core.contract import Vector3
 from flightstack.core.enums import Mode
 from flightstack.core.geodesy import LocalFrame
 from flightstack.plan import MissionItem, MissionType, Plan
-from flightstack.testing.client import Client, ConditionTimeoutError, Network, RefusedError
-from flightstack.testing.clock import Clock
+from flightstack.testing.client import Client, ConditionTimeoutError, RefusedError
 from flightstack.testing.engine import Engine
 from flightstack.testing.faults import apply_fault
 from flightstack.testing.flight import Event, Flight
 from flightstack.testing.link import Link
 from flightstack.testing.log import Log
 from flightstack.testing.mission_flight import await_first_state, fly_plan
+from flightstack.testing.network import Clock, Network
 from flightstack.testing.setup import Setup, built
 from flightstack.testing.state import State, condition_of, reported_by, state_of
 from gcs_cli.link import calls

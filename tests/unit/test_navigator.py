@@ -108,7 +108,7 @@ def test_nothing_moves_while_the_state_is_not_finite(mode: Mode, bad: float) -> 
     vehicle.enter(mode, 8.0)
     vehicle.run(1.0)
     n = vehicle.navigator
-    memories = (n.setpoint, *n.memory)
+    memories = (n.setpoint, *n.goal[:7])
     before = [memory.copy() for memory in memories]
     state = vehicle.state.copy()
     state[7] = bad

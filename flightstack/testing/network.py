@@ -1,0 +1,176 @@
+"""Messages between a vehicle and its clients in simulated time, and the ticks between two exchanges of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from flightstack.core.port_numbers import API, GROUND
+from flightstack.mavlink.dialect import mavlink
+from flightstack.services.routing.hub import GroundHub
+from flightstack.services.routing.peer import PeerAddress
+from flightstack.services.telemetry.streams import Streams
+from flightstack.testing.client import Client
+from flightstack.testing.engine import Engine
+from flightstack.testing.link import Link
+from gcs_cli.link.wire import SYSTEM_ID
+
+_ROUNDING = 1e-6
+"""Share of a period that is no further period."""
+_SETTLES = 10_000
+"""Most rounds of messages at one instant; a mission upload takes two for each item."""
+
+SLOW_RATES_HZ: dict[int, float] = {
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: 4.0,
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 4.0,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 4.0,
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 2.0,
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: 2.0,
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
+    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
+    mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: 0.5,
+    mavlink.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
+}
+"""Telemetry without ``telemetry=True``: a flight with PX4's default rates takes three times as long."""
+
+
+class Network:
+    """Carries datagrams between the vehicle's hub and its clients."""
+
+    def __init__(self, seed: int) -> None:
+        self._seed = seed
+        self.clients: dict[str, Client] = {}
+        self._by_address: dict[PeerAddress, Client] = {}
+
+    def add(
+        self,
+        name: str,
+        hub: GroundHub,
+        telemetry: bool,
+        is_companion: bool = False,
+        system_id: int | None = None,
+    ) -> Client:
+        """Connect a client; its link has a seed of its own. Raise ValueError for a name in use or a bad system id."""
+        if name in self.clients:
+            raise ValueError(f"a client named {name!r} is there already")
+        if system_id is None:
+            system_id = self._free_system_id()
+        elif not 1 <= system_id <= SYSTEM_ID:
+            raise ValueError(f"system_id must be 1 to {SYSTEM_ID}, not {system_id}")
+        number = len(self.clients)
+        address = PeerAddress(API if is_companion else GROUND, "memory", number)
+        client = Client(name, address, Link(self._seed * 1000 + number), is_companion, system_id)
+        self.clients[name] = self._by_address[address] = client
+        self.connect(client, hub, telemetry)
+        return client
+
+    def _free_system_id(self) -> int:
+        """Return the largest system id that no client has."""
+        taken = {client.system_id for client in self.clients.values()}
+        return next(number for number in range(SYSTEM_ID, 0, -1) if number not in taken)
+
+    def connect(self, client: Client, hub: GroundHub, telemetry: bool) -> None:
+        """Add a client to a hub, that of a vehicle after a power cycle too."""
+        peer = hub.add_peer(client.address, permanent=True)
+        if not telemetry:
+            peer.streams = Streams(SLOW_RATES_HZ, peer.streams.available)
+
+    def exchange(self, hub: GroundHub, now_s: float) -> bool:
+        """Exchange the messages of this instant once; return True if any arrived."""
+        arrived = False
+        for client in self.clients.values():
+            for data in client.poll(now_s):
+                client.link.to_vehicle.send(data, now_s)
+            for data in client.link.to_vehicle.receive(now_s):
+                hub.receive(client.address, data, now_s)
+                arrived = True
+        for address, data in hub.poll(now_s):
+            receiver = self._by_address.get(address)
+            if receiver is not None:  # a test may add peers of its own
+                receiver.link.from_vehicle.send(data, now_s)
+        for client in self.clients.values():
+            for data in client.link.from_vehicle.receive(now_s):
+                client.receive(data, now_s)
+                arrived = True
+        return arrived
+
+    def idle_s(self, hub: GroundHub, now_s: float) -> float:
+        """Return the time for which ``exchange`` does nothing, unless the vehicle has an event [s]."""
+        return min(hub.idle_s(now_s), *(client.idle_s(now_s) for client in self.clients.values()))
+
+    def settle(self, hub: GroundHub, now_s: float) -> None:
+        """Exchange messages until none is left at this instant."""
+        for _ in range(_SETTLES):
+            if not self.exchange(hub, now_s):
+                return
+        raise AssertionError(f"clients and vehicle exchange messages without end at t = {now_s:.3f} s")
+
+
+class Clock:
+    """Advances the engine, and lets the network exchange messages when some may be due."""
+
+    def __init__(self, engine: Engine, network: Network, after_outer: Callable[[], None]) -> None:
+        """Call ``after_outer`` before watches and timers, after each outer tick that may have had an event."""
+        self._engine, self._network, self._after_outer = engine, network, after_outer
+        self._watches: list[Callable[[], None]] = []
+        self._timers: list[tuple[float, Callable[[], None]]] = []
+
+    def watch(self, callback: Callable[[], None]) -> None:
+        """Call ``callback`` after every outer tick."""
+        self._watches.append(callback)
+
+    def after(self, seconds: float, callback: Callable[[], None]) -> None:
+        """Call ``callback`` once, ``seconds`` from now."""
+        self._timers.append((self._engine.time_s + seconds, callback))
+
+    def run(self, ticks: int) -> None:
+        """Run inner ticks, and exchange messages when some are due, at the end of an outer period."""
+        until_s = -math.inf  # messages may wait that were sent since the last exchange
+        while ticks > 0:
+            ticks -= self._run_period(ticks, until_s)
+            until_s = self._idle_until_s() if ticks > 0 else until_s
+
+    def run_on(self, most_s: float) -> None:
+        """Run one period, and on until messages are due or something happens, for ``most_s`` at most.
+
+        The time is a number of whole periods, at least one.
+        """
+        rates = self._engine.stack.rates
+        periods = max(1, math.ceil(most_s * rates.outer_hz - _ROUNDING))
+        self._run_period(periods * rates.divisor, self._idle_until_s())
+
+    def _run_period(self, most: int, until_s: float) -> int:
+        """Run up to the end of a period, and on until ``until_s`` if nothing happens; ``most`` inner ticks at most."""
+        left, engine = most, self._engine
+        while left > 0:
+            count, is_outer = engine.run(left, until_s)
+            left -= count
+            if is_outer:
+                engine.pass_requests()
+                self._network.exchange(engine.stack.ground, engine.time_s)
+                self._call_due()
+            engine.advance()
+            if is_outer:
+                break
+        return most - left
+
+    def _idle_until_s(self) -> float:
+        """Return the time from which messages are due, or a watch or a timer; −inf if it may be now."""
+        engine = self._engine
+        if self._watches or not engine.was_ready:
+            return -math.inf
+        now_s = engine.time_s
+        until_s = now_s + self._network.idle_s(engine.stack.ground, now_s)
+        return min(until_s, *(at_s for at_s, _ in self._timers)) if self._timers else until_s
+
+    def _call_due(self) -> None:
+        self._engine.note_readiness()
+        self._after_outer()
+        for watch in self._watches:
+            watch()
+        if self._timers:
+            now_s = self._engine.time_s + 1e-9
+            due = [call for at_s, call in self._timers if at_s <= now_s]
+            self._timers = [timer for timer in self._timers if timer[0] > now_s]
+            for call in due:
+                call()
