@@ -27,6 +27,7 @@ from tests.firmware.app_support import (
     command,
     kinds,
     step,
+    write,
 )
 
 FREE, REST = 4, 16
@@ -96,21 +97,23 @@ def timing(target: Target) -> Any:
 
 
 def test_ticks_fly_the_bits_of_steps(target: Target) -> None:
-    """The target decides when the outer loop is due: in every fifth tick, from the first one of each flight."""
+    """The target decides when the outer loop is due: in every fourth tick, from the first one of each flight."""
     other = Target()
+    for each in (target, other):
+        each.ask(write("FS_OUTER_DIV", 4.0))
     rng, first = np.random.default_rng(3), 0
     at(target, 0)
     for tick in range(60):
         values = np.float32([*rng.normal(size=6), 1.0, *0.1 * rng.normal(size=6)]).tolist()
         setpoint = np.float32(rng.normal(size=11)).tolist()
-        given = SET_TARGET if tick in (20, 25) else 0
+        given = SET_TARGET if tick in (20, 24) else 0
         if given:
             setpoint = [1.0, 0.0, 0.0, 0.0, 5.0, *[0.0] * 6]
-        flags = RESET if tick in (0, 32) else 0
+        flags = RESET if tick in (0, 33) else 0
         first = tick if flags else first
         assert at(target, PERIOD_US * tick + 900, state(tick, flags | given, values, setpoint)) == []
         (drive,) = at(target, PERIOD_US * (tick + 1))
-        due = (given or OUTER_DUE) if (tick - first) % 5 == 0 else 0
+        due = (given or OUTER_DUE) if (tick - first) % 4 == 0 else 0
         report = other.step(tick, flags | due, values, setpoint)
         assert drive.rotor_command == report.rotor_command
         assert drive.reference == report.reference[:4]
