@@ -27,6 +27,7 @@ from tests.firmware.app_support import (
     command,
     kinds,
     step,
+    write,
 )
 
 FREE, REST = 4, 16
@@ -96,20 +97,23 @@ def timing(target: Target) -> Any:
 
 
 def test_ticks_fly_the_bits_of_steps(target: Target) -> None:
-    """The target decides when the outer loop is due: in every fifth tick, from the first one of the flight."""
+    """The target decides when the outer loop is due: in every fourth tick, from the first one of each flight."""
     other = Target()
-    rng = np.random.default_rng(3)
+    for each in (target, other):
+        each.ask(write("FS_OUTER_DIV", 4.0))
+    rng, first = np.random.default_rng(3), 0
     at(target, 0)
     for tick in range(60):
         values = np.float32([*rng.normal(size=6), 1.0, *0.1 * rng.normal(size=6)]).tolist()
         setpoint = np.float32(rng.normal(size=11)).tolist()
-        given = SET_TARGET if tick in (20, 25) else 0
+        given = SET_TARGET if tick in (20, 24) else 0
         if given:
             setpoint = [1.0, 0.0, 0.0, 0.0, 5.0, *[0.0] * 6]
-        flags = RESET if tick == 0 else 0
+        flags = RESET if tick in (0, 33) else 0
+        first = tick if flags else first
         assert at(target, PERIOD_US * tick + 900, state(tick, flags | given, values, setpoint)) == []
         (drive,) = at(target, PERIOD_US * (tick + 1))
-        due = (given or OUTER_DUE) if tick % 5 == 0 else 0
+        due = (given or OUTER_DUE) if (tick - first) % 4 == 0 else 0
         report = other.step(tick, flags | due, values, setpoint)
         assert drive.rotor_command == report.rotor_command
         assert drive.reference == report.reference[:4]
@@ -236,6 +240,12 @@ def test_commands_are_told_in_every_so_many_ticks() -> None:
     started(target, every=5)
     told = [len(at(target, PERIOD_US * tick, state(tick, RESET if tick == 0 else 0))) for tick in range(20)]
     assert told == [0, 0, 0, 0, 1] * 4
+    at(target, PERIOD_US * 20, state(20))
+    at(target, PERIOD_US * 21, state(21))  # two ticks that are not told, and count for no other run
+    assert free_run(target, 0) == free_run(target, 1, 5) == ACCEPTED
+    again = range(22, 32)
+    told = [len(at(target, PERIOD_US * tick, state(tick, RESET if tick == 22 else 0))) for tick in again]
+    assert told == [0, 0, 0, 0, 1] * 2
     target.close()
 
 
