@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from flightstack.core.compiled import compiled
+from flightstack.core.compiled import IS_DISABLED, compiled
 from flightstack.flight_log.ulog import DATA_HEADER, DATA_TYPE, HEADER_SIZE, MESSAGE_HEADER, MESSAGE_TYPES
 
 Positions: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
@@ -20,7 +20,7 @@ _COMPILED_BYTES = 50_000_000
 
 
 @compiled
-def _scan_kernel(content: Any, is_known: Any, positions: Any) -> int:
+def scan_kernel(content: Any, is_known: Any, positions: Any) -> int:
     """Write the position of each message and that behind the last one to ``positions``; return their number.
 
     ``content`` and ``is_known``, by the type of a message, are bytes or arrays of uint8.
@@ -45,9 +45,9 @@ def message_positions(content: bytes) -> Positions:
     checksums: damage inside a message is not detected.
     """
     positions = np.empty(len(content) // _MESSAGE_HEADER + 1, np.int64)
-    if "numba" in sys.modules or len(content) >= _COMPILED_BYTES:
-        count = _scan_kernel(np.frombuffer(content, np.uint8), _KNOWN, positions)
+    if not IS_DISABLED and ("numba" in sys.modules or len(content) >= _COMPILED_BYTES):
+        count = scan_kernel(np.frombuffer(content, np.uint8), _KNOWN, positions)
     else:
-        scan = getattr(_scan_kernel, "py_func", _scan_kernel)
+        scan = getattr(scan_kernel, "py_func", scan_kernel)
         count = scan(content, _IS_KNOWN, positions.data)
-    return positions[:count]
+    return positions[:count].copy()  # most of the memory is not used

@@ -107,7 +107,7 @@ class Network:
 
 
 class Clock:
-    """Advances the engine, and lets the network exchange messages when some may be due."""
+    """Runs the engine, with an exchange of messages whenever some may be due."""
 
     def __init__(self, engine: Engine, network: Network, after_outer: Callable[[], None]) -> None:
         """Call ``after_outer`` before watches and timers, after each outer tick that may have had an event."""

@@ -161,8 +161,8 @@ class World:
     def run_on(self, most_s: float) -> None:
         """Run as ``step``, and on until there are messages to exchange, for ``most_s`` at most.
 
-        What the vehicle does by events, such as to disarm or to reach an item, ends it too. The time is a number of
-        whole periods, at least one.
+        What the vehicle does by events, such as to disarm or to reach an item, ends it too, and so does a period that
+        is not compiled: on the ground, with a watch, on loops in C. The time is of whole periods, at least one.
         """
         self._clock.run_on(most_s)
 

@@ -77,7 +77,6 @@ def _is_nominal(calls: Any, outer: Any, state: FloatArray, row: FloatArray) -> b
     found = call_kernel_int(calls[DETECT], (state, setpoint, row, rotors, detectors, limits, on_ground, dt_s))
     if found & ~MOVING != 0:
         return False
-    marks[FOUND] = found
     call_kernel(
         calls[GUIDE],
         (
@@ -85,7 +84,10 @@ def _is_nominal(calls: Any, outer: Any, state: FloatArray, row: FloatArray) -> b
             params, dt_s, setpoint,
         ),
     )  # fmt: skip
-    return not _touches(land)
+    if _touches(land):
+        return False
+    marks[FOUND] = found
+    return True
 
 
 @compiled

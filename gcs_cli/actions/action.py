@@ -61,8 +61,8 @@ class Action(NamedTuple):
     """Text of the error if that state is not reached."""
     unseen: str = ""
     """Says why an accepted action ends without its effect: "the vehicle does not report its speed limit"."""
-    stops_rotors: bool = False
-    """True if the command is sent to a vehicle as well whose heartbeat has timed out: it may still receive."""
+    goes_on_without_link: bool = False
+    """True if a vehicle whose heartbeat has timed out gets the command as well: it may still receive."""
 
 
 class ActionError(Exception):

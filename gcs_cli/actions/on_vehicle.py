@@ -31,7 +31,7 @@ def disarm(*, force: bool = False) -> Action:
     command = common_commands.FORCE_DISARM if force else common_commands.DISARM
     step = Step("disarming", command, lambda view: not view.armed, "is still armed")
     return Action(
-        "disarm", lambda _view: (step,), "disarming", "disarmed", {"force": force}, stops_rotors=True
+        "disarm", lambda _view: (step,), "disarming", "disarmed", {"force": force}, goes_on_without_link=True
     )
 
 
@@ -120,7 +120,7 @@ def terminate() -> Action:
         "is still armed",
     )
     doing, done = "terminating the flight", "flight terminated"
-    return Action("terminate", lambda _view: (step,), doing, done, stops_rotors=True)
+    return Action("terminate", lambda _view: (step,), doing, done, goes_on_without_link=True)
 
 
 def inject_failure(unit: str, failure: str, instance: int = 0) -> Action:

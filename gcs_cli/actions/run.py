@@ -125,9 +125,8 @@ class ActionRun:
     def _advance(self, now_s: float) -> None:
         view = self._view()
         self._whole.update(view, now_s)
-        is_sent_anyway = self.action.stops_rotors and self._timer is None
-        restarts = self.step is not None and self.step.restarts
-        if not (restarts or is_sent_anyway) and (view.powered_off or view.lost(now_s)):
+        goes_on = self.action.goes_on_without_link or (self.step is not None and self.step.restarts)
+        if not goes_on and (view.powered_off or view.lost(now_s)):
             how = "shut down" if view.powered_off else "was lost"
             self._end(Outcome.ENDED, f"{self.action.name}: the vehicle {how}")
         elif self._steps is None:

@@ -25,7 +25,6 @@ from flightstack.mavlink.ftp_messages import (
     read_packet,
 )
 from flightstack.mavlink.link import Address, Message, is_for, is_from
-from gcs_cli.clients.answer_timeout import AnswerTimeout
 
 RETRY_S = 0.3
 """Time after which a request is sent again, before a round trip was measured."""
@@ -42,6 +41,8 @@ MAX_READS = 16
 """Largest number of pending single requests."""
 MAX_ENTRIES = 100_000
 _HALF = 0x8000
+_GAIN, _VARIATION_GAIN, _VARIATIONS = 1 / 8, 1 / 4, 4.0
+_SMALLEST_MARGIN_S = 0.05
 
 
 class FtpDone(NamedTuple):
@@ -60,6 +61,31 @@ class FtpFailed(NamedTuple):
     """One sentence for the user."""
     error: int | None = None
     """The vehicle's FtpError; None if it did not answer."""
+
+
+class _AnswerTimeout:
+    """Timeout of requests: mean round trip and four times its variation, as TCP computes it (RFC 6298).
+
+    It lies between ``least_s`` and ``most_s``.
+    """
+
+    def __init__(self, first_s: float, least_s: float, most_s: float) -> None:
+        self.value_s = first_s
+        """The timeout [s]; ``first_s`` before a measurement."""
+        self._least_s, self._most_s = least_s, most_s
+        self.round_trip_s = 0.0
+        """Mean round trip; 0 before a measurement."""
+        self._variation_s = 0.0
+
+    def measure(self, answer_s: float) -> None:
+        """Take the time from a request to its own answer: one of several equal requests measures nothing."""
+        if not self.round_trip_s:
+            self.round_trip_s, self._variation_s = answer_s, answer_s / 2.0
+        else:
+            self._variation_s += _VARIATION_GAIN * (abs(answer_s - self.round_trip_s) - self._variation_s)
+            self.round_trip_s += _GAIN * (answer_s - self.round_trip_s)
+        margin_s = max(_SMALLEST_MARGIN_S, _VARIATIONS * self._variation_s)
+        self.value_s = min(self._most_s, max(self._least_s, self.round_trip_s + margin_s))
 
 
 class FtpClient:
@@ -95,7 +121,7 @@ class FtpClient:
         """Time of the pending request."""
         self._is_repeated = False
         """True if that was sent again, so that its answer does not measure the round trip."""
-        self._timeout = AnswerTimeout(RETRY_S, SOONEST_RETRY_S, LATEST_RETRY_S)
+        self._timeout = _AnswerTimeout(RETRY_S, SOONEST_RETRY_S, LATEST_RETRY_S)
 
     def start_download(self, path: str) -> None:
         """Download the file at ``path``."""
@@ -178,7 +204,7 @@ class FtpClient:
                 self._ask(Opcode(request.opcode))  # it answers an earlier client: use another number
             return
         self._progress_s = now_s
-        if not self._is_repeated:
+        if not self._is_repeated and self._sent_s > -math.inf:
             self._timeout.measure(now_s - self._sent_s)
         if packet.opcode == Opcode.NAK:
             self._on_refusal(request, packet)
@@ -249,7 +275,7 @@ class FtpClient:
             self._timeout.measure(now_s - sent_s)
         if burst is None or (packet.sequence - next_sequence(burst.sequence)) % (2 * _HALF) >= _HALF:
             is_late = any((packet.sequence - first) % (2 * _HALF) < BURST_NUMBERS for first in self._bursts)
-            return False if is_late else None
+            return False if is_late and packet.opcode == Opcode.ACK else None
         if packet.offset < burst.offset:
             return None
         if (packet.sequence - self._sequence) % (2 * _HALF) < _HALF:
@@ -263,6 +289,7 @@ class FtpClient:
         error = packet.data[0] if packet.data else FtpError.FAIL
         if error == FtpError.INVALID_SESSION:  # closed by the vehicle: open it again, keep the received data
             self._reads.clear()
+            self._burst = None
             self._ask(Opcode.OPEN_FILE_RO)
         elif error != FtpError.END_OF_FILE:
             self._end(_refused(error))

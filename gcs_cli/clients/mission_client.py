@@ -190,10 +190,7 @@ class MissionClient:
         """
         if kind == "MISSION_CURRENT":
             return True
-        is_late = self._ended_s is not None and now_s > self._ended_s + self._timing.settle_s
-        if not is_late:
-            self._ended_s = now_s
-        return is_late
+        return self._ended_s is not None and now_s > self._ended_s + self._timing.settle_s
 
     def _receive_early(self, kind: str, now_s: float) -> None:
         """Process a message of the previous operation: cancel it if the vehicle still requests items."""

@@ -66,8 +66,8 @@ def parse_ulog(content: bytes, source: object, topics: list[str] | None = None) 
 
     Raise ConfigError, which names ``source``.
     """
-    rows = _Rows(content, topics)
     try:
+        rows = _Rows(content, topics)
         # pyulog reports damage on stdout, which belongs to the command's own output
         with contextlib.redirect_stdout(io.StringIO()):
             log = ULog(LogBytes(rows.short_log()), topics) if rows.are_regular else None

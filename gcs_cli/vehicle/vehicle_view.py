@@ -29,6 +29,7 @@ from gcs_cli.vehicle.view_types import (
 _NO_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID: a ground station, a camera …
 _ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 _IGNORE_POSITION, _IGNORE_VELOCITY, _IGNORE_YAW = 0b111, 0b111000, 1 << 10  # POSITION_TARGET_TYPEMASK
+_SEA_LEVEL_FRAMES = (0, 5)  # MAV_FRAME_GLOBAL and its twin for integers
 _RELATIVE_FRAMES = (3, 6)  # MAV_FRAME_GLOBAL_RELATIVE_ALT and its twin for integers
 _IGNORE_ATTITUDE = 128  # ATTITUDE_TARGET_TYPEMASK
 _PREARM_CHECK = 1 << 28  # MAV_SYS_STATUS_PREARM_CHECK: no sensor
@@ -94,8 +95,8 @@ def _euler(q: Any) -> Euler | None:
 def _heartbeat(view: VehicleView, message: Any, now_s: float) -> VehicleView:
     armed = bool(message.base_mode & _ARMED)
     mode = mode_name(view, message.custom_mode)
-    if view.setpoint is not None and view.setpoint.is_global and (mode, armed) != (view.mode, view.armed):
-        view = view._replace(setpoint=None)  # sent only in modes that have one
+    if view.setpoint is not None and (mode, armed) != (view.mode, view.armed):
+        view = view._replace(setpoint=None)  # it may be sent only in modes that have one, or in another frame
     return view._replace(
         last_heartbeat_s=now_s,
         mode=mode,
@@ -267,9 +268,11 @@ def _global_target(view: VehicleView, message: Any, _now_s: float) -> VehicleVie
     """Take the setpoint of a vehicle that does not send it in its local frame (ArduPilot)."""
     now, geo = view.position_ned_m, view.geo
     is_local = view.setpoint is not None and not view.setpoint.is_global
-    if is_local or message.type_mask & _IGNORE_POSITION or now is None or geo is None:
-        return view
     is_relative = message.coordinate_frame in _RELATIVE_FRAMES
+    has_height = is_relative or message.coordinate_frame in _SEA_LEVEL_FRAMES
+    is_known = has_height and not message.type_mask & _IGNORE_POSITION
+    if is_local or not is_known or now is None or geo is None:
+        return view
     height_m = geo.relative_altitude_m if is_relative else geo.altitude_m
     frame = LocalFrame(GeoPoint(geo.latitude_deg, geo.longitude_deg, height_m))
     ahead = frame.to_ned(GeoPoint(message.lat_int / 1e7, message.lon_int / 1e7, message.alt))

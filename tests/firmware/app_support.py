@@ -337,3 +337,16 @@ def random_steps(count: int) -> list[tuple[int, list[float], list[float]]]:
         flags |= RESET if index == 0 else 0
         made.append((flags, np.float32(state).tolist(), np.float32(setpoint).tolist()))
     return made
+
+
+def state(
+    time_us: int, flags: int = 0, values: Sequence[float] = LEVEL, setpoint: Sequence[float] = ABOVE
+) -> Any:
+    """Return a state for a target that runs freely."""
+    return mavlink.MAVLink_fs_pil_state_message(time_us, flags, list(values), [*setpoint, *[0.0] * 11][:11])
+
+
+def free_run(target: Target, *values: float) -> int:
+    """Start or stop free running; return the result."""
+    answers = target.ask(command(mavlink.MAV_CMD_FS_FREE_RUN, *values))
+    return int(next(answer.result for answer in answers if answer.get_type() == "COMMAND_ACK"))

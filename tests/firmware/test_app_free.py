@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -25,13 +25,14 @@ from tests.firmware.app_support import (
     STEPPING,
     Target,
     command,
+    free_run,
     kinds,
+    state,
     step,
     write,
 )
 
-FREE, REST = 4, 16
-PERIOD_US = 2_000  # 500 Hz
+FREE, REST, PERIOD_US = 4, 16, 2_000  # 500 Hz
 ACCEPTED, REJECTED, DENIED = (
     mavlink.MAV_RESULT_ACCEPTED,
     mavlink.MAV_RESULT_TEMPORARILY_REJECTED,
@@ -55,11 +56,6 @@ def started(target: Target, every: float = 1, timeout_ms: float = 0) -> None:
     assert free_run(target, 1, every, timeout_ms) == ACCEPTED
 
 
-def free_run(target: Target, *values: float) -> int:
-    answers = target.ask(command(mavlink.MAV_CMD_FS_FREE_RUN, *values))
-    return int(next(answer.result for answer in answers if answer.get_type() == "COMMAND_ACK"))
-
-
 @pytest.mark.parametrize("stuck_us", [0, 1, -1])
 def test_microseconds_that_stand_still_are_unsupported(stuck_us: int) -> None:
     target = Target()
@@ -70,12 +66,6 @@ def test_microseconds_that_stand_still_are_unsupported(stuck_us: int) -> None:
     target.run(stuck_us + 1)
     assert free_run(target, 1, 1) == ACCEPTED
     target.close()
-
-
-def state(
-    time_us: int, flags: int = 0, values: Sequence[float] = LEVEL, setpoint: Sequence[float] = ABOVE
-) -> Any:
-    return mavlink.MAVLink_fs_pil_state_message(time_us, flags, list(values), [*setpoint, *[0.0] * 11][:11])
 
 
 def drives(target: Target) -> list[Any]:

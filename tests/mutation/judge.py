@@ -166,7 +166,8 @@ class Judge:
         """Learn from an earlier run that ``test`` found a mutant, empty: that none did."""
         found_by = next((index for index, item in enumerate(self.items) if item.nodeid == test), -1)
         if found_by >= 0 or not test:
-            self.order.learn(mutant, np.array(self._costs), found_by)
+            all_ran = np.array(self._costs)
+            self.order.learn(mutant, all_ran if found_by < 0 else np.full_like(all_ran, np.nan), found_by)
 
     def judged(self, mutant: Mutant) -> Verdict:
         """Return what becomes of a mutant; the sources are as before afterwards."""

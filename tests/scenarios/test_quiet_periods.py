@@ -16,15 +16,17 @@ def mission(world: World) -> None:
 
 
 def fence(world: World) -> None:
-    """Fly out of a fence, and find that it has become smaller."""
-    world.param_set("GF_MAX_HOR_DIST", 6.0)
+    """Fly out of a fence that became smaller on the way."""
+    world.param_set("GF_PREDICT", 0)
     world.param_set("GF_ACTION", 3)
     world.takeoff(3.0)
     world.run_for(5.0)
-    world.goto(5.0, 0.0)
-    world.run_for(4.0)
-    world.param_set("GF_MAX_HOR_DIST", 3.0)
+    world.goto(9.0, 0.0)
+    world.run_for(0.5)
+    world.param_set("GF_MAX_HOR_DIST", 4.0)
     world.run_for(10.0)
+    assert "failsafe_FENCE" in [event.name for event in world.events]
+    assert world.state.north_m < 4.0
 
 
 def lost_link(world: World) -> None:
@@ -36,6 +38,7 @@ def lost_link(world: World) -> None:
     world.run_for(20.0)
     world.link.restore()
     world.run_for(3.0)
+    assert "failsafe_GCS_LOST" in [event.name for event in world.events]
 
 
 def bad_link(world: World) -> None:
@@ -57,6 +60,7 @@ def empty_battery(world: World) -> None:
     world.run_for(2.0)
     world.fault("battery:level=0.1")
     world.run_for(8.0)
+    assert any(event.name.startswith("failsafe_BATTERY") for event in world.events)
 
 
 def timer(world: World) -> None:
@@ -69,11 +73,21 @@ def timer(world: World) -> None:
 
 @pytest.mark.parametrize("fly", [mission, fence, lost_link, bad_link, empty_battery, timer])
 @pytest.mark.parametrize("state", ["truth", "estimated"])
-def test_a_flight_is_the_same_as_by_single_ticks_with_bytes(fly: Callable[[World], None], state: str) -> None:
-    def flown(world: World) -> tuple[bytes, list[str], list[int], dict[str, int], float]:
+def test_a_flight_is_the_same_as_by_single_ticks_with_bytes(
+    fly: Callable[[World], None], state: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def flown(world: World) -> tuple[bytes, list[tuple[float, bytes]], list[object], float]:
+        received: list[tuple[float, bytes]] = []
+        receive = world.gcs.receive
+
+        def recorded(data: bytes, now_s: float) -> None:
+            received.append((now_s, data))
+            receive(data, now_s)
+
+        monkeypatch.setattr(world.gcs, "receive", recorded)
         world.wait_until_ready()
         fly(world)
-        return world.engine.newest_log(), world.texts, world.reached, world.gcs.counts, world.time_s
+        return world.engine.newest_log(), received, list(world.events), world.time_s
 
     conditions = {"state": state, "vehicle": "x_quad", "seed": 5}
     with World(**conditions) as quiet, World(make_engine=BytesEngine, **conditions) as exchanged:

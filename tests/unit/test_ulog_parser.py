@@ -133,9 +133,13 @@ def damaged(log: bytes, seed: int) -> bytes:
 def test_messages_are_found_with_numba_as_without(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     content = damaged(small_ulog(), seed)
     compiled = ulog_scan.message_positions(content)
+    with monkeypatch.context() as patch:  # NUMBA_DISABLE_JIT=1
+        patch.setattr(ulog_scan, "IS_DISABLED", True)
+        patch.setattr(ulog_scan, "scan_kernel", ulog_scan.scan_kernel.py_func)
+        debugged = ulog_scan.message_positions(content)
     monkeypatch.setattr(ulog_scan, "sys", SimpleNamespace(modules={}))
     plain = ulog_scan.message_positions(content)
-    assert plain.tolist() == compiled.tolist()
+    assert plain.tolist() == compiled.tolist() == debugged.tolist()
     assert plain[0] == HEADER_SIZE
     sizes = [MESSAGE_HEADER.size + MESSAGE_HEADER.unpack_from(content, at)[0] for at in plain[:-1]]
     assert np.diff(plain).tolist() == sizes

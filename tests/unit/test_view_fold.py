@@ -111,7 +111,9 @@ def test_setpoint_of_ardupilot_is_global_and_ends_with_the_mode(vehicle: Vehicle
     )
     local = vehicle.view.setpoint
     assert vehicle.send(target(0, 500.0)).setpoint == local
-    assert vehicle.send(heartbeat()).setpoint == local
+    assert vehicle.send(heartbeat(mode=HOLD_MODE)).setpoint == local
+    assert vehicle.send(heartbeat()).setpoint is None  # the vehicle may send it in another frame now
+    assert vehicle.send(target(10, 500.0)).setpoint is None  # above the terrain
 
 
 def test_attitude_target_is_shown_as_angles(vehicle: Vehicle) -> None:

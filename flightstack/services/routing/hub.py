@@ -234,9 +234,10 @@ class GroundHub:
     def idle_s(self, now_s: float) -> float:
         """Return the time for which ``poll`` sends nothing, unless a message arrives or an event happens [s].
 
-        The link clock and the vehicle clock must run alike.
+        0 or less if it may send something now. The link clock and the vehicle clock must run alike.
         """
-        if self._to_forward or self._texts or self._journal.has_events:
+        has_changed = self._now.status != self._shown or self._area.home != self._home
+        if has_changed or self._to_forward or self._texts or self._journal.has_events:
             return 0.0
         vehicle_s = self._now.time_us * 1e-6
         idle_s = min(self._schedule.idle_s(now_s), self._forget_due_s - now_s)
