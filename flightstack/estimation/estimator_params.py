@@ -27,8 +27,7 @@ class EstimatorParams(NamedTuple):
     earth_field_walk: float = estimator_default("earth_field_walk")  # gauss/√s
     body_field_walk: float = estimator_default("body_field_walk")  # gauss/√s
     wind_walk: float = estimator_default("wind_walk")  # m/s/√s
-    baro_walk: float = 0.015  # m/√s
-    """Drift of the barometer: 0.25 m within 10 min, √(2 · 0.25² / 600 s)."""
+    baro_walk: float = 0.03  # m/√s
     # initial uncertainty
     tilt_rad: float = estimator_default("tilt_rad")
     gyro_bias_rad_s: float = estimator_default("gyro_bias_rad_s")

@@ -19,7 +19,6 @@ from flightstack.params import vehicle
 from flightstack.testing import World
 from tests.support.estimate_errors import Watch
 from tests.support.refusals import refused
-from tests.support.tools import NIGHTLY
 
 
 def test_square_on_sensors_is_completed_within_the_limits_of_gnss() -> None:
@@ -34,20 +33,6 @@ def test_square_on_sensors_is_completed_within_the_limits_of_gnss() -> None:
     assert errors.horizontal_m < 0.7
     assert errors.vertical_m < 0.4
     assert errors.landing_m < 1.5
-
-
-@pytest.mark.skipif(not NIGHTLY, reason="a flight of thirty minutes: set NIGHTLY=1")
-def test_place_is_known_within_the_limits_of_gnss_for_thirty_minutes() -> None:
-    plan = Path(__file__).parent / "files" / "plans" / "loop_30_min.plan"
-    conditions = {"vehicle": "x_quad", "wind": (3.0, 2.0), "battery_capacity_mah": 10000.0}
-    with World(state="estimated", **conditions) as world:
-        watch = Watch(world)
-        assert world.fly(plan).completed
-    horizontal_m, vertical_m = (
-        watch.place_errors()
-    )  # measured: 0.41 m, 0.17 m; vertically 0.28 m over five seeds
-    assert horizontal_m < 0.7
-    assert vertical_m < 0.4
 
 
 def test_ideal_sensors_at_rest_and_in_hover_are_not_stuck(tmp_path: Path) -> None:

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from flightstack.core.contract import FloatArray, Quaternion
-from flightstack.core.geodesy import LocalFrame
 from flightstack.core.geometry import euler_from_quaternion
 from flightstack.testing import World
 
@@ -42,23 +41,9 @@ class Watch:
         if engine.stack.now.status.armed:
             self._rows.append((engine.stack.now.state.copy(), engine.simulator.frame.state.copy()))
 
-    def place_errors(self) -> tuple[float, float]:
-        """Return the root mean squares of the place on Earth: horizontally and of the altitude [m].
-
-        The origin of the vehicle's frame, the first fix, has an error of its own, which does not count here.
-        """
-        frame = self._world.engine.stack.estimation.estimator.frame
-        estimate, truth = self._columns()
-        off = estimate[:, :3] + LocalFrame(self._world.setup.home).to_ned(frame.origin) - truth[:, :3]
-        return _rms(np.linalg.norm(off[:, :2], axis=1)), _rms(off[:, 2])
-
-    def _columns(self) -> tuple[FloatArray, FloatArray]:
-        estimate, truth = (np.array(column) for column in zip(*self._rows, strict=True))
-        return estimate, truth
-
     def errors(self) -> Errors:
         """Return the errors of the flight."""
-        estimate, truth = self._columns()
+        estimate, truth = (np.array(column) for column in zip(*self._rows, strict=True))
         angles = _angles_deg(estimate) - _angles_deg(truth)
         angles = (angles + 180.0) % 360.0 - 180.0
         off = estimate - truth

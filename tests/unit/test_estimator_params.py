@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 
 from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits, tuning_of
 from flightstack.params.config import StackConfig
 from flightstack.params.estimator import ESTIMATOR_PARAMS, ESTIMATOR_SPECS
-from flightstack.params.sensors import TABLES
 from flightstack.vehicle.parameters import declared
 from tests.support.truth import World
 
@@ -26,14 +23,6 @@ def test_each_parameter_sets_one_field_and_fits_its_range() -> None:
     for name, spec in ESTIMATOR_SPECS.items():
         assert len(name) <= 16
         assert spec.accepted(spec.default) == spec.default
-
-
-def test_walk_of_the_barometer_is_the_drift_of_the_consumer_grade() -> None:
-    drift = {number.key: number.consumer for number in TABLES["baro"]}
-    pa = drift["drift_hpa"] * 100.0
-    drift_m = pa / (1.225 * EstimatorParams().gravity_m_s2)
-    walk = drift_m * math.sqrt(2.0 / drift["drift_time_s"])
-    assert EstimatorParams().baro_walk == pytest.approx(walk, rel=0.05)  # 0.0144
 
 
 def test_delay_of_the_filter_follows_the_slowest_sensor() -> None:
