@@ -19,6 +19,7 @@ from flightstack.process.assembly import Stack, reboot_config, transfer_state
 from flightstack.process.clock import DeadlineScheduler, minimise_timer_slack
 from flightstack.process.connections import (
     GroundConnection,
+    SimulatorPace,
     check_deadline,
     connect_simulator,
     serve_while_idle,
@@ -45,8 +46,8 @@ GROUND_IDLE_NS = 2_000_000
 GROUND_BUSY_NS = 50_000_000
 """Time after received data in which the ground links are also served while waiting for the simulator.
 
-Mission items are requested one at a time: served every outer tick alone, a transfer of 1000 items takes 10 s. Not while
-ticks follow each other faster than GROUND_POLL_NS: then the outer ticks are frequent enough.
+Mission items are requested one at a time: served every outer tick alone, a transfer of 1000 items takes 10 s. Only in
+pauses of the simulator: at full speed the outer ticks are frequent enough.
 """
 GROUND_SHARE = 0.4
 """Maximum share of a real-time tick for sending to ground stations; the rest is sent in the next ticks."""
@@ -242,14 +243,14 @@ class App:
         receive, clock_ns = simulator.receive, time.monotonic_ns
         self._follower = AffinityFollower(simulator.socket)
         divisor, tick = self.stack.rates.divisor, 0
-        fresh, began_ns, before_ns = True, 0, 0  # fresh: the state received before the start
-        is_over = False
+        pace, is_over, fresh = SimulatorPace(), False, True  # fresh: the state received before the start
         while True:
             if fresh:
                 is_over = is_over or (until is not None and until())
                 if is_over and tick % divisor == 0:
                     return
-                before_ns, began_ns = began_ns, clock_ns()
+                began_ns = clock_ns()
+                pace.note_tick(began_ns)
                 commands = lockstep.tick(began_ns)
                 simulator.send(link.answer(commands, autopilot.now.status.armed))
                 timing.tick(began_ns, clock_ns())
@@ -257,7 +258,7 @@ class App:
                 if tick % divisor == 0:
                     self._between_ticks(simulator)
             # a command between the end and the next outer tick would act at a time that depends on the machine
-            if self._idle_poller is not None and not is_over and began_ns - before_ns > GROUND_POLL_NS:
+            if self._idle_poller is not None and not is_over and pace.may_pause():
                 serve_while_idle(
                     simulator, self._idle_poller, self.stack, self._process, self._serve_while_idle
                 )

@@ -21,6 +21,10 @@ IDLE_MS = 20
 """Longest wait for data of the ground links between two states of the simulator."""
 TRANSFER_MS = 1
 """The same while files are sent."""
+PAUSE_NS = 500_000
+"""Time without data from the simulator that counts as a pause; at full speed a tick takes a tenth of it."""
+PACED_NS = 50_000_000
+"""Time after a pause in which the next one is expected: several periods of a simulator that sends in bursts."""
 SIMULATOR_WARNING_S = 10.0
 """Timeout before the user is warned; waiting continues, because the simulator may be compiling."""
 
@@ -101,6 +105,23 @@ class GroundConnection:
         return self._hub.heard_s(PeerAddress(channel, *peer))
 
 
+class SimulatorPace:
+    """Recognises a simulator that pauses, after each state or after a burst of states."""
+
+    def __init__(self) -> None:
+        self._began_ns = self._paused_ns = -PACED_NS
+
+    def note_tick(self, began_ns: int) -> None:
+        """Note the time of the machine's clock at which a state was received."""
+        if began_ns - self._began_ns > PAUSE_NS:
+            self._paused_ns = began_ns
+        self._began_ns = began_ns
+
+    def may_pause(self) -> bool:
+        """Return True if the simulator paused in the last ``PACED_NS`` before the last state."""
+        return self._began_ns - self._paused_ns < PACED_NS
+
+
 def connect_simulator(process: ProcessConfig, between_tries: Callable[[], None]) -> TcpClient:
     """Connect to the simulator, calling ``between_tries`` while waiting; raise Ended after the timeout."""
     p = process
@@ -140,11 +161,14 @@ def wait_for_state(
 def serve_while_idle(
     simulator: TcpClient, poller: select.poll, stack: Stack, process: ProcessConfig, serve: Callable[[], None]
 ) -> None:
-    """Call ``serve`` as ground data arrives, and while files are sent, until the simulator sends.
+    """Call ``serve`` as ground data arrives in a pause of the simulator, and while files are sent, until it sends.
 
-    ``poller`` has the simulator and the ground links. Raise Ended after the timeout of the simulator.
+    Within a burst of states the ground links do not delay the simulation. ``poller`` has the simulator and the ground
+    links. Raise Ended after the timeout of the simulator.
     """
     number = simulator.fileno()
+    if select.select([number], [], [], PAUSE_NS * 1e-9)[0]:
+        return
     deadline_s = time.monotonic() + process.simulator_timeout_s
     while True:
         sends_files = stack.ground.sends_files

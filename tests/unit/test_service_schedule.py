@@ -12,7 +12,7 @@ import pytest
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.ftp_messages import Opcode, Packet, ftp_message
 from flightstack.mavlink.link import SILENT_AFTER_S, Address
-from flightstack.process.connections import serve_while_idle
+from flightstack.process.connections import SimulatorPace, serve_while_idle
 from flightstack.process.process_config import Ended, ProcessConfig
 from flightstack.services.registry import Schedule
 from flightstack.transports.tcp import TcpClient
@@ -95,6 +95,59 @@ def test_hub_sends_no_files_to_a_client_that_vanished_in_a_burst() -> None:
     net.now_s += SILENT_AFTER_S + 0.1
     net.poll()
     assert not net.hub.sends_files
+
+
+def paces(intervals_us: list[int]) -> list[bool]:
+    """Return, for each tick, if a pause of the simulator is expected after it; ``intervals_us`` are between ticks."""
+    pace, time_ns, expected = SimulatorPace(), 10**12, []
+    pace.note_tick(time_ns)
+    for interval_us in intervals_us:
+        time_ns += 1000 * interval_us
+        pace.note_tick(time_ns)
+        expected.append(pace.may_pause())
+    return expected
+
+
+def test_pause_is_expected_after_each_state_and_after_bursts() -> None:
+    assert paces([2000] * 50) == [True] * 50
+    burst = [200, 200, 200, 200, 9200]
+    assert paces(burst * 10)[4:] == [True] * 46
+
+
+def test_no_pause_is_expected_at_full_speed() -> None:
+    at_full_speed = paces([3000] + [50] * 1100)  # a slow tick: the processor was taken
+    assert at_full_speed.index(False) == 1000  # 50 ms later
+    assert not any(at_full_speed[1000:])
+
+
+def test_ground_links_are_served_in_a_pause_but_not_before_a_ready_state() -> None:
+    ports = PortsConfig(0, (), ("127.0.0.1", 1), "127.0.0.1", 0)
+    process = ProcessConfig("127.0.0.1", 1, 10.0, ports, None, False, None)
+    with (
+        socket.create_server(("127.0.0.1", 0)) as server,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ground,
+    ):
+        simulator = TcpClient.connect(*server.getsockname(), 10.0, lambda: None)
+        world, _ = server.accept()
+        ground.bind(("127.0.0.1", 0))
+        poller = select.poll()
+        poller.register(simulator, select.POLLIN)
+        poller.register(ground, select.POLLIN)
+        served: list[bytes] = []
+
+        def serve() -> None:
+            served.append(ground.recv(64))
+            if len(served) == 2:
+                world.send(b"state")
+
+        for data in (b"1", b"2", b"3"):
+            ground.sendto(data, ground.getsockname())
+        with world:
+            serve_while_idle(simulator, poller, Net().stack, process, serve)
+            assert served == [b"1", b"2"]
+            serve_while_idle(simulator, poller, Net().stack, process, serve)
+            assert served == [b"1", b"2"]
+        simulator.close()
 
 
 def test_hung_simulator_is_detected_while_files_are_sent() -> None:
