@@ -296,10 +296,8 @@ def test_stopping_does_not_end_the_safe_state(target: Target) -> None:
 @pytest.mark.parametrize(
     "values", [(2,), (math.nan, 1), (1, 0), (1, 1_001), (1, math.nan), (1, 1, -1), (1, 1, 10_000.001)]
 )
-def test_a_command_out_of_range_is_denied(values: tuple[float, ...]) -> None:
-    target = Target()
+def test_a_command_out_of_range_is_denied(target: Target, values: tuple[float, ...]) -> None:
     assert free_run(target, *values) == DENIED
-    target.close()
 
 
 def test_a_port_without_microseconds_does_not_run_freely() -> None:
@@ -381,10 +379,9 @@ def test_figures_without_room_count_in_the_next_second(target: Target) -> None:
     at(target, 0, state(1, RESET))
     for _ in range(60):  # refused in flight, with a report each
         target.give(target.pack(step(3)))
-    target.poll(1_000)
-    assert "FS_PIL_TIMING" not in kinds(target.heard())
-    target.poll(10)
-    assert "FS_PIL_TIMING" not in kinds(target.heard())
+    for passed_ms in (1_000, 10):
+        target.poll(passed_ms)
+        assert "FS_PIL_TIMING" not in kinds(target.heard())
     at(target, PERIOD_US)
     assert timing(target).ticks == 2
 
