@@ -129,6 +129,22 @@ def test_noise_with_pauses_keeps_the_rate(target: Target) -> None:
     assert target.baud == FAST
 
 
+@pytest.mark.parametrize(
+    ("pauses_ms", "baud"), [((1_000,), FAST), ((500, 499), FAST), ((500, 500), START_BAUD)]
+)
+def test_noise_counts_from_the_first_octet_after_a_pause_of_1_s(
+    target: Target, pauses_ms: tuple[int, ...], baud: int
+) -> None:
+    at_rate(target, FAST)
+    target.poll(1)
+    for pause_ms in (1, *pauses_ms):
+        target.give(b"\0")
+        target.poll(pause_ms)
+    target.heard()
+    target.poll(1)
+    assert target.baud == baud
+
+
 def test_noise_at_the_first_rate_changes_nothing(target: Target) -> None:
     noise(target, 5_000)
     assert target.baud == START_BAUD
@@ -140,6 +156,15 @@ def test_a_rate_that_the_line_cannot_have_is_denied(target: Target, baud: float)
     assert set_baud(target, baud) == DENIED
     target.poll(1)
     assert target.baud == START_BAUD
+
+
+@pytest.mark.parametrize("baud", [9_599, 20_000_002])
+def test_a_rate_out_of_range_is_denied_although_the_line_can_have_it(baud: int) -> None:
+    target = Target(bauds=(baud,))
+    target.poll()
+    target.heard()
+    assert set_baud(target, baud) == DENIED
+    target.close()
 
 
 @pytest.mark.parametrize("baud", [9_600, 20_000_000])

@@ -98,7 +98,8 @@ def test_event_with_the_number_of_another_kind_is_refused(target: Target) -> Non
 
 
 def test_event_before_a_start_is_refused(target: Target) -> None:
-    assert sense(target, 0, IMU, SAMPLE).status == OUT_OF_ORDER
+    answer = sense(target, 5, IMU, SAMPLE)
+    assert (answer.status, answer.event) == (OUT_OF_ORDER, 0)
 
 
 @pytest.mark.parametrize(
@@ -120,8 +121,8 @@ def test_memory_is_read_as_words(target: Target) -> None:
     count = layout.itemsize // 4
     words = np.zeros(count + 60, np.uint32)
     for first in range(0, count, 60):
-        answer = sense(target, 0, READ, (first,))
-        assert answer.first == first
+        answer = sense(target, first, READ, (first,))
+        assert (answer.event, answer.first) == (first, first)
         words[first : first + 60] = answer.words
     assert not words[count:].any()
     params = words[:count].view(layout)["params"][0]

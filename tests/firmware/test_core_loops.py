@@ -115,6 +115,16 @@ def test_an_integral_too_large_to_be_carried_over_is_dropped() -> None:
     assert c.integrals == [0.0, 1e308, 1e308]
 
 
+@pytest.mark.parametrize("axis", range(3))
+def test_each_gain_carries_its_own_integral_over(axis: int) -> None:
+    _, c = both("pid", load_vehicle("paper_quad"))
+    name = ("PID_ROLL_I", "PID_PITCH_I", "PID_YAW_I")[axis]
+    assert c.set(name, 2.0) == 0
+    c.core.call("drive_set_integral", c.memory, c.core.c_real(1.0))
+    assert c.set(name, 4.0) == 0
+    assert c.integrals == [0.5 if each == axis else 1.0 for each in range(3)]
+
+
 def test_another_law_starts_without_memory() -> None:
     _, c = both("pid", load_vehicle("paper_quad"))
     c.run(*level(100, OUTER_DUE))
