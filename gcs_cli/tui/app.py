@@ -51,7 +51,8 @@ def _theme(name: str, colours: Palette, dark: bool) -> Theme:
 THEMES = (_theme("gcs-dark", DARK, dark=True), _theme("gcs-light", LIGHT, dark=False))
 
 
-REDRAWS_HZ = 8.0
+REDRAWS_HZ = 5.0
+"""Fly in 200 × 50 cells takes 10 % of a core so, 14 % at 8 Hz."""
 _ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 

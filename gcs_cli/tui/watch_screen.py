@@ -53,7 +53,7 @@ class Tabs(KeepsLines):
 class WatchScreen(Screen[None]):
     """A screen of the application. A subclass yields its widgets in ``compose_body``.
 
-    ``show`` is called at most 8 times a second, while the screen is visible and composed.
+    ``show`` is called at most five times a second, while the screen is visible and composed.
     """
 
     DRAWN: ClassVar = "#body > *"

@@ -48,7 +48,7 @@ class FlyScreen(WatchScreen):
                 yield Drawing(timing_panel, "Loops", every=4, id="loops")
                 yield Drawing(link_panel, "Link", id="link")
             with Vertical(id="past"):
-                yield Drawing(self._trends, "Last 2 minutes", every=8, id="trends")
+                yield Drawing(self._trends, "Last 2 minutes", every=5, id="trends")
 
     def show(self, view: VehicleView, now_s: float) -> None:
         """Draw the state, or the wait for a vehicle."""
