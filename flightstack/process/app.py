@@ -46,8 +46,8 @@ GROUND_IDLE_NS = 2_000_000
 GROUND_BUSY_NS = 50_000_000
 """Time after received data in which the ground links are also served while waiting for the simulator.
 
-Mission items are requested one at a time: served every outer tick alone, a transfer of 1000 items takes 10 s. Only in
-pauses of the simulator: at full speed the outer ticks are frequent enough.
+Mission items are requested one at a time: served every outer tick alone, a transfer of 1000 items takes 10 s. Not while
+states follow each other at full speed: then the outer ticks are frequent enough.
 """
 GROUND_SHARE = 0.4
 """Maximum share of a real-time tick for sending to ground stations; the rest is sent in the next ticks."""
@@ -75,7 +75,8 @@ class App:
         self._next_log_us = 0
         self._next_ground_ns = 0
         self._busy_until_ns = 0
-        self._idle_poller: select.poll | None = None
+        self._poller = select.poll()  # simulator and ground links
+        self._serves_pauses = False
         self._follower: AffinityFollower | None = None
 
     # ------------------------------------------------------------------ lifecycle
@@ -117,6 +118,8 @@ class App:
     def _fly(self, simulator: TcpClient) -> None:
         """Wait for the first state and run the loops until the process ends, with reboots on request."""
         holds_time, waits = self._process.wait_for_start, True
+        self._poller.register(simulator, select.POLLIN)
+        self._ground.register(self._poller)
         simulator.send(self.stack.simulator.initial_requests(self.stack.rates.interval_us))
         while True:
             try:
@@ -211,9 +214,6 @@ class App:
 
     def _hold_time(self, simulator: TcpClient) -> None:
         """Hold time at zero and serve the ground links until the vehicle flies a mission."""
-        poller = select.poll()
-        poller.register(simulator, select.POLLIN)
-        self._ground.register(poller)
         now = self.stack.now
         next_heartbeat_s = 0.0
         while not (now.status.armed and now.status.mode is Mode.MISSION):
@@ -222,7 +222,7 @@ class App:
                 next_heartbeat_s = time.monotonic() + 1.0
                 simulator.send(self.stack.simulator.heartbeat(now.status.armed))
             self._send_requests(simulator)
-            poller.poll(20)
+            self._poller.poll(20)
             data = simulator.receive_now()
             if data is not None:
                 self.stack.simulator.receive(data)
@@ -258,10 +258,8 @@ class App:
                 if tick % divisor == 0:
                     self._between_ticks(simulator)
             # a command between the end and the next outer tick would act at a time that depends on the machine
-            if self._idle_poller is not None and not is_over and pace.may_pause():
-                serve_while_idle(
-                    simulator, self._idle_poller, self.stack, self._process, self._serve_while_idle
-                )
+            if self._serves_pauses and not is_over and pace.pauses(simulator):
+                serve_while_idle(simulator, self._poller, self.stack, self._process, self._serve_while_idle)
             data = receive()
             fresh = self._wait_for_simulator(simulator, not is_over) if data is None else link.receive(data)
 
@@ -304,7 +302,7 @@ class App:
             simulator.send(link.answer(commands, autopilot.now.status.armed))
             timing.tick(began_ns, time.monotonic_ns())
             tick += 1
-            if tick % self.stack.rates.divisor == 0 or self._idle_poller is not None:
+            if tick % self.stack.rates.divisor == 0 or self._serves_pauses:
                 self._between_ticks(simulator)
                 check_deadline(heard_s + self._process.simulator_timeout_s, self.stack, self._process)
             elif self._ground.is_sending:
@@ -327,20 +325,15 @@ class App:
             self._follower.update()
         heard = self._serve_ground() or self.stack.ground.sends_files
         self._next_ground_ns = now_ns + (GROUND_POLL_NS if heard else GROUND_IDLE_NS)
-        self._note_traffic(heard, now_ns, simulator)
+        self._note_traffic(heard, now_ns)
         self._send_requests(simulator)
         self._check_stop()
 
-    def _note_traffic(self, heard: bool, now_ns: int, simulator: TcpClient) -> None:
+    def _note_traffic(self, heard: bool, now_ns: int) -> None:
         """Begin or end to serve the ground links while waiting."""
         if heard:
             self._busy_until_ns = now_ns + GROUND_BUSY_NS
-            if self._idle_poller is None:
-                self._idle_poller = select.poll()
-                self._idle_poller.register(simulator, select.POLLIN)
-                self._ground.register(self._idle_poller)
-        elif now_ns >= self._busy_until_ns:
-            self._idle_poller = None
+        self._serves_pauses = now_ns < self._busy_until_ns
 
     def _report_notices(self) -> None:
         """Report problems with the simulator's steps; raise Ended before a mission that cannot be flown."""

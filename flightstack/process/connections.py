@@ -22,7 +22,8 @@ IDLE_MS = 20
 TRANSFER_MS = 1
 """The same while files are sent."""
 PAUSE_NS = 500_000
-"""Time without data from the simulator that counts as a pause; at full speed a tick takes a tenth of it."""
+"""Time between the starts of two ticks above which the simulator counts as waiting; at full speed it is a twentieth to
+a third of it."""
 PACED_NS = 50_000_000
 """Time after a pause in which the next one is expected: several periods of a simulator that sends in bursts."""
 SIMULATOR_WARNING_S = 10.0
@@ -106,20 +107,32 @@ class GroundConnection:
 
 
 class SimulatorPace:
-    """Recognises a simulator that pauses, after each state or after a burst of states."""
+    """Recognises the pauses of a simulator that waits after each state or after a burst of states."""
 
     def __init__(self) -> None:
         self._began_ns = self._paused_ns = -PACED_NS
 
     def note_tick(self, began_ns: int) -> None:
-        """Note the time of the machine's clock at which a state was received."""
+        """Note the time of the machine's clock at which a tick begins."""
         if began_ns - self._began_ns > PAUSE_NS:
             self._paused_ns = began_ns
         self._began_ns = began_ns
 
     def may_pause(self) -> bool:
-        """Return True if the simulator paused in the last ``PACED_NS`` before the last state."""
+        """Return True if there was a pause in the last ``PACED_NS`` before this tick."""
         return self._began_ns - self._paused_ns < PACED_NS
+
+    def pauses(self, simulator: TcpClient) -> bool:
+        """Return True if the simulator sends nothing until ``PAUSE_NS`` after the start of this tick.
+
+        Waits for that only if a pause may come: within a burst the next state comes first. A tick that took longer
+        itself, for example on a serial target, has no wait.
+        """
+        if not self.may_pause():
+            return False
+        left_ns = max(0, self._began_ns + PAUSE_NS - time.monotonic_ns())
+        # unlike poll, in microseconds; the descriptor is one of the first, below the limit of select
+        return not select.select([simulator.fileno()], [], [], left_ns * 1e-9)[0]
 
 
 def connect_simulator(process: ProcessConfig, between_tries: Callable[[], None]) -> TcpClient:
@@ -161,14 +174,11 @@ def wait_for_state(
 def serve_while_idle(
     simulator: TcpClient, poller: select.poll, stack: Stack, process: ProcessConfig, serve: Callable[[], None]
 ) -> None:
-    """Call ``serve`` as ground data arrives in a pause of the simulator, and while files are sent, until it sends.
+    """Call ``serve`` as ground data arrives, and while files are sent, until the simulator sends.
 
-    Within a burst of states the ground links do not delay the simulation. ``poller`` has the simulator and the ground
-    links. Raise Ended after the timeout of the simulator.
+    ``poller`` has the simulator and the ground links. Raise Ended after the timeout of the simulator.
     """
     number = simulator.fileno()
-    if select.select([number], [], [], PAUSE_NS * 1e-9)[0]:
-        return
     deadline_s = time.monotonic() + process.simulator_timeout_s
     while True:
         sends_files = stack.ground.sends_files

@@ -84,7 +84,7 @@ class WatchScreen(Screen[None]):
 
     def compose(self) -> ComposeResult:
         """Yield the frame around the body."""
-        yield Drawing(self._status, id="status")
+        yield Drawing(self._status, every=1, id="status")
         yield Tabs(id="tabs")
         with Container(id="body"):
             yield from self.compose_body()

@@ -1,4 +1,4 @@
-"""Let a target of the tests run freely: start it, let times and states come, and read its commands and figures."""
+"""Free runs of a target in the tests: start one, advance its time, send states, read commands and figures."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def drives(target: Target) -> list[Any]:
 
 
 def at(target: Target, now_us: int, *states: Any) -> list[Any]:
-    """Let a time come, first the tick that is due, then states; return the commands."""
+    """Advance to a time, first the tick that is due, then states; return the commands."""
     target.run(now_us)
     for each in states:
         target.give(target.pack(each))

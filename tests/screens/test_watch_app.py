@@ -277,7 +277,7 @@ def test_vehicles_are_listed_selected_and_commanded_together() -> None:
         await pilot.pause()
         assert "hexarotor  GUIDED" in "\n".join(shown(app))
         await pilot.press("end", "enter")
-        await pilot.pause(0.3)
+        await pilot.pause(2 / REDRAWS_HZ)
         assert app.feed.commands_all
         assert "COMMANDS TO ALL 2" in shown(app)[0]
         await pilot.press("v", "down", "enter")

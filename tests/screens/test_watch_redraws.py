@@ -38,7 +38,7 @@ def test_redraws_of_a_moving_vehicle_compute_no_layout(
         await pilot.pause()
         monkeypatch.setattr(Screen, "_refresh_layout", count)
         for step in range(1, 9):
-            app.feed.time_s += 0.125
+            app.feed.time_s += 1 / REDRAWS_HZ
             place = Vector(FULL.position_ned_m.x + step, 0.0, -5.0)
             app.feed.shown = FULL._replace(position_ned_m=place, time_s=100.0 + step)
             app.redraw()

@@ -6,13 +6,14 @@ import math
 import random
 import select
 import socket
+import time
 
 import pytest
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.ftp_messages import Opcode, Packet, ftp_message
 from flightstack.mavlink.link import SILENT_AFTER_S, Address
-from flightstack.process.connections import SimulatorPace, serve_while_idle
+from flightstack.process.connections import PAUSE_NS, SimulatorPace, serve_while_idle
 from flightstack.process.process_config import Ended, ProcessConfig
 from flightstack.services.registry import Schedule
 from flightstack.transports.tcp import TcpClient
@@ -120,33 +121,36 @@ def test_no_pause_is_expected_at_full_speed() -> None:
     assert not any(at_full_speed[1000:])
 
 
-def test_ground_links_are_served_in_a_pause_but_not_before_a_ready_state() -> None:
-    ports = PortsConfig(0, (), ("127.0.0.1", 1), "127.0.0.1", 0)
-    process = ProcessConfig("127.0.0.1", 1, 10.0, ports, None, False, None)
-    with (
-        socket.create_server(("127.0.0.1", 0)) as server,
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ground,
-    ):
+def test_pause_is_silence_from_the_start_of_a_tick() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
         simulator = TcpClient.connect(*server.getsockname(), 10.0, lambda: None)
         world, _ = server.accept()
-        ground.bind(("127.0.0.1", 0))
-        poller = select.poll()
-        poller.register(simulator, select.POLLIN)
-        poller.register(ground, select.POLLIN)
-        served: list[bytes] = []
-
-        def serve() -> None:
-            served.append(ground.recv(64))
-            if len(served) == 2:
-                world.send(b"state")
-
-        for data in (b"1", b"2", b"3"):
-            ground.sendto(data, ground.getsockname())
         with world:
-            serve_while_idle(simulator, poller, Net().stack, process, serve)
-            assert served == [b"1", b"2"]
-            serve_while_idle(simulator, poller, Net().stack, process, serve)
-            assert served == [b"1", b"2"]
+            pace = SimulatorPace()
+            began_ns = time.monotonic_ns()
+            pace.note_tick(began_ns)
+            assert pace.pauses(simulator)
+            assert time.monotonic_ns() - began_ns >= PAUSE_NS  # a state of a burst would have come first
+            world.send(b"state")
+            select.select([simulator.fileno()], [], [])
+            assert not pace.pauses(simulator)
+        simulator.close()
+
+
+def test_tick_longer_than_a_pause_has_no_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+    waits_s: list[float] = []
+
+    def silent(_read: object, _write: object, _other: object, timeout_s: float) -> tuple[list[int], ...]:
+        waits_s.append(timeout_s)
+        return [], [], []
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        simulator = TcpClient.connect(*server.getsockname(), 10.0, lambda: None)
+        monkeypatch.setattr(select, "select", silent)
+        pace = SimulatorPace()
+        pace.note_tick(time.monotonic_ns() - 2 * PAUSE_NS)
+        assert pace.pauses(simulator)
+        assert waits_s == [0.0]
         simulator.close()
 
 

@@ -45,7 +45,7 @@ class FlyScreen(WatchScreen):
                 yield Drawing(position_panel, "Position", id="position")
                 yield Drawing(power_panel, "Power", id="power")
                 yield Drawing(health_panel, "Health", id="health")
-                yield Drawing(timing_panel, "Loops", every=4, id="loops")
+                yield Drawing(timing_panel, "Loops", every=2, id="loops")
                 yield Drawing(link_panel, "Link", id="link")
             with Vertical(id="past"):
                 yield Drawing(self._trends, "Last 2 minutes", every=5, id="trends")

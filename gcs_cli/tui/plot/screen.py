@@ -22,7 +22,7 @@ _SPANS_S = (5.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0)
 _EVERY = 2
 """Drawn in one of so many redraws, and at once when the user moves the cursor."""
 
-_PICKER_EVERY = 4
+_PICKER_EVERY = 2
 
 _LONGEST_STEP_S = 1.0
 
