@@ -30,6 +30,8 @@ _GENERAL = frozenset(
     ("fs_attitude_reference.c", "fs_position_pid.c", "fs_attitude_pid.c", "fs_attitude_backstepping.c")
 )
 """Generated files that are the same for every controller."""
+_SHARED = ("fs_geometry.h", "fs_portable_math.h")
+"""Generated headers of functions that laws and estimator share: the estimator has those that no law uses."""
 KEPT_TREES = 8
 """Number of generated firmware trees that are kept."""
 WARNINGS = (
@@ -66,12 +68,19 @@ def logged_params(controller: Controller, text: str, log: Path) -> LawValues:
 
 
 def generated_files(controller: AnyController) -> dict[str, str]:
-    """Return the files of ``core`` with this controller's laws; raise ConfigError if one is outside the subset."""
+    """Return the files of ``core`` with this controller's laws; raise ConfigError if one is outside the subset.
+
+    The estimator's files are among them if the laws use a function that was the estimator's alone.
+    """
     from flightstack.firmware.generator.core_files import core_files  # noqa: PLC0415  # a tenth of a second
+    from flightstack.firmware.generator.filter_files import filter_files  # noqa: PLC0415
     from flightstack.firmware.generator.subset import OutsideSubsetError  # noqa: PLC0415
 
+    laws, core = laws_with(controller), firmware_root() / "core"
     try:
-        texts = core_files(laws_with(controller))
+        texts = core_files(laws)
+        if any((core / name).read_text(encoding="ascii") != texts.get(name, "") for name in _SHARED):
+            texts |= {f"estimation/{name}": text for name, text in filter_files(laws).items()}
     except (OutsideSubsetError, TypeError, ValueError) as error:
         raise ConfigError("--controller", controller.name, f"has no C: {error}") from None
     if any(_LAW_MATH in text for text in texts.values()):
@@ -96,7 +105,9 @@ def write_tree(controller: AnyController, folder: Path) -> Path:
     for name, text in texts.items():
         (folder / "core" / name).write_text(text, encoding="utf-8")
     by_hand = {path.name for law in controller_of(controller).own_laws.values() for path in law.sources}
-    laws = sorted(name for name in texts.keys() - by_hand - _GENERAL if name.endswith(".c"))
+    laws = sorted(
+        name for name in texts.keys() - by_hand - _GENERAL if name.endswith(".c") and "/" not in name
+    )
     _compile_strictly(controller, [folder / "core" / name for name in laws])
     return folder
 
