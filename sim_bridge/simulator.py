@@ -267,29 +267,33 @@ class Simulator:
         """Steps of the plant in an interval."""
         return self._steps
 
-    def pass_by(self, count: int, result: int) -> None:
-        """Count quiet intervals that the plant's kernel advanced, with the bits of the last one; raise as ``apply``."""
+    def pass_by(self, count: int, result: int, fields: int) -> None:
+        """Count quiet intervals that the plant's kernel advanced, with the bits of the last one; raise as ``apply``.
+
+        ``fields`` are the bits of HIL_SENSOR for sensors that are not inertial.
+        """
         self.time_us += count * self._interval_us
         self._set_flags(result)
         if self.sensors is not None:
-            self.sensors.pass_by(count)
+            self.sensors.pass_by(count, fields)
 
     @property
     def sends_state_alone(self) -> bool:
         """True if ``outgoing`` has the true state and, with sensors, messages of sensors, but nothing else."""
         return self._sent is None and self.time_us < self._battery_due_us
 
-    def quiet_intervals(self) -> int:
-        """Return how many of the next intervals change nothing but the state and the inertial sensor.
+    def quiet_intervals(self, measures: bool) -> int:
+        """Return how many of the next intervals change nothing but the state and the inertial sensors.
 
-        The bytes after each of them are FS_PLANT_STATE and, with sensors, one HIL_SENSOR.
+        The bytes after each of them are FS_PLANT_STATE and, with sensors, HIL_SENSOR. With ``measures``, magnetometer
+        and barometer may change too.
         """
         sensors = self.sensors
         if self._sent is not None or not (sensors is None or sensors.is_quiet):
             return 0
         due_us = min(self._change_us, self._battery_due_us)
         if sensors is not None:
-            due_us = min(due_us, sensors.next_us)
+            due_us = min(due_us, sensors.next_other_us if measures else sensors.next_us)
         return max(0, (due_us - 1 - self.time_us) // self._interval_us)
 
     def _follow_faults(self) -> None:

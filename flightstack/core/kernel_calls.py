@@ -53,3 +53,5 @@ call_kernel = intrinsic(_call(types.none))
 """Call the kernel at an address with a tuple of arguments."""
 call_kernel_int = intrinsic(_call(types.int64))
 """Call the kernel at an address, which returns a whole number, with a tuple of arguments."""
+call_kernel_float = intrinsic(_call(types.float64))
+"""Call the kernel at an address, which returns a float, with a tuple of arguments."""

@@ -231,10 +231,12 @@ class SensorFeed:
             lane.estimator.imu_row(lane.newest.imu_track.take_wire(time_s, step_us, wire, record))
         self._write_state()
 
-    def pass_by(self, time_us: int, step_us: int) -> None:
-        """Count a measurement of each inertial sensor at ``time_us`` as taken."""
+    def pass_by(self, time_us: int, step_us: int, mag: MagSample | None, baro: BaroSample | None) -> None:
+        """Count a measurement of each inertial sensor at ``time_us`` as taken, and those of the others if not None."""
         for lane in self.lanes:
             lane.measured_us, lane.step_us = time_us, step_us
+            lane.newest.mag = mag or lane.newest.mag
+            lane.newest.baro = baro or lane.newest.baro
 
     @property
     def selected(self) -> int:

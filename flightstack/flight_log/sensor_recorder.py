@@ -24,6 +24,7 @@ from flightstack.flight_log.estimator_topics import (
 from flightstack.flight_log.flight_log import FlightLog, Trace
 from flightstack.flight_log.local_position import fill_local_position
 from flightstack.flight_log.recorder import FlightRecorder
+from flightstack.flight_log.sensor_rows import store_truth
 from flightstack.flight_log.sensor_topics import (
     BARO_GROUP,
     GNSS_GROUP,
@@ -45,6 +46,7 @@ SENSOR_GROUPS = (
 )  # fmt: skip
 TRUTH_INTERVAL_US, GLOBAL_INTERVAL_US, ESTIMATOR_INTERVAL_US = 10_000, 100_000, 500_000
 """Intervals of PX4's logger."""
+NEVER_US = 1 << 62
 LOCAL_INTERVAL_US = 200_000
 """Interval of the validity and accuracy of the local position: a report of the estimator takes 0.1 ms."""
 _FILLS: dict[type, tuple[Group, Callable[[FloatArray, Any], None]]] = {
@@ -62,9 +64,12 @@ class SensorRecorder:
         """``frame`` is the vehicle's local frame; ``home`` is the origin of the true position."""
         self._recorder = recorder
         self._frame, self._true_frame = frame, LocalFrame(home)
-        # of the true frame's origin in the vehicle's; heights of both count from the ground at the start, so that the
-        # altitude of GNSS at the first fix is no error of the height
-        self._offset_m = np.zeros(3)
+        self.offset_m: FloatArray = np.zeros(3)
+        """Of the true frame's origin in the vehicle's [m NED].
+
+        Heights of both count from the ground at the start: the altitude of GNSS at the first fix is no error of the
+        height.
+        """
         self._log: FlightLog | None = None
         scratch: FloatArray = np.zeros(IMU_GROUP.columns)
         self._no_row: Callable[[int], FloatArray] = lambda _: scratch
@@ -78,7 +83,7 @@ class SensorRecorder:
             self._log = log
             self._imu_row = self._no_row if log is None else log.sampled[IMU_GROUP.name].append
             if log is not None:
-                self._offset_m[:2] = self._frame.to_ned(self._true_frame.origin)[:2]
+                self.offset_m[:2] = self._frame.to_ned(self._true_frame.origin)[:2]
                 self._truth_us = self._global_us = self._estimator_us = 0
                 log.binary_information(ESTIMATOR_START, estimator())
 
@@ -86,17 +91,31 @@ class SensorRecorder:
         """Return the row of ``IMU_GROUP`` for a sample that the estimator takes; without a log a scratch row."""
         return self._imu_row(time_us)
 
-    @property
-    def imu_trace(self) -> Trace | None:
-        """Rows of ``imu_row`` in the open log; None without one."""
-        return None if self._log is None else self._log.sampled[IMU_GROUP.name]
+    def trace(self, group: Group) -> Trace | None:
+        """Return the rows of a group in the open log; None without one."""
+        return None if self._log is None else self._log.sampled[group.name]
 
     @property
-    def due_us(self) -> int:
-        """Time from which ``state`` records something; 0 for a new log."""
+    def truth_due_us(self) -> int:
+        """Time from which ``state`` records the true state."""
+        return NEVER_US if self._log is None else self._truth_us
+
+    def due_us(self, with_truth: bool) -> int:
+        """Return the time from which ``state`` records something; 0 for a new log.
+
+        Without ``with_truth``, something besides the rows of ``TRUTH_GROUP``.
+        """
         if self._recorder.log is not self._log:
             return 0
-        return self._local_us if self._log is None else min(self._local_us, self._truth_us)
+        if self._log is None:
+            return self._local_us
+        if with_truth:
+            return min(self._local_us, self._truth_us)
+        return min(self._local_us, self._global_us, self._estimator_us)
+
+    def pass_by(self, truth_due_us: int) -> None:
+        """Follow the rows of ``TRUTH_GROUP`` that a kernel recorded: the next one is due at ``truth_due_us``."""
+        self._truth_us = truth_due_us
 
     def sample(self, sample: Sample) -> None:
         """Record a sample of another sensor that the estimator takes."""
@@ -140,9 +159,7 @@ class SensorRecorder:
         fill_local_position(self._recorder.estimate, sensed)
 
     def _record_truth(self, log: FlightLog, time_us: int, truth: FloatArray) -> None:
-        row = log.sampled[TRUTH_GROUP.name].append(time_us)
-        row[:] = truth
-        row[:3] += self._offset_m
+        store_truth(log.sampled[TRUTH_GROUP.name].append(time_us), truth, self.offset_m)
         if time_us >= self._global_us:
             self._global_us = time_us + GLOBAL_INTERVAL_US
             place = self._true_frame.to_geo(Vector3(*truth[:3].tolist()))

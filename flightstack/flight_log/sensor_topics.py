@@ -10,11 +10,10 @@ import math
 from flightstack.core.contract import STATE_SIZE, FloatArray
 from flightstack.core.portable_math import atan2, distance
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, MagSample, RangeSample
+from flightstack.flight_log.sensor_rows import store_baro, store_mag
 from flightstack.flight_log.topics import Field, Group, Topic, outer_heading
 from flightstack.mavlink.dialect import mavlink
 
-_GAS_CONSTANT_DRY_AIR = 287.1
-_KELVIN = 273.15
 _DEVICE = 1
 """Device id of the only sensor of each kind."""
 
@@ -132,16 +131,13 @@ RANGE_GROUP = Group(
 
 def fill_mag(row: FloatArray, sample: MagSample) -> None:
     """Fill a row of ``MAG_GROUP``."""
-    row[0], row[1:4] = round(sample.time_s * 1e6), sample.field_frd_gauss
+    store_mag(row, round(sample.time_s * 1e6), *sample.field_frd_gauss)
 
 
 def fill_baro(row: FloatArray, sample: BaroSample) -> None:
-    """Fill a row of ``BARO_GROUP``; the density is that of dry air."""
-    pressure_pa = sample.pressure_hpa * 100.0
-    density = pressure_pa / (_GAS_CONSTANT_DRY_AIR * (sample.temperature_c + _KELVIN))
-    row[:] = (
-        round(sample.time_s * 1e6), sample.pressure_altitude_m, sample.temperature_c, pressure_pa, density,
-    )  # fmt: skip
+    """Fill a row of ``BARO_GROUP``."""
+    time_us = round(sample.time_s * 1e6)
+    store_baro(row, time_us, sample.pressure_hpa, sample.pressure_altitude_m, sample.temperature_c)
 
 
 def fill_gnss(row: FloatArray, sample: GnssSample) -> None:

@@ -173,7 +173,11 @@ class Engine:
             if self.tick():
                 return 1, True
             done = 1
-        count = 0 if exchanges else min(most - done, self._left, self._quiet.count(self.simulator))
+        count = (
+            0
+            if exchanges
+            else min(most - done, self._left, self._quiet.count(self.simulator, self.actuators))
+        )
         if count > 0:
             count = self._quiet.run(self.simulator, self.actuators, count)
             self._count(count, count)

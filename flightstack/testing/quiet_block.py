@@ -21,9 +21,11 @@ from flightstack.estimation.filter_core import PythonCore
 from flightstack.estimation.imu_track import RECORD_SIZE, take_wire
 from flightstack.estimation.memory import ALIGNED, FLAGS, POSITION_RESET, RESETS, VELOCITY_RESET, YAW_RESET
 from flightstack.flight_log.flight_log import DEFAULT_CAPACITY, Trace
+from flightstack.flight_log.sensor_topics import IMU_GROUP
 from flightstack.process.assembly import Stack
 from flightstack.simulator_link.hot_frames import ActuatorsFrame
 from flightstack.testing.quiet_outer import QuietOuter
+from flightstack.testing.quiet_slow import QuietSlow
 from flightstack.vehicle.quiet_kernel import (
     ADVANCE,
     CALLS,
@@ -107,6 +109,7 @@ class QuietBlock:
         self._sensors, self._estimation = simulator.sensors, stack.estimation
         self._estimates = _estimates(stack)
         self.outer = QuietOuter(stack, loops)
+        self._slow = QuietSlow(simulator, stack.estimation, stack.simulator.truth)
         self._interval_us, self._divisor = simulator.interval_us, stack.rates.divisor
         self.waited = False
         """True if the last tick of ``run`` waited for Python."""
@@ -151,7 +154,8 @@ class QuietBlock:
             _bytes(faults.rotors), _bytes(faults.lags),
         )  # fmt: skip
         return (
-            calls, self.outer.calls, self._counters, self._interval_us, self._divisor, plant_part, sensing, control
+            calls, self.outer.calls, self._slow.calls, self._counters, self._interval_us, self._divisor, plant_part,
+            sensing, self._slow.constant, control,
         )  # fmt: skip
 
     def _changing(self, count: int, is_taken: bool, log: Trace, imu_log: Trace) -> _Arguments:
@@ -159,7 +163,8 @@ class QuietBlock:
         now, estimation = self._stack.now, self._estimation
         return (
             count, is_taken, self._stack.parts.autopilot.next_outer, now.time_us, self._actuators.flags, self._flies,
-            now.row, self._estimates[0 if estimation is None else estimation.feed.selected], self.outer.arguments(),
+            now.row, self._estimates[0 if estimation is None else estimation.feed.selected], self._slow.following(),
+            self.outer.arguments(),
             (log.rows, log.times_us, log.n), (imu_log.rows, imu_log.times_us, imu_log.n),
         )  # fmt: skip
 
@@ -175,24 +180,28 @@ class QuietBlock:
             and simulator.sensors is self._sensors
         )
 
+    def _logs(self) -> tuple[Trace, Trace]:
+        """Return the traces of the inner loop and of the inertial sensor; without a log, some that are not recorded."""
+        log, estimation = self._stack.recorder.log, self._estimation
+        imu_log = None if estimation is None else estimation.recorder.trace(IMU_GROUP)
+        return self._no_log if log is None else log.inner, imu_log or self._no_imu_log
+
+    def room(self, is_taken: bool = False) -> int:
+        """Return how many ticks ``run`` can run: 0 if a log is full or a fault acts between steps."""
+        log, imu_log = self._logs()
+        advances = min(self._plant.quiet_steps() // self._simulator.steps, imu_log.capacity - imu_log.n)
+        if self._sensors is not None:
+            advances = min(advances, self._sensors.imus.rows_left(), self._slow.room())
+        return min(advances + is_taken, log.capacity - log.n)
+
     def run(self, count: int, is_taken: bool = False) -> int:
-        """Run ``count`` ticks, or fewer, at least one unless a log is full or a fault acts between steps.
+        """Run ``count`` ticks, ``room`` at most, or fewer, but one at least.
 
         With ``is_taken``, vehicle and estimator have the state of the first one. Return their number. Raise
         PlantDivergedError.
         """
-        stack, sensors, estimation = self._stack, self._sensors, self._estimation
-        recorded = stack.recorder.log
-        log = self._no_log if recorded is None else recorded.inner
-        imu_log = (None if estimation is None else estimation.imu_trace) or self._no_imu_log
-        advances = min(
-            count - is_taken, self._plant.quiet_steps() // self._simulator.steps, imu_log.capacity - imu_log.n
-        )
-        if sensors is not None:
-            advances = min(advances, sensors.imus.rows_left())
-        count = min(advances + is_taken, log.capacity - log.n)
-        if count <= 0:
-            return 0
+        stack, recorded = self._stack, self._stack.recorder.log
+        log, imu_log = self._logs()
         now, flies = stack.now, self._flies
         self._fraction[0] = self._loops.fraction
         if not flies:
@@ -222,10 +231,11 @@ class QuietBlock:
             stack.simulator.has_arrived = True
         if ticks:
             stack.parts.autopilot.pass_by(ticks, began_us + ticks * interval_us, rows[ticks - 1])
+        fields, mag, baro = self._slow.pass_by()
         if flown:
-            self._simulator.pass_by(flown, result)
+            self._simulator.pass_by(flown, result, fields)
         if self._estimation is not None and sensed:
-            self._estimation.pass_by(began_us + (ticks + waits) * interval_us, interval_us)
+            self._estimation.pass_by(began_us + (ticks + waits) * interval_us, interval_us, mag, baro)
         if waits:
             commands = stack.parts.autopilot.tick(began_us + (ticks + 1) * interval_us)
             self._actuators.rotor_speed_rad_s[:] = commands

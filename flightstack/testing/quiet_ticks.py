@@ -28,17 +28,30 @@ class QuietTicks:
         """True if all ticks of the last call of ``run_periods`` were compiled ones: the vehicle had no event."""
         self._block = QuietBlock(stack, simulator, actuators) if compiles(stack, simulator) else None
 
-    def count(self, simulator: Simulator) -> int:
+    def count(self, simulator: Simulator, actuators: ActuatorsFrame) -> int:
         """Return how many of the next ticks are quiet. The last tick's answer was taken and is not applied yet."""
         if simulator.interval_us != self._interval_us or not self._lockstep.is_quiet:
             return 0
-        return min(self._autopilot.quiet_ticks, self._quiet_intervals(simulator, self._now.time_us))
+        block = self._fitting(simulator, actuators)
+        count = min(
+            self._autopilot.quiet_ticks,
+            self._quiet_intervals(simulator, self._now.time_us, block is not None),
+        )
+        return count if block is None or count <= 0 else min(count, block.room())
 
-    def _quiet_intervals(self, simulator: Simulator, time_us: int) -> int:
-        """Return after how many of the next intervals there is nothing but the loops to run; ``time_us`` is now."""
-        count = simulator.quiet_intervals()
+    def _fitting(self, simulator: Simulator, actuators: ActuatorsFrame) -> QuietBlock | None:
+        """Return the compiled ticks, None if a part of them is not compiled, or is not that of the start."""
+        block = self._block
+        return block if block is not None and block.fits(simulator, actuators) else None
+
+    def _quiet_intervals(self, simulator: Simulator, time_us: int, measures: bool) -> int:
+        """Return after how many of the next intervals there is nothing but the loops to run; ``time_us`` is now.
+
+        With ``measures``, magnetometer and barometer are part of it.
+        """
+        count = simulator.quiet_intervals(measures)
         if self._estimation is not None:
-            count = min(count, (self._estimation.quiet_until_us - 1 - time_us) // self._interval_us)
+            count = min(count, (self._estimation.quiet_until_us(measures) - 1 - time_us) // self._interval_us)
         return max(0, count)
 
     def run_periods(self, simulator: Simulator, actuators: ActuatorsFrame, most: int) -> int:
@@ -46,19 +59,16 @@ class QuietTicks:
 
         Return their number; 0 if vehicle and simulator are not in step, or not compiled.
         """
-        block = self._block
-        if block is None or not (
-            simulator.interval_us == self._interval_us
-            and self._lockstep.is_due
-            and block.fits(simulator, actuators)
-        ):
+        block = self._fitting(simulator, actuators)
+        if block is None or simulator.interval_us != self._interval_us or not self._lockstep.is_due:
             return 0
         time_us, done = self._now.time_us + self._interval_us, 0
         if self._estimation is not None:
             self._estimation.update(time_us)
         if self._autopilot.is_nominal():
-            most = min(most, 1 + self._quiet_intervals(simulator, time_us), block.outer.room(time_us))
-            done = block.run(most, is_taken=True)
+            intervals = self._quiet_intervals(simulator, time_us, measures=True)
+            most = min(most, 1 + intervals, block.outer.room(time_us), block.room(is_taken=True))
+            done = block.run(most, is_taken=True) if most > 0 else 0
         self.is_idle = done > 0 and not block.waited
         if not done:
             actuators.rotor_speed_rad_s[:] = self._autopilot.tick(time_us)
@@ -70,7 +80,8 @@ class QuietTicks:
 
         There are fewer after a reset of the estimate, which may change what is quiet.
         """
-        done = self._run_block(simulator, actuators, count) or self._run_ticks(simulator, actuators, count)
+        block = self._fitting(simulator, actuators)
+        done = self._run_ticks(simulator, actuators, count) if block is None else block.run(count)
         self._answer(simulator, actuators, done)
         return done
 
@@ -79,11 +90,6 @@ class QuietTicks:
         actuators.flags = self._link.flags(self._now.status.armed) | VALID_FLAG
         if self._inbox is not None and intervals > 0:
             self._inbox.pass_by(self._now.time_us, simulator.stamp_us)
-
-    def _run_block(self, simulator: Simulator, actuators: ActuatorsFrame, count: int) -> int:
-        """Run the ticks as one compiled call; return 0 if a part of them is not compiled, or not ready for it."""
-        block = self._block
-        return block.run(count) if block is not None and block.fits(simulator, actuators) else 0
 
     def _run_ticks(self, simulator: Simulator, actuators: ActuatorsFrame, count: int) -> int:
         """Run the ticks one after another, each part by itself."""

@@ -29,9 +29,8 @@ from flightstack.estimation.memory import (
 )
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed
-from flightstack.estimation.sensor_samples import BaroSample, ImuSample
+from flightstack.estimation.sensor_samples import BaroSample, ImuSample, MagSample
 from flightstack.estimation.snapshot import snapshot
-from flightstack.flight_log.flight_log import Trace
 from flightstack.flight_log.sensor_recorder import SensorRecorder
 from flightstack.guidance.navigator import Navigator
 from flightstack.params.estimator import ESTIMATOR_SPECS, MULTI_IMU
@@ -99,7 +98,7 @@ class Estimation:
         self._sensors = sensors
         self._now = now
         self._users = users
-        self._recorder, self._truth = recorder, truth
+        self.recorder, self._truth = recorder, truth
         self._feed = SensorFeed(first, now.state, recorder, spares)
         self._lanes = Lanes(self._feed, estimators)
         self._landed = False
@@ -155,7 +154,7 @@ class Estimation:
     def update(self, time_us: int) -> None:
         """Take the measurements since the last call; once per tick, at the time of the tick."""
         now = self._now
-        self._recorder.begin(self._snapshot)
+        self.recorder.begin(self._snapshot)
         if now.landed is not self._landed:
             self._landed = now.landed
             for estimator in self._lanes.estimators:
@@ -168,24 +167,29 @@ class Estimation:
             self._follow_selection()
         if is_known and not now.has_state:
             self._find_origin()
-        self._recorder.state(time_us, self._truth, self.sensed)
+        self.recorder.state(time_us, self._truth, self.sensed)
         self._check_resets(time_us)
         if reports and self._time_us >= self._health_due_us:
             self._update_health(self._time_us)
 
-    @property
-    def quiet_until_us(self) -> int:
-        """Time from which a tick has more to do than ``update_imus``; 0 if the next one has."""
+    def quiet_until_us(self, measures: bool) -> int:
+        """Return the time from which a tick has more to do than ``update_imus``; 0 if the next one has.
+
+        With ``measures``, kernels also take magnetometer and barometer, and record the true state.
+        """
         now = self._now
         finds_origin = not now.has_state and self.estimator.frame is not None
         if finds_origin or now.landed is not self._landed or not self._sensors.is_quiet:
             return 0
-        return min(self._health_due_us, self._recorder.due_us)
+        return min(self._health_due_us, self.recorder.due_us(with_truth=not measures))
 
-    def pass_by(self, time_us: int, step_us: int) -> None:
-        """Follow the measurements up to ``time_us`` that the kernels of sensors and filters took."""
+    def pass_by(self, time_us: int, step_us: int, mag: MagSample | None, baro: BaroSample | None) -> None:
+        """Follow the measurements up to ``time_us`` that the kernels of sensors and filters took.
+
+        ``mag`` and ``baro`` are the newest of them, None without one.
+        """
         self._time_us = time_us
-        self._feed.pass_by(time_us, step_us)
+        self._feed.pass_by(time_us, step_us, mag, baro)
         self._check_resets(time_us)
 
     @property
@@ -197,11 +201,6 @@ class Estimation:
     def estimators(self) -> tuple[Estimator, ...]:
         """Those of the feed, by the number of their inertial sensor."""
         return self._lanes.estimators
-
-    @property
-    def imu_trace(self) -> Trace | None:
-        """Rows of the selected inertial sensor in the open log; None without one."""
-        return self._recorder.imu_trace
 
     def update_imus(self, time_us: int, step_us: int, wires: Sequence[SingleArray]) -> None:
         """Take a measurement of each inertial sensor, the only messages of a tick before ``quiet_until_us``.
@@ -216,7 +215,7 @@ class Estimation:
         resets = self._resets
         if (resets[POSITION_RESET], resets[VELOCITY_RESET], resets[YAW_RESET]) != self._counts:
             self._follow_resets()
-            self._recorder.local_position(time_us, self.sensed())
+            self.recorder.local_position(time_us, self.sensed())
 
     def _find_origin(self) -> None:
         frame = self.estimator.frame
@@ -252,7 +251,7 @@ class Estimation:
         selection = self._lanes.selection
         text = f"Inertial sensor {selection.left + 1} {selection.reason}: flying on {selection.selected + 1}"
         self._users.journal.say(Severity.WARNING, text)
-        self._recorder.selection(self._now.time_us, self.sensed())
+        self.recorder.selection(self._now.time_us, self.sensed())
 
     def _reset_loops(self) -> None:
         self._users.backend.reset(self._now.state)

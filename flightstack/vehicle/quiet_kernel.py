@@ -1,4 +1,4 @@
-"""Quiet ticks as one compiled call: plant, inertial sensors, filter, inner loop, rotor monitor, nominal outer ticks.
+"""Quiet ticks as one compiled call: plant, sensors, filter, inner loop, rotor monitor, nominal outer ticks.
 
 It calls the kernels that each part runs in any other tick, at their addresses, on the same arrays and in the same
 order. Records are passed as bytes, so that this kernel is compiled once for all of them. A module of its own, with few
@@ -13,6 +13,7 @@ from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, LoopRow
 from flightstack.core.kernel_calls import call_kernel, call_kernel_int
 from flightstack.vehicle.outer_kernel import FELL_US, FOUND, OUTERS, copy_all, guide, note_outer
+from flightstack.vehicle.slow_kernel import log_truth, measure_slow, take_slow
 
 ADVANCE, MEASURE, TAKE, ESTIMATE, CONTROL, FOLLOW, CALLS = range(7)
 """Kernels by their index in ``calls``."""
@@ -37,7 +38,7 @@ def _sum_at(values: FloatArray, columns: Any) -> float:
 def _sense(
     calls: Any, sensing: Any, time_us: int, interval_us: int, selected: int, record: FloatArray
 ) -> None:
-    """Measure, and give each filter its inertial sensor's sample; ``record`` takes that of the selected one."""
+    """Measure with the inertial sensors, and give each filter its sample; ``record`` takes that of the selected one."""
     motion, imus, true_state, true_speeds, noise, wires, tracks, counters, filters, spare_record = sensing
     call_kernel(calls[MEASURE], (motion, imus, true_state, true_speeds, noise, wires))
     time_s = time_us * 1e-6
@@ -74,8 +75,8 @@ def _control(calls: Any, control: Any, flies: bool, row: FloatArray, commands: F
 
 @compiled
 def _advance(
-    calls: Any, counters: Any, interval_us: int, plant: Any, sensing: Any, state: FloatArray,
-    time_us: int, flags: int, estimate: Any, imu_log: Any,
+    calls: Any, slow_calls: Any, counters: Any, interval_us: int, plant: Any, sensing: Any, slow: Any,
+    state: FloatArray, time_us: int, flags: int, estimate: Any, following: Any, imu_log: Any,
 ) -> bool:  # fmt: skip
     """Advance plant, sensors and estimate to ``time_us``; return False if no tick is to follow."""
     memory, commands, steps, output, largest_result, sent, taken = plant
@@ -91,10 +92,13 @@ def _advance(
         resets_before = _sum_at(resets, reset_counts)
         at = record_at + counters[SENSED]
         record_times[at] = time_us
+        measure_slow(slow_calls, slow, time_us, memory, sensing[2], sensing[3])
         _sense(calls, sensing, time_us, interval_us, selected, records[at])
+        take_slow(slow_calls, slow, time_us, sensing[8], following)
         counters[SENSED] += 1
         if is_known[0] != 0:
             copy_all(known, state)
+        log_truth(slow, time_us, following)
         if _sum_at(resets, reset_counts) != resets_before:
             counters[WAITS] = 1
             return False
@@ -103,9 +107,9 @@ def _advance(
 
 @compiled
 def fly_quiet_ticks(
-    calls: Any, outer_calls: Any, counters: Any, interval_us: int, divisor: int, plant: Any, sensing: Any, control: Any,
-    count: int, is_taken: bool, outer_in: int, time_us: int, flags: int, flies: bool, last_row: FloatArray,
-    estimate: Any, outer: Any, log: Any, imu_log: Any,
+    calls: Any, outer_calls: Any, slow_calls: Any, counters: Any, interval_us: int, divisor: int, plant: Any,
+    sensing: Any, slow: Any, control: Any, count: int, is_taken: bool, outer_in: int, time_us: int, flags: int,
+    flies: bool, last_row: FloatArray, estimate: Any, following: Any, outer: Any, log: Any, imu_log: Any,
 ) -> None:  # fmt: skip
     """Run ``count`` ticks, or fewer: what was done is in ``counters``.
 
@@ -113,7 +117,7 @@ def fly_quiet_ticks(
     ``outer_in`` ticks. It stops when the result of the plant is larger than ``largest_result``, after a reset of the
     estimate, counted in the columns ``reset_counts``, and at an outer tick that is not nominal: their tick waits.
     Records and frames are bytes. ``tracks``, ``counters`` and ``filters`` of ``sensing`` have an element for each
-    inertial sensor; on the true state there are no ``imus``.
+    inertial sensor; on the true state there are no ``imus``. ``slow`` and ``following`` are those of ``slow_kernel``.
     """
     rows, row_times, row_at = log
     state, row, marks = control[0], last_row, outer[0]
@@ -123,8 +127,9 @@ def fly_quiet_ticks(
     for i in range(count):
         time_us += interval_us
         if (i > 0 or not is_taken) and not _advance(
-            calls, counters, interval_us, plant, sensing, state, time_us, flags, estimate, imu_log
-        ):
+            calls, slow_calls, counters, interval_us, plant, sensing, slow, state, time_us, flags, estimate,
+            following, imu_log,
+        ):  # fmt: skip
             return
         outer_due = (i - outer_in) % divisor == 0
         if outer_due:

@@ -80,7 +80,8 @@ class RecordPlant(ABC):
         self._vehicle = vehicle
         self.memory: RecordArray = np.zeros(1, MEMORY)
         """State, rotors, faults and disturbances, dtype ``MEMORY``, shape (1,)."""
-        self._current: FloatArray = self.memory["current"]
+        self.currents_a: FloatArray = self.memory["current"]
+        """Current of the battery as in the memory, shape (1,)."""
         m = self.memory[0]
         disturbance = options.disturbance
         self._boat = np.array(options.boat_ned_m_s)
@@ -178,7 +179,7 @@ class RecordPlant(ABC):
     @property
     def current_a(self) -> float:
         """Current of the battery; 0 without one."""
-        return float(self._current[0])
+        return float(self.currents_a[0])
 
     def set_charge(self, share: float) -> None:
         """Set the charge of the battery, 0 to 1."""

@@ -19,7 +19,7 @@ from flightstack.core.portable_math import exp, log
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.plant.dimensions import foot_z_m, propeller_radius_m
 from sim_bridge.sensors.layout import BARO, write_numbers
-from sim_bridge.sensors.noise import NormalStream, Wander, quantised, with_fault
+from sim_bridge.sensors.noise import NormalStream, gauss_markov, quantised, step_to, with_fault
 
 SEA_LEVEL_HPA, SEA_LEVEL_K, LAPSE_K_M = 1013.25, 288.15, 0.0065
 _EXPONENT = 9.80665 / (287.05287 * LAPSE_K_M)
@@ -44,11 +44,17 @@ def pressure_altitude_m(pressure_hpa: float) -> float:
 
 @compiled
 def measure_baro(
-    baros: RecordArray, state: FloatArray, airspeed_m_s: float, rotor_speed: FloatArray, noise: FloatArray
+    baros: RecordArray,
+    time_us: int,
+    state: FloatArray,
+    airspeed_m_s: float,
+    rotor_speed: FloatArray,
+    noise: FloatArray,
 ) -> None:
     """Write pressure, pressure altitude and temperature to ``out``; ``noise`` are two standard normal deviates."""
     baro = baros[0]
-    baro["drift"] = baro["decay"] * baro["drift"] + baro["wander"] * noise[1]
+    decay, share = gauss_markov(step_to(baro, time_us), baro["drift_time_s"])
+    baro["drift"] = decay * baro["drift"] + share * baro["drift_hpa"] * noise[1]
     if baro["is_frozen"] != 0:
         return
     altitude = baro["altitude"] - state[2]
@@ -78,7 +84,7 @@ class Barometer:
         self.out: FloatArray = self.records["out"][0]
         """The last measurement."""
         self._call = measure_baro
-        baro, self._noise = self.records[0], NormalStream(seed, "baro", width=2)
+        baro, self.noise = self.records[0], NormalStream(seed, "baro", width=2)
         write_numbers(baro, vehicle.sensors.numbers["baro"])
         radius = propeller_radius_m(vehicle)
         baro["altitude"] = altitude_m
@@ -86,17 +92,16 @@ class Barometer:
         area = len(vehicle.rotors) * math.pi * radius * radius
         for index, rotor in enumerate(vehicle.rotors):
             baro["disc_loading"][index] = rotor.thrust_coefficient_n_s2 / area
-        first, second = self._noise.first(2).tolist()
+        first, second = self.noise.first(2).tolist()
         baro["offset"], baro["drift"] = baro["turn_on_offset_hpa"] * first, baro["drift_hpa"] * second
-        self._wander = Wander(baro, float(baro["drift_hpa"]), float(baro["drift_time_s"]))
+        baro["measured_us"] = -1
 
     def measure(
         self, time_us: int, state: FloatArray, airspeed_m_s: float, rotor_speed: FloatArray
     ) -> FloatArray:
         """Measure at a state, an airspeed and the speeds [rad/s] of the rotors, shape (8,)."""
-        self._wander.follow(time_us)
-        noise = self._noise.row()
+        arguments = (self.records, time_us, state, airspeed_m_s, rotor_speed, self.noise.row())
         if self._call is measure_baro:
-            self._call = direct(measure_baro, self.records, state, airspeed_m_s, rotor_speed, noise)
-        self._call(self.records, state, airspeed_m_s, rotor_speed, noise)
+            self._call = direct(measure_baro, *arguments)
+        self._call(*arguments)
         return self.out

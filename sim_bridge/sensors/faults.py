@@ -20,7 +20,7 @@ from sim_bridge.sensors.noise import UniformStream
 
 T = TypeVar("T")
 
-NEVER_US = 1 << 64
+NEVER_US = 1 << 62
 _STILL = Vector3(0.0, 0.0, 0.0)
 
 

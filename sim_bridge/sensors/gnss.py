@@ -19,7 +19,7 @@ from flightstack.core.contract import FloatArray, RecordArray, Vector3
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.sensors.layout import GNSS, write_numbers
-from sim_bridge.sensors.noise import NormalStream, Wander, with_fault
+from sim_bridge.sensors.noise import NormalStream, gauss_markov, step_to, with_fault
 
 LEAST_SATELLITES = 4
 
@@ -36,12 +36,14 @@ class Fix(NamedTuple):
 
 
 @compiled
-def measure_gnss(receivers: RecordArray, state: FloatArray, noise: FloatArray) -> None:
+def measure_gnss(receivers: RecordArray, time_us: int, state: FloatArray, noise: FloatArray) -> None:
     """Write position and velocity NED to ``out``; ``noise`` are nine standard normal deviates."""
     gnss = receivers[0]
     out, factor = gnss["out"], gnss["noise_factor"]
+    decay, share = gauss_markov(step_to(gnss, time_us), gnss["drift_time_s"])
     for axis in range(3):
-        gnss["drift"][axis] = gnss["decay"] * gnss["drift"][axis] + gnss["wander"][axis] * noise[axis]
+        drift_m = gnss["horizontal_drift_m"] if axis < 2 else gnss["vertical_drift_m"]
+        gnss["drift"][axis] = decay * gnss["drift"][axis] + share * drift_m * noise[axis]
     if gnss["is_frozen"] != 0:
         return
     for axis in range(3):
@@ -62,7 +64,7 @@ class GnssReceiver:
         horizontal, vertical = float(gnss["horizontal_drift_m"]), float(gnss["vertical_drift_m"])
         spread = np.array([horizontal, horizontal, vertical])
         gnss["drift"] = spread * self._noise.first(4)[:3]
-        self._wander = Wander(gnss, spread, float(gnss["drift_time_s"]))
+        gnss["measured_us"] = -1
         noise_m, vertical_noise_m = float(gnss["horizontal_noise_m"]), float(gnss["vertical_noise_m"])
         self._eph_m = math.sqrt(2.0 * (horizontal * horizontal + noise_m * noise_m))
         self._epv_m = math.sqrt(vertical * vertical + vertical_noise_m * vertical_noise_m)
@@ -81,11 +83,10 @@ class GnssReceiver:
 
     def measure(self, time_us: int, state: FloatArray) -> Fix:
         """Measure at a state."""
-        self._wander.follow(time_us)
-        noise = self._noise.row()
+        arguments = (self.records, time_us, state, self._noise.row())
         if self._call is measure_gnss:
-            self._call = direct(measure_gnss, self.records, state, noise)
-        self._call(self.records, state, noise)
+            self._call = direct(measure_gnss, *arguments)
+        self._call(*arguments)
         has_fix = self._satellites >= LEAST_SATELLITES and time_us >= self._first_fix_us
         kind = mavlink.GPS_FIX_TYPE_3D_FIX if has_fix else mavlink.GPS_FIX_TYPE_NO_FIX
         x, y, z, vx, vy, vz = self.records["out"][0].tolist()

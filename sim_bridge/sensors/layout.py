@@ -108,8 +108,7 @@ BARO = _dtype(
     "baro",
     ("offset", "f8"),  # hPa
     ("drift", "f8"),  # hPa
-    ("decay", "f8"),
-    ("wander", "f8"),
+    ("measured_us", "i8"),  # time of the last measurement, -1 before the first
     ("disc_loading", "f8", MAX_ROTORS),  # thrust of each rotor over Ω·|Ω| and the area of all rotors, Pa s²
     ("rotor_radius", "f8"),  # m
     ("surface_z", "f8"),  # m NED, of the ground
@@ -121,8 +120,7 @@ BARO = _dtype(
 GNSS = _dtype(
     "gnss",
     ("drift", "f8", 3),  # correlated error, m NED
-    ("decay", "f8"),
-    ("wander", "f8", 3),
+    ("measured_us", "i8"),  # time of the last measurement, -1 before the first
     ("fault_bias", "f8", 3),  # m NED
     ("fault_rate", "f8", 3),  # m/s NED: the velocity of a spoofed position
     ("noise_factor", "f8"),  # of jamming

@@ -41,17 +41,17 @@ class Magnetometer:
         self.out: FloatArray = self.records["out"][0]
         """The last measurement."""
         self._call = measure_mag
-        mag, self._noise = self.records[0], NormalStream(seed, "mag", width=3)
+        mag, self.noise = self.records[0], NormalStream(seed, "mag", width=3)
         write_numbers(mag, vehicle.sensors.numbers["mag"])
         mag["earth"] = earth_ned_gauss
-        mag["matrix"] = np.eye(3) + mag["soft_iron"] * self._noise.first(10)[:9].reshape(3, 3)
-        mag["offset"] = mag["hard_iron_gauss"] * self._noise.first(4)[:3]
-        mag["per_ampere"] = mag["current_gauss_a"] * self._noise.first(4)[:3]
+        mag["matrix"] = np.eye(3) + mag["soft_iron"] * self.noise.first(10)[:9].reshape(3, 3)
+        mag["offset"] = mag["hard_iron_gauss"] * self.noise.first(4)[:3]
+        mag["per_ampere"] = mag["current_gauss_a"] * self.noise.first(4)[:3]
 
     def measure(self, state: FloatArray, current_a: float) -> FloatArray:
         """Measure at a state; ``current_a`` is that of the battery."""
-        noise = self._noise.row()
+        arguments = (self.records, state, current_a, self.noise.row())
         if self._call is measure_mag:
-            self._call = direct(measure_mag, self.records, state, current_a, noise)
-        self._call(self.records, state, current_a, noise)
+            self._call = direct(measure_mag, *arguments)
+        self._call(*arguments)
         return self.out

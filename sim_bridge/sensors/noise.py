@@ -27,21 +27,40 @@ class NormalStream:
     def __init__(self, seed: int, sensor: str, instance: int = 0, width: int = 1) -> None:
         self._bits = np.random.PCG64(seed).jumped(_FIRST_STREAM + _STREAMS[sensor] + instance)
         self._width = width
-        self._left: list[FloatArray] = []
+        self.block: FloatArray = np.zeros((2 * _ROWS, width))
+        """Next rows, from ``cursor`` to the last one."""
+        self._each: list[FloatArray] = list(self.block)
+        self.cursor = np.full(1, len(self.block), np.int64)
+        """Index of the next row in ``block``, which a kernel that takes rows moves on."""
+        self._cursor = self.cursor.data  # a number of an array takes four times as long to read
 
     def first(self, count: int) -> FloatArray:
         """Return ``count`` deviates for the constants of a sensor; call before the rows."""
         return normal_deviates(self._bits, count)
 
     def rows(self, count: int) -> FloatArray:
-        """Return the next rows, shape (count, width)."""
+        """Draw the next rows, shape (count, width)."""
         return normal_deviates(self._bits, count * self._width).reshape(count, self._width)
 
     def row(self) -> FloatArray:
-        """Return the next row, shape (width,)."""
-        if not self._left:
-            self._left = list(self.rows(_ROWS)[::-1])
-        return self._left.pop()
+        """Return the next row, shape (width,), valid until the next call of ``ready``."""
+        at = self._cursor[0]
+        if at == len(self._each):
+            self.ready()
+            at = self._cursor[0]
+        self._cursor[0] = at + 1
+        return self._each[at]
+
+    def ready(self) -> int:
+        """Return how many rows ``block`` has ready, at least 256; draw more if there are fewer."""
+        left = len(self._each) - self._cursor[0]
+        while left < _ROWS:
+            start = len(self._each) - _ROWS
+            self.block[start - left : start] = self.block[len(self._each) - left :]
+            self.block[start:] = self.rows(_ROWS)
+            left += _ROWS
+            self._cursor[0] = len(self._each) - left
+        return left
 
 
 class UniformStream:
@@ -55,28 +74,19 @@ class UniformStream:
         return float(int(self._bits.random_raw()) >> 11) / 2**53
 
 
+@compiled
 def gauss_markov(step_s: float, time_s: float) -> tuple[float, float]:
     """Return decay and relative noise of a first-order Gauss-Markov process over one step, exact for any step."""
     decay = exp(-step_s / time_s)
     return decay, math.sqrt(1.0 - decay * decay)
 
 
-class Wander:
-    """Keeps ``decay`` and ``wander`` of a record, a Gauss-Markov process, to the times of its samples."""
-
-    def __init__(self, record: Record, spread: FloatArray | float, time_s: float) -> None:
-        self._record, self._spread, self._time_s = record, spread, time_s
-        self._last_us: int | None = None
-        self._step_us = -1
-
-    def follow(self, time_us: int) -> None:
-        """Set the coefficients for a sample at ``time_us``; the first sample is the start of the process."""
-        step_us = 0 if self._last_us is None else time_us - self._last_us
-        self._last_us = time_us
-        if step_us != self._step_us:
-            self._step_us = step_us
-            decay, share = gauss_markov(step_us * 1e-6, self._time_s)
-            self._record["decay"], self._record["wander"] = decay, np.multiply(share, self._spread)
+@compiled
+def step_to(sensor: Record, time_us: int) -> float:
+    """Return the time since the last measurement [s], 0 for the first one, and keep that of this one."""
+    last_us = sensor["measured_us"]
+    sensor["measured_us"] = time_us
+    return 0.0 if last_us < 0 else (time_us - last_us) * 1e-6
 
 
 @compiled

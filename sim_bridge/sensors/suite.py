@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,12 +56,15 @@ from sim_bridge.sensors.rangefinder import Rangefinder
 
 _DEGREE = math.pi / 180.0
 _IMU = ACCEL | GYRO
+MAG_SLOT, BARO_SLOT, SLOTS = 0, 1, 5
+"""Magnetometer and barometer, which quiet ticks measure as well, by their index in ``due_us``, and its length."""
 _UNKNOWN_VARIANCE = 255
 
 
 class _Sensor(NamedTuple):
     """A sensor with a rate of its own; ``measure`` returns the output, ``send`` puts it into a message."""
 
+    slot: int
     period_us: int
     channel: Channel
     measure: Callable[[int], Any]
@@ -111,32 +115,38 @@ class SensorSuite:
         self._is_apart = False  # measurements of the inertial sensors go through their channels
         self._imbalance = float(self.imus.motion[0]["imbalance"])
         self._sensors: list[_Sensor] = []
+        self.due_us = np.full(SLOTS, NEVER_US, np.int64)
+        """Time of the next measurement of each sensor that is not inertial; never for one that is missing."""
+        self.period_us = np.full(SLOTS, NEVER_US, np.int64)
+        self._due_us = self.due_us.data  # a number of an array takes four times as long to read
         self._add_slow_sensors(vehicle, home, options)
-        self._due_us = [0] * len(self._sensors)
-        self._next_us = 0
+        self._next_us = self._next_other_us = 0
 
     def _add_slow_sensors(self, vehicle: Vehicle, home: GeoPoint, options: PlantOptions) -> None:
         """Add the sensors besides the IMU that the vehicle's file has."""
         numbers, seed = vehicle.sensors.numbers, self._seed
+        self.mag: Magnetometer | None = None
+        self.baro: Barometer | None = None
         if "mag" in numbers:
-            self.mag = Magnetometer(vehicle, seed, earth_field_ned_gauss(home))
-            self._mag_matrix: FloatArray = self.mag.records[0]["matrix"].copy()
-            self._add("mag", self.mag.records, self._measure_mag, self._send_mag)
+            mag = self.mag = Magnetometer(vehicle, seed, earth_field_ned_gauss(home))
+            self._mag_matrix: FloatArray = mag.records[0]["matrix"].copy()
+            self._add(MAG_SLOT, "mag", mag.records, partial(self._measure_mag, mag), self._send_mag)
         if "baro" in numbers:
-            self.baro = Barometer(vehicle, seed, home.altitude_m)
-            self._add("baro", self.baro.records, self._measure_baro, self._send_baro)
+            baro = self.baro = Barometer(vehicle, seed, home.altitude_m)
+            self._add(BARO_SLOT, "baro", baro.records, partial(self._measure_baro, baro), self._send_baro)
         if "gnss" in numbers:
             self.gnss = GnssReceiver(vehicle, seed)
-            self._add("gnss", self.gnss.records, self._measure_gnss, self._send_fix, self.gnss.latency_us)
+            self._add(2, "gnss", self.gnss.records, self._measure_gnss, self._send_fix, self.gnss.latency_us)
         if "range" in numbers:
             self.range = Rangefinder(vehicle, options)
-            self._add("range", self.range.records, self._measure_range, self._send_range)
+            self._add(3, "range", self.range.records, self._measure_range, self._send_range)
         if "flow" in numbers:
             self.flow = OpticalFlow(vehicle, options)
-            self._add("flow", self.flow.records, self._measure_flow, self._send_flow)
+            self._add(4, "flow", self.flow.records, self._measure_flow, self._send_flow)
 
     def _add(
         self,
+        slot: int,
         name: str,
         records: RecordArray,
         measure: Callable[[int], Any],
@@ -145,7 +155,9 @@ class SensorSuite:
     ) -> None:
         channel = Channel((name, 0), self._seed, records, latency_us=latency_us)
         self._channels[name, 0] = channel
-        self._sensors.append(_Sensor(round(1e6 / float(records[0]["rate_hz"])), channel, measure, send))
+        period_us = round(1e6 / float(records[0]["rate_hz"]))
+        self.due_us[slot], self.period_us[slot] = 0, period_us
+        self._sensors.append(_Sensor(slot, period_us, channel, measure, send))
 
     def set_interval_us(self, interval_us: int) -> None:
         """Set the time between two exchanges."""
@@ -165,7 +177,7 @@ class SensorSuite:
         )
         values = {fault.kind: fault.value for fault in causes}
         self.imus.motion[0]["imbalance"] = self._imbalance * values.get(Kind.VIBRATION, 1.0)
-        if ("mag", 0) in self._channels:
+        if self.mag is not None:
             sine, cosine = sin_cos(values.get(Kind.MAG_TURN, 0.0) * _DEGREE)
             turn = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
             self.mag.records[0]["matrix"] = np.array(  # in this order on every processor, unlike BLAS
@@ -207,20 +219,35 @@ class SensorSuite:
         """``imu_wires`` as one array, shape (sensors, 6)."""
         return self._wires
 
-    def pass_by(self, count: int) -> None:
-        """Count quiet measurements that the kernel of the inertial sensors made."""
+    @property
+    def values(self) -> SingleArray:
+        """Newest values of HIL_SENSOR of the first inertial sensor, with magnetometer and barometer."""
+        return self._values
+
+    def pass_by(self, count: int, fields: int) -> None:
+        """Count quiet measurements that kernels made; ``fields`` are those of other sensors in the last one."""
         self.imus.take_rows(count)
         self._fields[:] = self._all_imus
+        self._fields[0] |= fields
+        self._next_us = min(self._due_us[MAG_SLOT], self._due_us[BARO_SLOT], self._next_other_us)
 
     @property
     def is_quiet(self) -> bool:
-        """True while ``measure`` before ``next_us`` changes ``imu_wires`` alone: there are no faults."""
+        """True while ``measure`` before ``next_us`` changes ``imu_wires`` alone: there are no faults.
+
+        Before ``next_other_us``, it also changes what magnetometer and barometer write to ``values``.
+        """
         return not (self._has_faults or self._is_apart or self._messages)
 
     @property
     def next_us(self) -> int:
         """Time of the next measurement of a sensor that is not inertial."""
         return self._next_us
+
+    @property
+    def next_other_us(self) -> int:
+        """Time of the next measurement of a sensor that quiet ticks do not measure, or of the next late message."""
+        return self._next_other_us
 
     @property
     def measurements(self) -> Sequence[HilMeasurement]:
@@ -253,11 +280,12 @@ class SensorSuite:
         self._fields[index] = fields
 
     def _measure_slow(self, time_us: int) -> None:
-        next_us = NEVER_US
-        for index, (period_us, channel, measure, send) in enumerate(self._sensors):
+        next_us = next_other_us = NEVER_US
+        due_us = self._due_us
+        for slot, period_us, channel, measure, send in self._sensors:
             out, is_direct = None, channel.is_direct
-            if time_us >= self._due_us[index]:
-                self._due_us[index] = (time_us // period_us + 1) * period_us
+            if time_us >= due_us[slot]:
+                due_us[slot] = (time_us // period_us + 1) * period_us
                 out = measure(time_us)
                 if not is_direct:
                     out = channel.pass_on(time_us, out if isinstance(out, tuple) else out.copy())
@@ -265,21 +293,22 @@ class SensorSuite:
                 out = channel.due(time_us)
             if out is not None:
                 send(time_us, out)
-            next_us = min(next_us, self._due_us[index])
-            if not is_direct:
-                next_us = min(next_us, channel.next_due_us)
-        self._next_us = next_us
+            sensor_us = due_us[slot] if is_direct else min(due_us[slot], channel.next_due_us)
+            next_us = min(next_us, sensor_us)
+            if slot > BARO_SLOT or not is_direct:
+                next_other_us = min(next_other_us, sensor_us)
+        self._next_us, self._next_other_us = next_us, next_other_us
 
-    def _measure_mag(self, _time_us: int) -> FloatArray:
-        return self.mag.measure(self._truth.state, self._plant.current_a)
+    def _measure_mag(self, mag: Magnetometer, _time_us: int) -> FloatArray:
+        return mag.measure(self._truth.state, self._plant.current_a)
 
     def _send_mag(self, _time_us: int, out: FloatArray) -> None:
         self._values[MAG_AT] = out
         self._fields[0] |= MAG
 
-    def _measure_baro(self, time_us: int) -> FloatArray:
+    def _measure_baro(self, baro: Barometer, time_us: int) -> FloatArray:
         truth = self._truth
-        return self.baro.measure(time_us, truth.state, self._plant.airspeed_m_s(), truth.rotor_speed_rad_s)
+        return baro.measure(time_us, truth.state, self._plant.airspeed_m_s(), truth.rotor_speed_rad_s)
 
     def _send_baro(self, _time_us: int, out: FloatArray) -> None:
         self._values[PRESSURE_AT], self._values[ALTITUDE_AT], self._values[TEMPERATURE_AT] = out.tolist()

@@ -1,0 +1,34 @@
+"""Rows of the flight log for samples that quiet ticks record as well."""
+
+from __future__ import annotations
+
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import FloatArray
+
+_GAS_CONSTANT_DRY_AIR = 287.1
+_KELVIN = 273.15
+
+
+@compiled
+def store_mag(row: FloatArray, time_us: int, x: float, y: float, z: float) -> None:
+    """Fill a row of ``MAG_GROUP`` with a field [gauss FRD]."""
+    row[0], row[1], row[2], row[3] = time_us, x, y, z
+
+
+@compiled
+def store_baro(
+    row: FloatArray, time_us: int, pressure_hpa: float, altitude_m: float, temperature_c: float
+) -> None:
+    """Fill a row of ``BARO_GROUP``; the density is that of dry air."""
+    pressure_pa = pressure_hpa * 100.0
+    row[0], row[1], row[2], row[3] = time_us, altitude_m, temperature_c, pressure_pa
+    row[4] = pressure_pa / (_GAS_CONSTANT_DRY_AIR * (temperature_c + _KELVIN))
+
+
+@compiled
+def store_truth(row: FloatArray, state: FloatArray, offset_m: FloatArray) -> None:
+    """Fill a row of ``TRUTH_GROUP`` with the true state, shape (13,); ``offset_m`` is that of its origin."""
+    for i in range(len(state)):
+        row[i] = state[i]
+    for i in range(3):
+        row[i] += offset_m[i]
