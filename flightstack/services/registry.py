@@ -89,6 +89,9 @@ class Schedule:
             kind: [index for index, service in enumerate(services) if kind in service.handles]
             for kind in OWN_MESSAGES
         }
+        self._clocks = {
+            i: service for i, service in enumerate(services) if isinstance(service, CountsVehicleTime)
+        }
         self._due_s: dict[int, float] = {}  # by the index of the service; not of those that are never due
         self.wake()
 
@@ -103,11 +106,8 @@ class Schedule:
         """Return the time for which no service is due, if link clock and vehicle clock run alike [s]."""
         idle_s = math.inf
         for index, due_s in self._due_s.items():
-            service = self._services[index]
-            if due_s == -math.inf and isinstance(service, CountsVehicleTime):
-                idle_s = min(idle_s, service.idle_s())
-            else:
-                idle_s = min(idle_s, due_s - now_s)
+            clock = self._clocks.get(index) if due_s == -math.inf else None
+            idle_s = min(idle_s, due_s - now_s if clock is None else clock.idle_s())
         return idle_s
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:

@@ -102,15 +102,23 @@ def reported_by(stack: Stack) -> Reported:
     return Reported(mode.name, armed, now.landed, stack.journal.failsafe_acts)
 
 
+class Condition(NamedTuple):
+    """A condition of the present state."""
+
+    is_true: Callable[[], object]
+    is_of_events: bool
+    """True if its value changes by events of the vehicle alone: it is an expression of modes and flags."""
+
+
 def condition_of(
     condition: Callable[[State], object] | str, state: Callable[[], State], reported: Callable[[], Reported]
-) -> Callable[[], object]:
-    """Return the function that tells whether a condition, a function or an expression, is true now."""
+) -> Condition:
+    """Return the condition that is a function or an expression."""
     if not isinstance(condition, str):
-        return lambda: condition(state())
+        return Condition(lambda: condition(state()), is_of_events=False)
     expression = Expression(condition)
     source = reported if expression.has_no_numbers else state
-    return lambda: expression.of_state(source())
+    return Condition(lambda: expression.of_state(source()), expression.has_no_numbers)
 
 
 def state_of(stack: Stack, simulator: Simulator, start: GeoPoint, time_s: float) -> State:

@@ -173,12 +173,20 @@ class World:
         the state after ``timeout_s`` of simulated time.
         """
         __tracebackhide__ = True
-        is_true = condition_of(condition, lambda: self.state, lambda: reported_by(self.engine.stack))
-        rates = self.engine.stack.rates
-        for _ in range(round(timeout_s * rates.outer_hz) + 1):
-            if is_true():
-                return self.state
-            self.step()
+        is_true, is_of_events = condition_of(
+            condition, lambda: self.state, lambda: reported_by(self.engine.stack)
+        )
+        end_s = self.time_s + timeout_s
+        while not is_true():
+            left_s = end_s - self.time_s
+            if left_s < 0.5 / self.engine.stack.rates.outer_hz:
+                break
+            if is_of_events:
+                self.run_on(left_s)
+            else:
+                self.step()
+        else:
+            return self.state
         what = f"{condition!r}" if isinstance(condition, str) else "the condition"
         raise ConditionTimeoutError(
             f"{what} did not come true within {timeout_s:g} s of simulated time; {self.state}{self._last_texts()}"

@@ -1,11 +1,16 @@
 """Outer periods of a world in which nothing happens are flown in one call; events come at the same tick as without."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
+from flightstack.core.contract import FloatArray
+from flightstack.params import vehicle
 from flightstack.testing import World
 from flightstack.testing.quiet_block import QuietBlock
+from flightstack.testing.state import State
+from sim_bridge.sensors.magnetometer import Magnetometer
 from tests.support.bytes_engine import BytesEngine
 
 
@@ -109,3 +114,54 @@ def test_one_call_flies_many_periods(monkeypatch: pytest.MonkeyPatch) -> None:
         world.run_for(1.0)
     assert sum(calls) >= 0.99 * 500
     assert len(calls) <= 500 / 20  # the battery reports ten times a second: 50 ticks at most
+
+
+def test_sensors_of_uneven_rates_measure_at_the_same_ticks(tmp_path: Path) -> None:
+    """Periods of 30.303 and 13.333 ms are no multiples of a tick."""
+    text = (Path(vehicle.__file__).parent / "vehicles" / "x_quad.toml").read_text()
+    path = tmp_path / "uneven.toml"
+    path.write_text(f"{text}\n[sensors.mag]\nrate_hz = 33\n[sensors.baro]\nrate_hz = 75\n")
+    logs = []
+    for engine in ({}, {"make_engine": BytesEngine}):
+        with World(state="estimated", vehicle=str(path), seed=5, **engine) as world:
+            world.wait_until_ready()
+            world.takeoff(2.0)
+            world.run_for(3.0)
+            logs.append(world.engine.newest_log())
+    assert logs[0] == logs[1]
+
+
+def test_most_measurements_of_the_magnetometer_are_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[float] = []
+    measure = Magnetometer.measure
+
+    def counted(mag: Magnetometer, state: FloatArray, current_a: float) -> FloatArray:
+        calls.append(current_a)
+        return measure(mag, state, current_a)
+
+    with World(state="estimated") as world:
+        world.wait_until_ready()
+        world.takeoff(2.0)
+        world.run_for(4.0)
+        monkeypatch.setattr(Magnetometer, "measure", counted)
+        world.run_for(1.0)
+    assert 0 < len(calls) <= 0.7 * 100  # others are in ticks with work for Python, such as a fix of GNSS
+
+
+def _signals(state: State) -> dict[str, object]:
+    return {name: getattr(state, name) for name in ("mode", "armed", "landed", "failsafe")}
+
+
+@pytest.mark.parametrize(
+    "condition", ["mode == 'HOLD'", "landed", "not armed", "not failsafe and mode == 'RETURN'"]
+)
+def test_a_condition_of_flags_is_met_in_the_same_period_as_a_function(condition: str) -> None:
+    times = []
+    for function in (None, lambda state: eval(condition, {}, _signals(state))):
+        with World(state="truth") as world:
+            world.takeoff(2.0)
+            world.run_until("not landed")
+            world.after(6.0, world.rtl)
+            world.run_until(function or condition)
+            times.append(world.time_s)
+    assert times[0] == times[1]

@@ -8,17 +8,19 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flightstack.core.contract import Vector3
+from flightstack.core.contract import FloatArray, Vector3
 from flightstack.core.geodesy import GeoPoint, earth_field_ned_gauss
 from flightstack.mavlink.dialect import mavlink
 from sim_bridge.plant.dimensions import foot_z_m, propeller_radius_m
 from sim_bridge.sensors.barometer import Barometer, pressure_altitude_m, standard_pressure_hpa
 from sim_bridge.sensors.gnss import Fix, GnssReceiver
 from sim_bridge.sensors.magnetometer import Magnetometer
+from sim_bridge.sensors.noise import NormalStream
 from sim_bridge.sensors.optical_flow import OpticalFlow
 from sim_bridge.sensors.rangefinder import Rangefinder
 from tests.support.sensor_vehicles import X_QUAD, state_at, with_sensors
 
+ROWS = 1_000
 FIELD = Vector3(0.21, 0.01, 0.43)
 HIGH = state_at(position=(0.0, 0.0, -100.0))
 FOOT = foot_z_m(X_QUAD)
@@ -28,6 +30,24 @@ def turned(yaw: float, pitch: float, roll: float) -> tuple[Rotation, tuple[float
     rotation = Rotation.from_euler("ZYX", [yaw, pitch, roll])
     x, y, z, w = rotation.as_quat()
     return rotation, (w, x, y, z)
+
+
+# ---------------------------------------------------------------------- noise
+
+
+def test_rows_that_kernels_take_are_those_of_the_stream() -> None:
+    """Kernels take rows of the block by its cursor, Python one by one; neither loses or repeats a row."""
+    stream, random = NormalStream(3, "mag", width=3), np.random.default_rng(1)
+    rows: list[FloatArray] = []
+    while len(rows) < ROWS:
+        for _ in range(random.integers(0, 40)):
+            rows.append(stream.row().copy())  # as the simulator does
+        count, at = min(int(random.integers(0, 60)), stream.ready()), int(stream.cursor[0])
+        rows += list(stream.block[at : at + count].copy())
+        stream.cursor[0] += count
+    other = NormalStream(3, "mag", width=3)
+    expected = np.concatenate([other.rows(256) for _ in range(5)])
+    assert np.array_equal(rows[:ROWS], expected[:ROWS])
 
 
 # ---------------------------------------------------------------------- magnetometer
