@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import itertools
-import os
-import select
 import subprocess
-from collections.abc import Callable
+from contextlib import closing
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 import pytest
@@ -30,13 +26,11 @@ from tests.firmware.board_builds import image
 from tests.firmware.board_machines import BoardMachine, Nucleo, RegisterMisuseError
 from tests.firmware.codec_support import compiler
 from tests.firmware.pico2_machine import Pico2
+from tests.firmware.qemu_link import QemuLink, answered, heartbeat_line
 from tests.firmware.step_machines import tool
 from tests.support.tools import NIGHTLY
 
-Found = TypeVar("Found")
 TIMEOUT_S = 0.25
-RESEND_HEARTBEATS = 2.0
-"""Heartbeats of the image in QEMU, each a second of its time, after which a frame is sent again."""
 STARTED = 3_000_000
 """Cycles after which every image serves its main loop; an instruction takes some 20 of them."""
 LATE_START = 20_000_000
@@ -135,61 +129,22 @@ def test_hazard3_divides_with_the_bits_of_ieee_754(tmp_path: Path) -> None:
     assert np.array_equal(found[is_number].view(np.uint32), expected[is_number].view(np.uint32))
 
 
-class QemuLink:
-    """USART2 of QEMU's netduinoplus2, an STM32F405 with it at the same addresses, but without RCC, DWT and IWDG."""
-
-    name = "QEMU"
-
-    def __init__(self, image: Path) -> None:
-        command = [
-            tool("qemu-system-arm", "qemu-system-arm"),
-            "-M",
-            "netduinoplus2",
-            "-nographic",
-            "-monitor",
-            "none",
-            "-icount",
-            "shift=0,sleep=off",
-        ]
-        serial = ["-serial", "null", "-serial", "stdio", "-kernel", str(image)]
-        self.process = subprocess.Popen(
-            [*command, *serial], stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0
-        )
-
-    def write(self, data: bytes) -> None:
-        assert self.process.stdin is not None
-        self.process.stdin.write(data)
-
-    def read(self, timeout_s: float) -> bytes:
-        assert self.process.stdout is not None
-        ready, _, _ = select.select([self.process.stdout], [], [], timeout_s)
-        data = os.read(self.process.stdout.fileno(), 4096) if ready else b""
-        assert data or not ready, "QEMU ended"
-        return data
-
-    def close(self) -> None:
-        self.process.kill()  # SIGTERM may not end it
-        self.process.wait()
-        for pipe in (self.process.stdin, self.process.stdout):
-            assert pipe is not None
-            pipe.close()
-
-
-def answered(ask: Callable[[], Found | None]) -> Found:
-    """Ask until there is an answer: QEMU may deliver a frame in pieces so far apart that the image drops it."""
-    while (found := ask()) is None:
-        pass
-    return found
-
-
 def test_a_nucleos_image_runs_in_qemu_by_its_interrupts() -> None:
-    """Vectors, SysTick and USART2 by QEMU's interrupt controller; its clock registers are missing: 16 MHz.
+    """Vectors, SysTick and USART2 by QEMU's interrupt controller, in an STM32F405 with them at the same addresses.
 
-    The clock is the image's: an instruction takes 1 ns of QEMU's time, and the heartbeats count the seconds.
+    RCC, DWT and IWDG are missing: 16 MHz. An instruction takes 1 ns of QEMU's time.
     """
+    machine = [
+        tool("qemu-system-arm", "qemu-system-arm"),
+        "-M",
+        "netduinoplus2",
+        "-icount",
+        "shift=0,sleep=off",
+    ]
+    serial = ["-nographic", "-monitor", "none", "-serial", "null", "-serial", "stdio"]
     steps = vectors(30)
-    with contextlib.closing(QemuLink(image("nucleo-f401re", GCC))) as link:
-        line = Line(link, RESEND_HEARTBEATS, lambda: float(line.heartbeats))
+    with closing(QemuLink([*machine, *serial, "-kernel", str(image("nucleo-f401re", GCC))])) as link:
+        line = heartbeat_line(link)
         line.wait(1.0)  # the first heartbeat
         identity = answered(lambda: line.request("FS_PIL_IDENTITY"))
         reports = [
