@@ -19,7 +19,7 @@ CORES := $(shell getconf _NPROCESSORS_ONLN)
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 .DEFAULT_GOAL := help
 
-.PHONY: help setup fly test test-all stress check static lint types imports generated generate docs bench fuzz fuzz-firmware firmware-check mutation clean
+.PHONY: help setup fly test test-all nightly stress check static lint types imports generated generate docs bench fuzz fuzz-firmware firmware-check mutation clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
@@ -50,6 +50,9 @@ test: $(READY) ## Run the tests that a developer runs all day: eleven in twelve 
 
 test-all: $(READY) ## Run every test
 	@$(PYTEST) --durations 15
+
+nightly: $(READY) ## Run every test with all its samples, seeds and combinations
+	@NIGHTLY=1 $(PYTEST) --durations 25
 
 stress: $(READY) ## Run every test beside a program that keeps each core busy
 	@$(BIN)/python tools/beside_load.py $(PYTEST)

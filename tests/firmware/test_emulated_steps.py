@@ -33,7 +33,10 @@ RANDOM_STEPS = 100_000 if NIGHTLY else 6_000
 CALM_PLAN = "square.plan" if NIGHTLY else "hop.plan"
 COMPILERS = ["zig", "gcc"] if NIGHTLY else ["zig"]
 """Of the missions; the random steps, which run both laws, are compiled by both."""
-MEAN_INSTRUCTIONS, MOST_INSTRUCTIONS, MOST_IN_GUSTS_INSTRUCTIONS = 1700, 2300, 2450
+MEAN_INSTRUCTIONS = {"zig": 1700, "gcc": 1840}
+MOST_INSTRUCTIONS = {"zig": 2290, "gcc": 2620}
+MOST_IN_GUSTS_INSTRUCTIONS = {"zig": 2390, "gcc": 2700}
+"""By compiler, 5 % above what was measured: gcc compiles file by file, without link-time optimisation."""
 MOST_OF_ANY_INSTRUCTIONS = 2900
 LAWS = [pytest.param(0, id="pid"), pytest.param(1, id="backstepping")]
 Emulated = Callable[[bytes, str], tuple[np.ndarray, Costs]]
@@ -115,11 +118,12 @@ def test_a_step_stays_within_its_instructions(emulated: Emulated, law: int, name
     In calm air the costliest step is the first one, which resets; in gusts it is one that limits thrust and yaw in a
     tick of the outer loop.
     """
-    # measured: 1589 to 1624; 2158 to 2180, and 2252 to 2274
+    # measured with zig: 1598 to 1624; 2158 to 2180, and 2252 to 2274
+    # measured with gcc: 1730 to 1755; 2472 to 2493, and 2550 to 2571
     for flight, most in ((calm(), MOST_INSTRUCTIONS), (flown(), MOST_IN_GUSTS_INSTRUCTIONS)):
         _, costs = emulated(by_law(law, flight), name)
-        assert costs.mean["whole"] < MEAN_INSTRUCTIONS, costs
-        assert costs.most["whole"] < most, costs
+        assert costs.mean["whole"] < MEAN_INSTRUCTIONS[name], costs
+        assert costs.most["whole"] < most[name], costs
 
 
 @pytest.mark.parametrize("name", ["zig", "gcc"])

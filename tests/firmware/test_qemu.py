@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-import os
-import select
-import subprocess
-from collections.abc import Iterator
+from contextlib import closing
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from flightstack.firmware.pil.steps import OVERRUN, REPEATED
 from flightstack.firmware.sources import PORTABLE, c_files, firmware_root
 from flightstack.firmware.toolchain.build import EXACT, includes
 from flightstack.firmware.toolchain.cortex_m4 import emulated_target
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
+from tests.firmware.qemu_link import QemuLink, answered, heartbeat_line
 from tests.firmware.step_machines import run, tool
 from tests.firmware.step_streams import random_steps
 
 PORT = firmware_root() / "ports" / "cortex_m4"
-LIMIT_S = 60
-"""How long to wait for QEMU before it counts as hung: QEMU answers within milliseconds."""
+LIMIT_S = 600
+"""After which QEMU counts as hung, as any test does. It takes some seconds."""
 COUNTED = ["-icount", "shift=10,sleep=off"]
-OVERRUN = 0x40000
 
 
 def qemu(image: Path, *more: str) -> list[str]:
@@ -77,7 +76,7 @@ def reports(octets: bytes) -> list[Message]:
 
 
 def made(report: Message) -> tuple[object, ...]:
-    """All of a report but its costs, and whether they were too high."""
+    """All of a report but its costs, whether they were too high, and whether the step was sent again."""
     stages = (
         report.attitude_target,
         report.reference,
@@ -85,7 +84,11 @@ def made(report: Message) -> tuple[object, ...]:
         report.wrench_achieved,
         report.rotor_command,
     )
-    return report.step, report.status & ~OVERRUN, *map(tuple, stages)
+    return report.step, report.status & ~(OVERRUN | REPEATED), *map(tuple, stages)
+
+
+def of_step(number: int, message: Message) -> Message | None:
+    return message if message.get_type() == "FS_PIL_REPORT" and message.step == number else None
 
 
 def test_the_board_makes_what_the_emulated_processor_makes(image: Path, tmp_path: Path) -> None:
@@ -107,62 +110,22 @@ def test_its_instruction_counts_repeat_exactly(image: Path, tmp_path: Path) -> N
     assert all(0 < report.cycles[3] < 10_000 for report in reports(first) if not report.status & 0xF0000)
 
 
-class Board:
-    """QEMU with its UART as standard input and output."""
-
-    def __init__(self, image: Path) -> None:
-        words = semihosting("uart")
-        command = qemu(image, "-serial", "stdio", "-semihosting-config", words)
-        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0)
-        self.link = Link(255, 190)
-        self.came: Iterator[Message] = iter(())
-
-    def send(self, octets: bytes) -> None:
-        assert self.process.stdin is not None
-        self.process.stdin.write(octets)
-
-    def await_(self, kind: str) -> Message:
-        """Return the next message of a kind, or fail when QEMU says nothing for too long."""
-        assert self.process.stdout is not None
-        while True:
-            for message in self.came:
-                if message.get_type() == kind:
-                    return message
-            ready, _, _ = select.select([self.process.stdout], [], [], LIMIT_S)
-            assert ready, f"no {kind} within {LIMIT_S} s"
-            octets = os.read(self.process.stdout.fileno(), 4096)
-            assert octets, "QEMU has ended"
-            self.came = iter(list(self.link.decode(octets)))
-
-
-@pytest.fixture
-def board(image: Path) -> Iterator[Board]:
-    started = Board(image)
-    yield started
-    started.process.kill()  # SIGTERM may not end it
-    started.process.wait()
-    for pipe in (started.process.stdin, started.process.stdout):
-        assert pipe is not None
-        pipe.close()
-
-
-def test_it_lives_by_its_interrupts(board: Board) -> None:
+def test_it_lives_by_its_interrupts(image: Path) -> None:
     """SysTick brings the heartbeats, the UART's interrupts bring steps in and reports out."""
-    first, second = board.await_("HEARTBEAT"), board.await_("HEARTBEAT")
-    assert (first.type, second.system_status) == (mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_STATE_STANDBY)
     steps = [frame for frame in random_steps(60, seed=1) if frame[7:9] == b"\x12\xcf"]
+    command = qemu(image, "-serial", "stdio", "-semihosting-config", semihosting("uart"))
     target = emulated_target()
-    for frame in steps:
-        target.write(frame)
-        (expected,) = reports(target.read(0.0))
-        board.send(frame)
-        assert made(board.await_("FS_PIL_REPORT")) == made(expected)
-    request = mavlink.MAVLink_command_long_message(
-        1, 1, 512, 0, mavlink.MAVLINK_MSG_ID_FS_PIL_STATUS, *[0] * 6
-    )
-    board.send(board.link.encode(request))
-    status = board.await_("FS_PIL_STATUS")
-    while status.steps < len(steps):  # one that was due before
-        status = board.await_("FS_PIL_STATUS")
-    assert (status.bad_frames, status.skipped_octets, status.uart_overruns) == (0, 0, 0)
+    with closing(QemuLink(command)) as link:
+        line = heartbeat_line(link)
+        first, second, *_ = (message for _, message in line.wait(2.0) if message.get_type() == "HEARTBEAT")
+        for frame in steps:
+            target.write(frame)
+            (expected,) = reports(target.read(0.0))
+            report = answered(partial(line.ask, frame, partial(of_step, expected.step)))
+            assert made(report) == made(expected)
+        status = answered(partial(line.request, "FS_PIL_STATUS"))
+        while status.steps < len(steps):  # one that was due before
+            status = answered(partial(line.request, "FS_PIL_STATUS"))
+    assert (first.type, second.system_status) == (mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_STATE_STANDBY)
+    assert status.uart_overruns == 0
     assert 0 < status.stack_high_water < status.stack_size // 2

@@ -1,4 +1,4 @@
-"""A test process that is killed leaves no programs behind: a vehicle in real time would take a core from later runs."""
+"""Programs from the warm server: they see PYTHONPATH, and end with a test process that is killed."""
 
 from __future__ import annotations
 
@@ -6,8 +6,12 @@ import os
 import select
 import subprocess
 import sys
+from pathlib import Path
 
-from tests.support.programs import ROOT
+import pytest
+
+from tests.support.plugin_site import install
+from tests.support.programs import ROOT, Program
 
 CLIENT = """
 import sys
@@ -18,7 +22,18 @@ sys.stdin.read()
 """
 
 
+def test_a_program_finds_packages_on_its_pythonpath(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The server, which an earlier program has started, had another path."""
+    told = []
+    for path in ("", str(install(tmp_path))):
+        monkeypatch.setenv("PYTHONPATH", path)
+        told.append(Program("flightstack", ["--controller", "lqr", "--check"]).communicate())
+    assert "there is no such attitude controller" in told[0][1]
+    assert "with lqr" in told[1][0]
+
+
 def test_programs_of_a_killed_test_process_end() -> None:
+    """A vehicle in real time would take a core from later runs."""
     client = subprocess.Popen(
         [sys.executable, "-c", CLIENT], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )

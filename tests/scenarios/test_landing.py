@@ -6,7 +6,6 @@ NIGHTLY=1 flies every vehicle, plant, controller and gains file in every wind; o
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
@@ -19,9 +18,9 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.params.vehicle import load_vehicle
 from tests.support.refusals import refused
 from tests.support.streams import attitude, level, local_point, sticks, stream
+from tests.support.tools import NIGHTLY
 from tests.support.truth import World
 
-NIGHTLY = bool(os.environ.get("NIGHTLY"))
 FRICTION = 0.7
 """Of the ground: wind that pushes with a larger share of the weight moves a standing vehicle."""
 USUAL_TEXTS = {"Armed", "Takeoff detected", "Landing detected", "Disarmed"}

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from flightstack.process import compile_helper
+from flightstack.process.compile_notice import base_name
 from tests.support.tools import NIGHTLY
 from tests.support.truth import World
 
@@ -29,7 +30,8 @@ from tests.support.truth import World
 class Listener(event.Listener):
     compiled = []
     def on_start(self, event):
-        self.compiled.append(base_name(event.data["dispatcher"].py_func.__name__))
+        kernel = event.data["dispatcher"].py_func
+        self.compiled.append(f"{kernel.__module__.rpartition('.')[2]}.{base_name(kernel.__name__)}")
     def on_end(self, event):
         pass
 
@@ -45,6 +47,14 @@ compile_helper.start(["goal_kernel"])
 os.write(1, str(compile_helper.helper.pid).encode())
 os._exit(0)
 """
+
+LAST_KERNEL = "topics.outer_heading"
+"""The last one of the task COMMANDER."""
+
+
+def cached(folder: Path) -> set[str]:
+    """Return the kernels whose cache is in a folder, each as MODULE.NAME."""
+    return {base_name(path.name.partition("-")[0]) for path in folder.rglob("*.nbi")}
 
 
 def digest_of_flight() -> str:
@@ -85,8 +95,10 @@ def cold(monkeypatch: pytest.MonkeyPatch, not_started: None) -> None:
 def test_cold_cache_is_compiled_once_and_gives_the_same_log(tmp_path: Path) -> None:
     """The helper compiles guidance and plant, this process the rest; no kernel of streams is needed."""
     compiled, digest = json.loads(run(COLD_FLIGHT, json.dumps(FLIGHT), cache=tmp_path).stdout)
-    assert {"inner_kernel", "outer_kernel", "detect", "fence_step", "outer_heading"} <= set(compiled)
-    assert not {"stream_kernel", "goal_kernel", "rest_kernel", "_advance"} & set(compiled)
+    here, there = set(compiled), cached(tmp_path) - set(compiled)
+    assert {"loop_kernels.inner_kernel", "fault_detector.detect", "fence.fence_step", LAST_KERNEL} <= here
+    assert {"kernels.goal_kernel", "kernels.rest_kernel", "integrator._advance"} <= there
+    assert "kernels.stream_kernel" not in here
     assert digest == digest_of_flight()
 
 
@@ -95,8 +107,7 @@ def test_compile_helper_ends_with_its_parent(tmp_path: Path) -> None:
     """The pipe of stderr closes when the helper has ended."""
     parent = run(ORPHAN, cache=tmp_path)
     assert int(parent.stdout) > 0
-    kernels = {path.name.split("-")[0] for path in tmp_path.rglob("*.nbi")}
-    assert "recorder.outer_heading" not in kernels  # the last one
+    assert LAST_KERNEL not in cached(tmp_path)
 
 
 def test_compile_helper_ends_in_order() -> None:

@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from flightstack.firmware.sources import firmware_root
+
 PID, BACKSTEPPING = "pid", "backstepping"
 _GAIN_ERROR = 1.01
 _NOT_GAINS = ("FS_CTRL", "FS_ROTORS", "FS_OUTER_DIV")
@@ -34,10 +36,13 @@ _PASSAGES = Path(__file__).with_name("passages.toml")
 
 
 def structural() -> Iterator[Fault]:
-    """Yield the faults of the source."""
+    """Yield the faults of the source; raise ValueError if the source has changed where one is planted."""
     with _PASSAGES.open("rb") as file:
         for entry in tomllib.load(file)["fault"]:
-            yield Fault(**{"controller": PID, **entry})
+            fault = Fault(**{"controller": PID, **entry})
+            if (firmware_root() / "core" / fault.file).read_text().count(fault.right) != 1:
+                raise ValueError(f"{fault.file} has changed: plant {fault.title!r} anew")
+            yield fault
 
 
 def scaled(numbers: Mapping[str, Mapping[str, float]]) -> Iterator[Fault]:
