@@ -60,7 +60,7 @@ def installed(environment: dict[str, str], tmp_path_factory: pytest.TempPathFact
     checked(sys.executable, "-m", "pip", "wheel", *OFFLINE, "-w", wheels, ROOT)
     shutil.copytree(EXAMPLE, project, ignore=shutil.ignore_patterns("__pycache__", ".pytest_cache"))
     python = Path(environment["VIRTUAL_ENV"]) / "bin" / "python"
-    install = (sys.executable, "-m", "pip", "--python", python, "install", *OFFLINE, "--no-compile")
+    install = (sys.executable, "-m", "pip", "--python", python, "install", *OFFLINE)
     checked(*install, *wheels.glob("*.whl"), project, env=environment)
     return project
 
