@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import faulthandler
 import gc
+import itertools
 import os
 import signal
 from collections.abc import Generator, Iterator
@@ -66,12 +67,13 @@ def pytest_collection() -> Generator[None, object, object]:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark each test with its tier, and those of ``long.txt`` and below a folder ``long`` as long."""
     long = frozenset(Path(__file__).with_name("long.txt").read_text(encoding="utf-8").splitlines())
-    for item in items:
-        folder, *below = item.path.relative_to(Path(__file__).parent).parts
-        if "long" in below or item.nodeid in long:
-            item.add_marker(pytest.mark.long)
-        tier = "paper" if item.path.name.startswith("test_paper") else TIERS[folder]
-        item.add_marker(getattr(pytest.mark, tier))
+    for path, in_file in itertools.groupby(items, lambda item: item.path):
+        folder, *below = path.relative_to(Path(__file__).parent).parts
+        tier = "paper" if path.name.startswith("test_paper") else TIERS[folder]
+        for item in in_file:
+            if "long" in below or item.nodeid in long:
+                item.add_marker(pytest.mark.long)
+            item.add_marker(getattr(pytest.mark, tier))
 
 
 @pytest.fixture(autouse=True)

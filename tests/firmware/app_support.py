@@ -17,6 +17,7 @@ import numpy as np
 
 from flightstack.mavlink.dialect import mavlink
 from tests.firmware.codec_support import ROOT, WARNINGS, compiler, filled_stack
+from tests.firmware.kept_builds import alone
 
 FIRMWARE = ROOT / "firmware"
 PORTABLE = ("core", "mavlink", "app")
@@ -88,9 +89,10 @@ def cached(name: str, *flags: str, program: bool = False) -> Path:
     folder = Path(tempfile.gettempdir()) / f"flightstack-app-{os.getuid()}" / digest.hexdigest()[:16]
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / name
-    if not path.exists():
-        build(fresh := folder / f"{name}.{os.getpid()}", *flags, program=program)
-        fresh.replace(path)
+    with alone(path):
+        if not path.exists():
+            build(fresh := folder / f"{name}.{os.getpid()}", *flags, program=program)
+            fresh.replace(path)
     return path
 
 

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from tests.firmware.kept_builds import alone
 from tests.support.tools import missing
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -76,13 +77,14 @@ def library_path(real: str, cc: str = "", flags: tuple[str, ...] = ("-O2",)) -> 
     folder = Path(tempfile.gettempdir()) / f"flightstack-core-{os.getuid()}"
     folder.mkdir(exist_ok=True)
     path = folder / f"{digest.hexdigest()[:16]}.so"
-    if not path.exists():
-        fresh = path.with_suffix(f".{os.getpid()}")
-        subprocess.run(
-            [*command, *map(str, sources()), str(DRIVER), "-lm", "-o", str(fresh)],
-            check=True, capture_output=True, text=True,
-        )  # fmt: skip
-        fresh.replace(path)
+    with alone(path):
+        if not path.exists():
+            fresh = path.with_suffix(f".{os.getpid()}")
+            subprocess.run(
+                [*command, *map(str, sources()), str(DRIVER), "-lm", "-o", str(fresh)],
+                check=True, capture_output=True, text=True,
+            )  # fmt: skip
+            fresh.replace(path)
     return path
 
 

@@ -9,7 +9,8 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from flightstack.firmware.toolchain.build import compiler_version
@@ -35,6 +36,14 @@ def _folder() -> Path:
     return folder
 
 
+@contextmanager
+def alone(output: Path) -> Iterator[None]:
+    """Wait for another process that makes the same output."""
+    with output.with_name(f".{output.name}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
 _version = functools.cache(compiler_version)
 
 
@@ -48,8 +57,7 @@ def kept_build(name: str, compiler: tuple[str, ...], *words: str | Path) -> Path
     command = [*compiler, *map(str, words)]
     key = hashlib.sha256("\0".join([_version(compiler), *command]).encode()).hexdigest()[:16]
     folder = _folder() / f"{name}-{key}"
-    with (_folder() / f"{name}-{key}.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with alone(folder):
         if not folder.exists():
             with tempfile.TemporaryDirectory(dir=_folder(), prefix=".") as place:
                 fresh = Path(place) / "fresh"

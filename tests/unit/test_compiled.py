@@ -7,7 +7,6 @@ import math
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numba
@@ -257,34 +256,42 @@ def test_a_stored_kernel_for_other_types_is_not_used(tmp_path: Path) -> None:
     assert printed() == "-1 0 0 0\n-1.0 0.0 0.0 0.0\n"
 
 
+DAMAGED = {
+    "cross": ("nbi", lambda content: b""),
+    "conjugate": ("nbi", lambda content: content[:200]),
+    "heading": ("nbi", lambda content: bytes(400)),
+    "normalised": ("nbc", lambda content: b""),
+    "quaternion_product": ("nbc", lambda content: content[:200]),
+    "wrap_pi": ("nbc", lambda content: bytes(400)),
+}
+"""Kernels of the geometry, which of their files is damaged, and how."""
+
+
 @pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
-@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
-@pytest.mark.parametrize(
-    "damage",
-    [lambda content: b"", lambda content: content[:200], lambda content: bytes(400)],
-    ids=["empty", "cut", "zero"],
-)
-def test_damaged_files_of_a_kernel_are_written_again(
-    tmp_path: Path, suffix: str, damage: Callable[[bytes], bytes]
-) -> None:
+def test_damaged_files_of_a_kernel_are_written_again(tmp_path: Path) -> None:
     """After a power failure, a file may be empty, cut or zero."""
     code = """if True:
-        from flightstack.core.geometry import Quaternion, quaternion_product
-        quaternion_product(Quaternion(1.0, 0.0, 0.0, 0.0), Quaternion(1.0, 0.0, 0.0, 0.0))
-        print(sum(quaternion_product.stats.cache_hits.values()))"""
+        from flightstack.core import geometry
+        turn, vector = geometry.Quaternion(1.0, 0.0, 0.0, 0.0), geometry.Vector3(1.0, 0.0, 0.0)
+        given = dict(cross=[vector] * 2, quaternion_product=[turn] * 2, wrap_pi=[1.0])
+        for name in KERNELS:
+            kernel = getattr(geometry, name)
+            kernel(*given.get(name, [turn]))
+            print(sum(kernel.stats.cache_hits.values()))"""
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
     environment.pop("NUMBA_CACHE_DIR", None)
 
-    def hits() -> int:
-        command = [sys.executable, "-c", code]
-        return int(
-            subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
-        )
+    def hits() -> dict[str, int]:
+        command = [sys.executable, "-c", code.replace("KERNELS", repr(list(DAMAGED)))]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        return dict(zip(DAMAGED, map(int, done.stdout.split()), strict=True))
 
-    assert hits() == 0
-    (stored,) = tmp_path.rglob(f"geometry.quaternion_product-*.{suffix}")
-    stored.write_bytes(damage(stored.read_bytes()))
-    assert [hits(), hits()] == [0, 1]
+    assert hits() == dict.fromkeys(DAMAGED, 0)
+    for name, (suffix, damage) in DAMAGED.items():
+        (stored,) = tmp_path.rglob(f"geometry.{name}-*.{suffix}")
+        stored.write_bytes(damage(stored.read_bytes()))
+    assert hits() == dict.fromkeys(DAMAGED, 0)
+    assert hits() == dict.fromkeys(DAMAGED, 1)
 
 
 def test_kernel_for_a_type_of_another_package_is_not_stored(tmp_path: Path) -> None:

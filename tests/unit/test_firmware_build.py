@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import tomllib
 from pathlib import Path
+from typing import IO
 
 import pytest
 
@@ -81,6 +82,14 @@ def test_it_is_compiled_once_for_each_state_and_flags(root: Path) -> None:
     assert library(root, compiler._replace(version="another")) != first
     (root / "core/a.c").write_text("int a(int);\n")
     assert library(root, compiler).parent != first.parent
+
+
+def test_a_process_waits_for_another_one_that_compiles_the_same(root: Path, monkeypatch) -> None:
+    def other_is_done(lock: IO[str], _: int) -> None:
+        Path(lock.name.replace("/.a-", "/a-").replace(".lock", ".so")).write_text("by another process")
+
+    monkeypatch.setattr(build.fcntl, "flock", other_is_done)
+    assert library(root, Compiler(("false",), "none")).read_text() == "by another process"
 
 
 def test_what_does_not_compile_is_one_sentence_and_leaves_nothing(root: Path) -> None:

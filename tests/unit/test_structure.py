@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
 
 from tools.structure import (
     PROGRAMS,
     cycles,
+    forget,
     has_one_definition,
     has_one_small_definition,
     imported,
@@ -22,6 +25,12 @@ ONE_DEFINITION = {"flightstack": 22, "sim_bridge": 4, "gcs_cli": 22}
 SMALL_WITHOUT_REASON = {"flightstack": 3, "sim_bridge": 0, "gcs_cli": 1}
 """Files with one small definition whose docstring does not say why it is a module of its own."""
 LONG_FUNCTIONS = {"flightstack": 2, "sim_bridge": 0, "gcs_cli": 0}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _forgotten() -> Iterator[None]:
+    yield
+    forget()
 
 
 @pytest.mark.parametrize("program", PROGRAMS)

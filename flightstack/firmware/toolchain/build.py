@@ -1,11 +1,12 @@
 """Compile the firmware for this machine, cached by sources, compiler and flags.
 
 The cache is ``~/.cache/flightstack/firmware``. Files are renamed into it when complete, so that concurrent processes
-never see a partial file.
+never see a partial file; a process waits for another one that compiles the same.
 """
 
 from __future__ import annotations
 
+import fcntl
 import functools
 import hashlib
 import os
@@ -123,7 +124,13 @@ def _compile(place: Path, command: list[str]) -> None:
     is_bare = "-nostdlib" in command or "-ffreestanding" in command
     libraries = [] if is_bare else ["-lm"]
     try:
-        with tempfile.TemporaryDirectory(dir=place.parent, prefix=".") as folder:
+        with (
+            place.with_name(f".{place.stem}.lock").open("w") as lock,
+            tempfile.TemporaryDirectory(dir=place.parent, prefix=".") as folder,
+        ):
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if place.exists():
+                return
             fresh = Path(folder) / place.name
             done = subprocess.run(
                 [*command, *libraries, "-o", str(fresh)], capture_output=True, text=True, check=False,

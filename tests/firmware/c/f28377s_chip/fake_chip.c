@@ -4,11 +4,14 @@
 #include <string.h>
 
 #define AREAS 10U
+#define HELD 4U /* registers that an expression of the port may hold the addresses of, and write later */
 
 static fake_area *const areas[AREAS] = {
     &fake_timer_area, &fake_pie_area, &fake_vector_area, &fake_watchdog_area, &fake_sci_area,
     &fake_clock_area, &fake_cpu_area, &fake_boot_area, &fake_gpio_area, &fake_pin_area,
 };
+static fake_area *held[2][HELD]; /* outside an interrupt, in one */
+static uint32_t holds[2];
 static uint64_t now;
 static const char *first_misuse;
 static uint16_t eallow;
@@ -58,14 +61,25 @@ static void settle_area(fake_area *area)
     }
 }
 
+/* Take in what was written: only registers that were reached lately can have been. */
 void fake_settle(void)
 {
+    const uint16_t level = fake_in_interrupt();
     uint32_t i;
 
-    for (i = 0U; i < AREAS; i++) {
-        if (areas[i] != &fake_vector_area) { /* large, and only read when an interrupt strikes */
-            settle_area(areas[i]);
+    for (i = 0U; i < HELD; i++) {
+        if (held[level][i] != NULL) {
+            settle_area(held[level][i]);
         }
+    }
+}
+
+void fake_hold(fake_area *area)
+{
+    if (area != &fake_vector_area) { /* large, and only read when an interrupt strikes */
+        const uint16_t level = fake_in_interrupt();
+
+        held[level][holds[level]++ % HELD] = area;
     }
 }
 
@@ -112,6 +126,7 @@ static uint16_t *cell_of(uint32_t address)
             if (areas[i] == &fake_sci_area) {
                 fake_sci_show(offset);
             }
+            fake_hold(areas[i]);
             return &areas[i]->cells[offset];
         }
     }

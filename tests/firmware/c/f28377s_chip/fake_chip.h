@@ -26,6 +26,7 @@ extern fake_area fake_timer_area, fake_pie_area, fake_vector_area, fake_watchdog
 
 /* Show a value in a register. */
 void fake_show(fake_area *area, uint32_t offset, uint16_t value);
+void fake_hold(fake_area *area); /* an address in these registers is given away */
 void fake_settle(void); /* do what the writes since the last access ask for */
 void fake_note(const char *misuse);
 void fake_access(void); /* let the time of an access pass, in which interrupts may strike */

@@ -41,12 +41,14 @@ uint32_t *fake_gpio_data(void);
 uint32_t *fake_gpio_control(void)
 {
     fake_access();
+    fake_hold(&fake_gpio_area);
     return cells[5];
 }
 
 uint32_t *fake_gpio_data(void)
 {
     fake_access();
+    fake_hold(&fake_pin_area);
     return cells[6];
 }
 
