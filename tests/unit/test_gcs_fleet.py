@@ -121,7 +121,7 @@ def test_action_ends_after_the_connection_was_closed() -> None:
 def test_messages_of_every_system_are_observed() -> None:
     fleet, seen = Fleet(), list[tuple[int, str]]()
 
-    def observe(message: Message) -> None:
+    def observe(message: Message, _now_s: float) -> None:
         seen.append((message.get_srcSystem(), message.get_type()))
 
     fleet.observe = observe
