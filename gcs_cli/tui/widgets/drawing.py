@@ -83,9 +83,11 @@ class LinesWidget(KeepsLines):
         self._frame: _Frame | None = None
         """The frame of the kept lines; None if they cannot be replaced one by one."""
 
-    def show_lines(self, lines: Sequence[Text | Runs]) -> None:
-        """Show ``lines`` from the top."""
-        width, colours = self.content_size.width, watch_app(self).palette
+    def show_lines(self, lines: Sequence[Text | Runs], width: int | None = None) -> None:
+        """Show ``lines`` from the top; ``width`` is that of the content, if it is known."""
+        if width is None:
+            width = self.content_size.width
+        colours = watch_app(self).palette
         if colours is not self._palette:  # rich_style collects the styles of all ancestors
             self._palette, background = colours, self.rich_style
             if background != self._background:
@@ -177,7 +179,7 @@ class Drawing(LinesWidget):
         """Draw ``view``."""
         width, height = self.content_size
         if width > 0 and height > 0:
-            self.show_lines(self._draw(view, now_s, width, height, watch_app(self).palette))
+            self.show_lines(self._draw(view, now_s, width, height, watch_app(self).palette), width)
 
     def on_resize(self, _event: Resize) -> None:
         """Draw in the new size."""
