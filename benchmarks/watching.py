@@ -148,7 +148,7 @@ def watching(rounds: int, seconds: float) -> Watched:
 def _messages_hz(connection: Connection) -> float:
     count = 0
 
-    def observe(_message: object) -> None:
+    def observe(_message: object, _now_s: float) -> None:
         nonlocal count
         count += 1
 

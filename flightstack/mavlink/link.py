@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, NamedTuple, TypeAlias
 
+from flightstack.mavlink.decoding import decoded
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.fields import PACKING_ERRORS, TEXT_FIELDS, clean, fit
 from flightstack.mavlink.frames import (
@@ -129,14 +130,22 @@ class Link:
         if self._signing is not None and not self._signing.accepts(frame):
             self.bad += 1
             return None
+        kind = mavlink.mavlink_map[message_id_of(frame)]
+        texts = TEXT_FIELDS[kind]
+        message = self._decoded_text(frame, texts) if texts else decoded(frame, kind)
+        if message is None:
+            self.bad += 1
+            return None
+        self.received += 1
+        return message
+
+    def _decoded_text(self, frame: bytes, names: tuple[str, ...]) -> Message | None:
         try:
             message = self._codec.decode(bytearray(frame))
         except mavlink.MAVError:
-            self.bad += 1
             return None
-        for name in TEXT_FIELDS[type(message)]:  # the frame keeps the bytes as they came
+        for name in names:  # the frame keeps the bytes as they came
             setattr(message, name, clean(getattr(message, name)))
-        self.received += 1
         return message
 
     def _is_one_frame(self, data: bytes) -> bool:

@@ -11,7 +11,7 @@ from functools import cache
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from rich.segment import Segment
 from rich.style import Style
 from rich.text import Text
@@ -134,12 +134,18 @@ class Canvas:
         return not self._codes[row, column : column + length].any()
 
     def rows(self) -> list[Runs]:
-        """Return the rows, each as runs of equal style that fill the width."""
+        """Return the rows, each as runs of equal style that fill the width.
+
+        Blank cells belong to the run before them if its style does not show on them.
+        """
         cells = self._dots.reshape(self.height, DOTS_Y, self.width, DOTS_X)
         bits = np.einsum("ijkl,jl->ik", cells, _WEIGHTS, dtype=np.uint8, casting="unsafe")
         has_text = self._codes > 0
         codes = np.where(has_text, self._codes, np.where(bits > 0, _BRAILLE + bits.astype(np.uint32), _SPACE))
-        styles = np.where(has_text, self._text_styles, np.where(bits > 0, self._dot_styles, 0))
+        styles = self._continued(
+            np.where(has_text, self._text_styles, np.where(bits > 0, self._dot_styles, 0)),
+            has_text | (bits > 0),
+        )
         marks = codes.astype("<u4").tobytes().decode("utf-32-le")
         is_start = np.ones((self.height, self.width), dtype=np.bool_)
         is_start[:, 1:] = styles[:, 1:] != styles[:, :-1]
@@ -150,6 +156,16 @@ class Canvas:
         for start, end, style in runs:
             rows[start // self.width].append((marks[start:end], self._styles[style]))
         return [Runs(row) for row in rows]
+
+    def _continued(self, styles: NDArray[np.int16], has_mark: Mask) -> NDArray[np.int16]:
+        """Return the styles of cells, those of blank ones continued from the left."""
+        columns = np.where(has_mark, np.arange(self.width), 0)
+        continued = np.take_along_axis(styles, np.maximum.accumulate(columns, axis=1), axis=1)
+        is_of_marks = np.array(
+            [not (s.bgcolor or s.reverse or s.underline or s.strike) for s in self._styles]
+        )
+        kept: NDArray[np.int16] = np.where(has_mark | is_of_marks[continued], continued, 0)
+        return kept
 
     def text(self) -> Text:
         """Return the canvas as one text, a line a row."""

@@ -164,7 +164,7 @@ class _Printer:
         """True once ``count`` messages are printed."""
         return self.printed == self._count
 
-    def _take(self, message: Message) -> None:
+    def _take(self, message: Message, _now_s: float) -> None:
         system, component = message.get_srcSystem(), message.get_srcComponent()
         if message.get_msgId() != self._number or self.is_complete:
             return
@@ -195,7 +195,7 @@ def _list(connection: Connection, output: Output, duration_s: float) -> None:
     counts: Counter[tuple[int, int, int, str]] = Counter()
     began_s = connection.now_s
 
-    def take(message: Message) -> None:
+    def take(message: Message, _now_s: float) -> None:
         number = message.get_header().msgId
         counts[message.get_srcSystem(), message.get_srcComponent(), number, message.get_type()] += 1
 

@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from flightstack.process import collection
 from flightstack.process.command_line import IN_OUTPUT, expand_options, make_app
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.link.connection import Connection
@@ -89,6 +90,7 @@ def watch_screen(connection: Connection, screen: str = SCREENS[0].mode) -> None:
     _follow_terminal_size()
     feed = Feed(connection)
     view = WatchApp(feed, screen)
+    collection.resume()  # of garbage: it would search all modules every few seconds
     view.run()
     if feed.error is not None:
         raise feed.error

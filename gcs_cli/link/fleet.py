@@ -39,8 +39,8 @@ class Fleet:
     ) -> None:
         self.peers = peers
         self.wire = Wire(signing, record)
-        self.observe: Callable[[Message], None] | None = None
-        """Called with every message on the link, those of other ground stations and of components too."""
+        self.observe: Callable[[Message, float], None] | None = None
+        """Called with every message on the link, those of other ground stations and of components too, and its time."""
         self.systems: set[int] = set()
         """Ids of systems whose autopilot, component 1, has sent any message."""
         self._only = only
@@ -111,7 +111,7 @@ class Fleet:
             return
         for message in self.wire.decode(data, peer):
             if self.observe is not None:
-                self.observe(message)
+                self.observe(message, now_s)
             self._take(message, peer, now_s)
 
     def _take(self, message: Message, peer: Address, now_s: float) -> None:

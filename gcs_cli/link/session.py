@@ -70,6 +70,8 @@ class Session:
         self._subscription = Subscription(lambda: self.view, {})
         self._monitor = LinkMonitor(lambda: self.view.link)
         self._background: list[Service] = [self._monitor] if monitors else []
+        self._services: tuple[Service, ...] = ()
+        self._collect_services()
         self._heartbeat_due_s = 0.0
         self._heartbeat_due_vehicle_s = -math.inf  # as soon as the vehicle's time is known
 
@@ -110,6 +112,7 @@ class Session:
     def subscribe(self, rates_hz: Mapping[int, float]) -> None:
         """Request messages from the vehicle, id -> rate [Hz], instead of those of an earlier call."""
         self._subscription = Subscription(lambda: self.view, rates_hz)
+        self._collect_services()
 
     def keep_vehicle(self) -> None:
         """Accept no other vehicle from now on, even if this one is lost."""
@@ -119,19 +122,21 @@ class Session:
     def use(self, service: Service | None) -> None:
         """Replace the service that exchanges messages with the vehicle."""
         self.service = service
+        self._collect_services()
 
     def attach(self, service: Service) -> None:
         """Run a service beside that of ``use`` until ``detach``."""
         self._background.append(service)
+        self._collect_services()
 
     def detach(self, service: Service) -> None:
         """End a service of ``attach``."""
         self._background.remove(service)
+        self._collect_services()
 
-    @property
-    def _services(self) -> list[Service]:
+    def _collect_services(self) -> None:
         chosen = [] if self.service is None else [self.service]
-        return [*chosen, self._subscription, *self._background]
+        self._services = (*chosen, self._subscription, *self._background)
 
     def is_heard(self, now_s: float) -> bool:
         """Return True if the vehicle is connected: it was heard, and its heartbeat has not timed out."""
@@ -180,7 +185,9 @@ class Session:
         return True
 
     def _is_other_system(self, message: Message) -> bool:
-        return (message.get_srcSystem(), message.get_srcComponent()) != self.target
+        header, identity = message.get_header(), self.view.identity
+        target = (_BROADCAST, _BROADCAST) if identity is None else identity[:2]
+        return (header.srcSystem, header.srcComponent) != target
 
     def disconnect(self) -> None:
         """Accept the vehicle from any peer: its connection was closed."""

@@ -169,8 +169,7 @@ class Feed:
         self.rates_hz = {**rates, message_id: rate_hz} if rate_hz else rates
         self.submit(lambda connection: connection.fleet.subscribe(self.rates_hz))
 
-    def _observe(self, message: Message) -> None:
-        now_s = self.now_s
+    def _observe(self, message: Message, now_s: float) -> None:
         self.history.record(message, now_s)
         if message.get_msgId() in TRAFFIC_MESSAGES:
             self._observe_traffic(message, now_s)

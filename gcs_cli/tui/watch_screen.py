@@ -50,7 +50,11 @@ class Tabs(KeepsLines):
                 return
 
 
-class WatchScreen(Screen[None]):
+class Body(KeepsLines, Container):
+    """The part of the screen between the tabs and the foot."""
+
+
+class WatchScreen(KeepsLines, Screen[None]):
     """A screen of the application. A subclass yields its widgets in ``compose_body``.
 
     ``show`` is called at most five times a second, while the screen is visible and composed.
@@ -86,7 +90,7 @@ class WatchScreen(Screen[None]):
         """Yield the frame around the body."""
         yield Drawing(self._status, every=1, id="status")
         yield Tabs(id="tabs")
-        with Container(id="body"):
+        with Body(id="body"):
             yield from self.compose_body()
         yield KeyBar()
 

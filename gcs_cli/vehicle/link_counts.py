@@ -42,38 +42,43 @@ class LinkCounts(NamedTuple):
         return self.received / total if total else None
 
 
-def _following(link: LinkCounts, sequence: int, now_s: float) -> LinkCounts:
+class _Sequence(NamedTuple):
+    """The counts of ``LinkCounts`` that follow from sequence numbers."""
+
+    lost: int
+    last_sequence: int | None
+    missing: int
+    stray: int | None
+
+
+def _following(link: LinkCounts, sequence: int, now_s: float) -> _Sequence:
     """Return the counts of losses after a message with this sequence number."""
-    last = link.last_sequence
+    lost, last, missing, stray = link.lost, link.last_sequence, link.missing, link.stray
     if last is None or link.last_received_s is None or now_s - link.last_received_s > _SILENCE_S:
-        return link._replace(last_sequence=sequence, missing=0, stray=None)
+        return _Sequence(lost, sequence, 0, None)
     late = (last - sequence) % 256
     if late == 0:  # repeated
-        return link
-    begins_anew = link.stray is not None and sequence == (link.stray + 1) % 256
+        return _Sequence(lost, last, missing, stray)
+    begins_anew = stray is not None and sequence == (stray + 1) % 256
     if late <= _MOST_LATE and not begins_anew:
-        if link.missing >> late & 1:  # overtaken by later ones, which counted it as lost
-            return link._replace(lost=link.lost - 1, missing=link.missing ^ 1 << late)
-        return link._replace(stray=sequence)  # repeated, or the first one of a sender that began anew
+        if missing >> late & 1:  # overtaken by later ones, which counted it as lost
+            return _Sequence(lost - 1, last, missing ^ 1 << late, stray)
+        return _Sequence(lost, last, missing, sequence)  # repeated, or of a sender that began anew
     gap = (sequence - last - 1) % 256
     if begins_anew or gap > _LARGEST_GAP:
-        return link._replace(last_sequence=sequence, missing=0, stray=None)
-    missing = (link.missing << gap + 1 | (1 << gap + 1) - 2) & _ALL_LATE
-    return link._replace(lost=link.lost + gap, last_sequence=sequence, missing=missing, stray=None)
+        return _Sequence(lost, sequence, 0, None)
+    return _Sequence(lost + gap, sequence, (missing << gap + 1 | (1 << gap + 1) - 2) & _ALL_LATE, None)
 
 
 def counted(link: LinkCounts, sequence: int, now_s: float) -> LinkCounts:
     """Return the counts after a message with this sequence number."""
-    losses = _following(link, sequence, now_s)
     start, count, rate, last = link.window_start_s, link.window_count + 1, link.rate_hz, link.last_received_s
     if start is None or last is None or (rate is None and now_s == start):
         start, count = now_s, 0  # read at once with the first message: a backlog has no rate
     elif now_s != last and last - start >= _RATE_WINDOW_S:  # messages read at one time belong to one window
         start, count, rate = last, 1, link.window_count / (last - start)
-    return losses._replace(
-        received=link.received + 1,
-        last_received_s=now_s,
-        rate_hz=rate,
-        window_start_s=start,
-        window_count=count,
+    lost, last_sequence, missing, stray = _following(link, sequence, now_s)
+    measured = link.round_trip_s, link.recent_loss
+    return LinkCounts(
+        link.received + 1, lost, last_sequence, now_s, rate, start, count, *measured, missing, stray
     )

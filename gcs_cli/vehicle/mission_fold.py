@@ -30,8 +30,8 @@ def after_heartbeat(view: VehicleView, mode: str, armed: bool) -> Mission:
     return mission._replace(has_returned=mission.has_returned and view.on_ground is True)
 
 
-def after_current(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    """Return ``view`` after MISSION_CURRENT."""
+def after_current(view: VehicleView, message: Any) -> Mission:
+    """Return the mission of ``view`` after MISSION_CURRENT."""
     mission = view.mission
     if mission.mission_id not in (None, message.mission_id):
         mission = mission._replace(reached=None, has_ended=False, has_returned=False)
@@ -44,38 +44,38 @@ def after_current(view: VehicleView, message: Any, _now_s: float) -> VehicleView
     if mission.total is not None and mission.reached is not None and mission.reached >= mission.total:
         mission = mission._replace(reached=None)  # of a former mission
     if mission.state == MISSION_COMPLETE:
-        return view._replace(mission=mission._replace(has_ended=True))
+        return mission._replace(has_ended=True)
     left_last = mission.state is None and view.armed and not mission.is_at_last
     runs = left_last or mission.state == MISSION_ACTIVE
     if runs and (mission.has_ended or mission.has_returned):  # begun again
         mission = mission._replace(reached=None, has_ended=False, has_returned=False)
-    return view._replace(mission=mission)
+    return mission
 
 
-def after_reached(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    """Return ``view`` after MISSION_ITEM_REACHED; PX4 repeats it for 10 s, and so into the next flight."""
+def after_reached(view: VehicleView, message: Any) -> Mission:
+    """Return the mission of ``view`` after MISSION_ITEM_REACHED, which PX4 repeats for 10 s: into the next flight."""
     number, total = _plan_number(view, message.seq), view.mission.total
     if message.seq == _NO_NUMBER or (number is not None and total is not None and number >= total):
-        return view  # none yet, or one of a former mission
+        return view.mission  # none yet, or one of a former mission
     mission = view.mission._replace(reached=number)
     is_last = mission.is_at_last and mission.reached == mission.current
     ends = is_last and mission.has_begun and mission.state is None
-    return view._replace(mission=mission._replace(has_ended=mission.has_ended or ends))
+    return mission._replace(has_ended=mission.has_ended or ends)
 
 
-def after_count(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    """Return ``view`` after MISSION_COUNT, with which the vehicle begins to send its items."""
+def after_count(view: VehicleView, message: Any) -> Mission:
+    """Return the mission of ``view`` after MISSION_COUNT, with which the vehicle begins to send its items."""
     if message.mission_type != mavlink.MAV_MISSION_TYPE_MISSION:
-        return view
-    return view._replace(mission=view.mission._replace(items_id=message.opaque_id, return_item=None))
+        return view.mission
+    return view.mission._replace(items_id=message.opaque_id, return_item=None)
 
 
-def after_item(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    """Return ``view`` after an item that the vehicle sends."""
+def after_item(view: VehicleView, message: Any) -> Mission:
+    """Return the mission of ``view`` after an item that the vehicle sends."""
     is_return = message.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH
     if message.mission_type != mavlink.MAV_MISSION_TYPE_MISSION or not is_return:
-        return view
-    return view._replace(mission=view.mission._replace(return_item=_plan_number(view, message.seq)))
+        return view.mission
+    return view.mission._replace(return_item=_plan_number(view, message.seq))
 
 
 def _plan_number(view: VehicleView, seq: int) -> int | None:

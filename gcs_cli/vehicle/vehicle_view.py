@@ -15,15 +15,18 @@ from gcs_cli.vehicle.status_texts import add_piece, without_stale_piece
 from gcs_cli.vehicle.view_types import (
     AvailableMode,
     Battery,
+    Changes,
     Estimator,
     Euler,
     GeoPosition,
     Gnss,
     Identity,
     LoopTiming,
+    Mission,
     Setpoint,
     Vector,
     VehicleView,
+    view_with,
 )
 
 _NO_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID: a ground station, a camera …
@@ -64,16 +67,19 @@ def update(view: VehicleView, message: Any, now_s: float) -> VehicleView:
         view = view._replace(identity=sender)
     elif (message.get_srcSystem(), message.get_srcComponent()) != view.identity[:2]:
         return view
-    view = without_stale_piece(view, now_s)._replace(link=counted(view.link, message.get_seq(), now_s))
+    if view.partial_text is not None:
+        view = view_with(view, without_stale_piece(view, now_s))
     fold = FOLDS.get(message.get_type())
-    return view if fold is None else _restarted(view.time_s, fold(view, message, now_s))
+    changes: Changes = {} if fold is None else fold(view, message, now_s)
+    if _is_restarted(view.time_s, changes.get("time_s")):
+        changes["restarts"] = view.restarts + 1
+    changes["link"] = counted(view.link, message.get_seq(), now_s)
+    return view_with(view, changes)
 
 
-def _restarted(before_s: float | None, view: VehicleView) -> VehicleView:
-    """Return ``view``, with the restart counted if the vehicle's clock went back."""
-    if before_s is None or view.time_s is None or view.time_s > before_s - _RESTART_S:
-        return view
-    return view._replace(restarts=view.restarts + 1)
+def _is_restarted(before_s: float | None, after_s: float | None) -> bool:
+    """Return True if the vehicle's clock went back."""
+    return before_s is not None and after_s is not None and after_s <= before_s - _RESTART_S
 
 
 def _number(value: float) -> float | None:
@@ -92,20 +98,21 @@ def _euler(q: Any) -> Euler | None:
     return Euler(*euler_angles(*(v / norm for v in q)))
 
 
-def _heartbeat(view: VehicleView, message: Any, now_s: float) -> VehicleView:
+def _heartbeat(view: VehicleView, message: Any, now_s: float) -> Changes:
     armed = bool(message.base_mode & _ARMED)
     mode = mode_name(view, message.custom_mode)
-    if view.setpoint is not None and (mode, armed) != (view.mode, view.armed):
-        view = view._replace(setpoint=None)  # it may be sent only in modes that have one, or in another frame
-    return view._replace(
-        last_heartbeat_s=now_s,
-        mode=mode,
-        custom_mode=message.custom_mode,
-        mission=mission_fold.after_heartbeat(view, mode, armed),
-        armed=armed,
-        ever_armed=view.ever_armed or armed,
-        system_status=message.system_status,
-    )
+    changes: Changes = {
+        "last_heartbeat_s": now_s,
+        "mode": mode,
+        "custom_mode": message.custom_mode,
+        "mission": mission_fold.after_heartbeat(view, mode, armed),
+        "armed": armed,
+        "ever_armed": view.ever_armed or armed,
+        "system_status": message.system_status,
+    }
+    if (mode, armed) != (view.mode, view.armed):
+        changes["setpoint"] = None  # it may be sent only in modes that have one, or in another frame
+    return changes
 
 
 def mode_name(view: VehicleView, custom_mode: int) -> str:
@@ -123,71 +130,73 @@ def _standard_label(standard_mode: int) -> str:
     return "" if entry is None else entry.name.removeprefix(_STANDARD).replace("_", " ").capitalize()
 
 
-def _available_mode(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+def _available_mode(view: VehicleView, message: Any, _now_s: float) -> Changes:
     selectable = not message.properties & _NOT_SELECTABLE
     label = message.mode_name or _standard_label(message.standard_mode)
     entry = AvailableMode(message.custom_mode, label, selectable, message.standard_mode)
     others = [mode for mode in view.modes if mode.number != entry.number]
-    view = view._replace(modes=(*others, entry), mode_total=message.number_modes)
-    return view._replace(mode=mode_name(view, view.custom_mode))
+    changes: Changes = {"modes": (*others, entry), "mode_total": message.number_modes}
+    return {**changes, "mode": mode_name(view_with(view, changes), view.custom_mode)}
 
 
-def _system(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+def _system(view: VehicleView, message: Any, _now_s: float) -> Changes:
     enabled = message.onboard_control_sensors_present & message.onboard_control_sensors_enabled
     failed = enabled & ~message.onboard_control_sensors_health
-    view = view._replace(
-        healthy=not failed & ~_PREARM_CHECK,
-        unhealthy=tuple(name for bit, name in SENSOR_NAMES.items() if failed & bit),
-        can_arm=not failed & _PREARM_CHECK if enabled & _PREARM_CHECK else None,
-    )
+    changes: Changes = {
+        "healthy": not failed & ~_PREARM_CHECK,
+        "unhealthy": tuple(name for bit, name in SENSOR_NAMES.items() if failed & bit),
+        "can_arm": not failed & _PREARM_CHECK if enabled & _PREARM_CHECK else None,
+        "battery": None,
+    }
     remaining = message.battery_remaining / 100 if 0 <= message.battery_remaining <= 100 else None
     voltage = message.voltage_battery / 1000 if 0 < message.voltage_battery < 65535 else None
     current = message.current_battery / 100 if message.current_battery >= 0 else None
     if remaining is None and voltage is None:
-        return view._replace(battery=None)
+        return changes
     if not view.armed or remaining is None:
-        view = view._replace(charge_at_arming=None)
+        changes["charge_at_arming"] = None
     elif view.charge_at_arming is None and view.time_s is not None:
-        view = view._replace(charge_at_arming=(view.time_s, remaining))
+        changes["charge_at_arming"] = (view.time_s, remaining)
     time_s = None if view.battery is None else view.battery.time_remaining_s
-    return view._replace(battery=Battery(remaining, voltage, current, time_s))
+    changes["battery"] = Battery(remaining, voltage, current, time_s)
+    return changes
 
 
-def _fence(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    return view._replace(fence_breached=bool(message.breach_status))
+def _fence(view: VehicleView, message: Any, _now_s: float) -> Changes:
+    return {"fence_breached": bool(message.breach_status)}
 
 
-def _battery(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+def _battery(view: VehicleView, message: Any, _now_s: float) -> Changes:
     """Take the remaining time of the first battery; SYS_STATUS has the rest."""
     if message.id != 0 or view.battery is None:
-        return view
-    return view._replace(battery=view.battery._replace(time_remaining_s=message.time_remaining or None))
+        return {}
+    return {"battery": view.battery._replace(time_remaining_s=message.time_remaining or None)}
 
 
-def _gnss(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+def _gnss(view: VehicleView, message: Any, _now_s: float) -> Changes:
     satellites = None if message.satellites_visible == 255 else message.satellites_visible
     hdop = None if message.eph == 65535 else message.eph / 100
-    return view._replace(gnss=Gnss(message.fix_type, satellites, hdop, message.h_acc / 1e3 or None))
+    return {"gnss": Gnss(message.fix_type, satellites, hdop, message.h_acc / 1e3 or None)}
 
 
-def _estimator_status(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+def _estimator_status(view: VehicleView, message: Any, _now_s: float) -> Changes:
     ratios = (message.vel_ratio, message.pos_horiz_ratio, message.pos_vert_ratio, message.mag_ratio)
     horizontal_m, vertical_m = (
         accuracy if accuracy > 0.0 else None  # the true state has none
         for accuracy in (message.pos_horiz_accuracy, message.pos_vert_accuracy)
     )
     health = _estimator(message.flags, ratios)._replace(horizontal_m=horizontal_m, vertical_m=vertical_m)
-    return view._replace(estimator=health)
+    return {"estimator": health}
 
 
-def _ekf_status(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+def _ekf_status(view: VehicleView, message: Any, _now_s: float) -> Changes:
     variances = (
         message.velocity_variance,
         message.pos_horiz_variance,
         message.pos_vert_variance,
         message.compass_variance,
     )
-    return view._replace(estimator=_estimator(message.flags, variances))
+    return {"estimator": _estimator(message.flags, variances)}
 
 
 def _estimator(flags: int, ratios: Iterable[float]) -> Estimator:
@@ -201,70 +210,70 @@ def _estimator(flags: int, ratios: Iterable[float]) -> Estimator:
     )
 
 
-def _wind(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+def _wind(view: VehicleView, message: Any, _now_s: float) -> Changes:
     """ArduPilot's WIND: the direction that the wind comes from, and the speed."""
     if not math.isfinite(message.direction):
-        return view._replace(wind_ned_m_s=None)
+        return {"wind_ned_m_s": None}
     away_rad = math.radians(message.direction)
     north, east = -message.speed * math.cos(away_rad), -message.speed * math.sin(away_rad)
-    return view._replace(wind_ned_m_s=_vector(north, east, message.speed_z))
+    return {"wind_ned_m_s": _vector(north, east, message.speed_z)}
 
 
-def _wind_cov(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+def _wind_cov(view: VehicleView, message: Any, _now_s: float) -> Changes:
     vertical_m_s = message.wind_z if math.isfinite(message.wind_z) else 0.0  # NaN: unknown
-    return view._replace(wind_ned_m_s=_vector(message.wind_x, message.wind_y, vertical_m_s))
+    return {"wind_ned_m_s": _vector(message.wind_x, message.wind_y, vertical_m_s)}
 
 
-def _attitude(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+def _attitude(view: VehicleView, message: Any, _now_s: float) -> Changes:
     angles = _vector(message.roll, message.pitch, message.yaw)
-    return view._replace(
-        attitude=None if angles is None else Euler(*angles),
-        rates_frd_rad_s=_vector(message.rollspeed, message.pitchspeed, message.yawspeed),
-        time_s=message.time_boot_ms / 1e3,
-    )
+    return {
+        "attitude": None if angles is None else Euler(*angles),
+        "rates_frd_rad_s": _vector(message.rollspeed, message.pitchspeed, message.yawspeed),
+        "time_s": message.time_boot_ms / 1e3,
+    }
 
 
-def _attitude_target(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+def _attitude_target(view: VehicleView, message: Any, _now_s: float) -> Changes:
     ignored = message.type_mask & _IGNORE_ATTITUDE
-    return view._replace(
-        attitude_target=None if ignored else _euler(message.q), time_s=message.time_boot_ms / 1e3
-    )
+    return {"attitude_target": None if ignored else _euler(message.q), "time_s": message.time_boot_ms / 1e3}
 
 
-def _local_position(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    return view._replace(
-        position_ned_m=_vector(message.x, message.y, message.z),
-        velocity_ned_m_s=_vector(message.vx, message.vy, message.vz),
-        time_s=message.time_boot_ms / 1e3,
-    )
+def _local_position(view: VehicleView, message: Any, _now_s: float) -> Changes:
+    return {
+        "position_ned_m": _vector(message.x, message.y, message.z),
+        "velocity_ned_m_s": _vector(message.vx, message.vy, message.vz),
+        "time_s": message.time_boot_ms / 1e3,
+    }
 
 
-def _global_position(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+def _global_position(view: VehicleView, message: Any, _now_s: float) -> Changes:
     """Take the position, and the velocity without LOCAL_POSITION_NED; ArduPilot sends zeros until it has them."""
     geo = GeoPosition(message.lat / 1e7, message.lon / 1e7, message.alt / 1e3, message.relative_alt / 1e3)
     is_known = any(geo[:3])
     velocity = view.velocity_ned_m_s
     if is_known and view.position_ned_m is None:
         velocity = Vector(message.vx / 1e2, message.vy / 1e2, message.vz / 1e2)
-    return view._replace(
-        geo=geo if is_known else None, velocity_ned_m_s=velocity, time_s=message.time_boot_ms / 1e3
-    )
+    return {
+        "geo": geo if is_known else None,
+        "velocity_ned_m_s": velocity,
+        "time_s": message.time_boot_ms / 1e3,
+    }
 
 
-def _home(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+def _home(view: VehicleView, message: Any, _now_s: float) -> Changes:
     home = GeoPosition(message.latitude / 1e7, message.longitude / 1e7, message.altitude / 1e3, 0.0)
-    return view._replace(home=home, home_count=view.home_count + 1)
+    return {"home": home, "home_count": view.home_count + 1}
 
 
-def _position_target(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+def _position_target(view: VehicleView, message: Any, _now_s: float) -> Changes:
     mask = message.type_mask
     position = None if mask & _IGNORE_POSITION else _vector(message.x, message.y, message.z)
     velocity = None if mask & _IGNORE_VELOCITY else _vector(message.vx, message.vy, message.vz)
     yaw = None if mask & _IGNORE_YAW else _number(message.yaw)
-    return view._replace(setpoint=Setpoint(position, velocity, yaw), time_s=message.time_boot_ms / 1e3)
+    return {"setpoint": Setpoint(position, velocity, yaw), "time_s": message.time_boot_ms / 1e3}
 
 
-def _global_target(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+def _global_target(view: VehicleView, message: Any, _now_s: float) -> Changes:
     """Take the setpoint of a vehicle that does not send it in its local frame (ArduPilot)."""
     now, geo = view.position_ned_m, view.geo
     is_local = view.setpoint is not None and not view.setpoint.is_global
@@ -272,65 +281,69 @@ def _global_target(view: VehicleView, message: Any, _now_s: float) -> VehicleVie
     has_height = is_relative or message.coordinate_frame in _SEA_LEVEL_FRAMES
     is_known = has_height and not message.type_mask & _IGNORE_POSITION
     if is_local or not is_known or now is None or geo is None:
-        return view
+        return {}
     height_m = geo.relative_altitude_m if is_relative else geo.altitude_m
     frame = LocalFrame(GeoPoint(geo.latitude_deg, geo.longitude_deg, height_m))
     ahead = frame.to_ned(GeoPoint(message.lat_int / 1e7, message.lon_int / 1e7, message.alt))
     place = _vector(now.x + ahead.x, now.y + ahead.y, now.z + ahead.z)
-    return view._replace(setpoint=Setpoint(place, is_global=True), time_s=message.time_boot_ms / 1e3)
+    return {"setpoint": Setpoint(place, is_global=True), "time_s": message.time_boot_ms / 1e3}
 
 
-def _hud(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    return view._replace(heading_deg=float(message.heading % 360), throttle=message.throttle / 100)
+def _hud(view: VehicleView, message: Any, _now_s: float) -> Changes:
+    return {"heading_deg": float(message.heading % 360), "throttle": message.throttle / 100}
 
 
-def _extended_state(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    return view._replace(landed_state=message.landed_state)
+def _extended_state(view: VehicleView, message: Any, _now_s: float) -> Changes:
+    return {"landed_state": message.landed_state}
 
 
-def _rotors(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+def _rotors(view: VehicleView, message: Any, _now_s: float) -> Changes:
     return _with_rotors(view, message.index, message.rpm)
 
 
-def _with_rotors(view: VehicleView, first: int, speeds_rpm: Iterable[float]) -> VehicleView:
+def _with_rotors(view: VehicleView, first: int, speeds_rpm: Iterable[float]) -> Changes:
     if first >= _MOST_ROTORS:
-        return view
+        return {}
     rpm = list(view.rotor_rpm) + [0.0] * (first + 4 - len(view.rotor_rpm))
     rpm[first : first + 4] = [float(value) for value in speeds_rpm]
     if view.identity is not None and view.identity.rotors is not None:  # a message always holds four
         rpm = rpm[: view.identity.rotors]
     peak = max(view.rotor_peak_rpm, *(abs(value) for value in rpm))
-    return view._replace(rotor_rpm=tuple(rpm), rotor_peak_rpm=peak)
+    return {"rotor_rpm": tuple(rpm), "rotor_peak_rpm": peak}
 
 
-def _esc_telemetry(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+def _esc_telemetry(view: VehicleView, message: Any, _now_s: float) -> Changes:
     """ArduPilot's ESC_TELEMETRY_1_TO_4 and the like: the speeds of four rotors, the first one in the name.
 
     An ESC that draws current at no speed does not measure it, as in ArduPilot's simulation.
     """
     if any(message.current) and not any(message.rpm):
-        return view._replace(rotor_rpm=())
+        return {"rotor_rpm": ()}
     first = int(message.get_type().split("_")[2]) - 1
     return _with_rotors(view, first, message.rpm)
 
 
-def _loop_timing(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+def _loop_timing(view: VehicleView, message: Any, _now_s: float) -> Changes:
     names = LoopTiming._fields[4:-1]
     measured = (_number(getattr(message, name)) for name in names)
     counts = (message.time_us / 1e6, message.ticks, message.overruns, message.missed)
     timing = LoopTiming._make((*counts, *measured, message.clock == 0))
-    return view._replace(timing=timing)
+    return {"timing": timing}
 
 
-def _version(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    return view._replace(is_own=list(message.flight_custom_version) == NAME_IN_VERSION)
+def _version(view: VehicleView, message: Any, _now_s: float) -> Changes:
+    return {"is_own": list(message.flight_custom_version) == NAME_IN_VERSION}
 
 
-def _system_time(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    return view._replace(time_s=message.time_boot_ms / 1e3)
+def _system_time(view: VehicleView, message: Any, _now_s: float) -> Changes:
+    return {"time_s": message.time_boot_ms / 1e3}
 
 
-FOLDS: dict[str, Callable[[VehicleView, Any, float], VehicleView]] = {
+def _mission(fold: Callable[[VehicleView, Any], Mission]) -> Callable[[VehicleView, Any, float], Changes]:
+    return lambda view, message, _now_s: {"mission": fold(view, message)}
+
+
+FOLDS: dict[str, Callable[[VehicleView, Any, float], Changes]] = {
     "HEARTBEAT": _heartbeat,
     "AUTOPILOT_VERSION": _version,
     "AVAILABLE_MODES": _available_mode,
@@ -351,11 +364,11 @@ FOLDS: dict[str, Callable[[VehicleView, Any, float], VehicleView]] = {
     "POSITION_TARGET_GLOBAL_INT": _global_target,
     "VFR_HUD": _hud,
     "EXTENDED_SYS_STATE": _extended_state,
-    "MISSION_CURRENT": mission_fold.after_current,
-    "MISSION_ITEM_REACHED": mission_fold.after_reached,
-    "MISSION_COUNT": mission_fold.after_count,
-    "MISSION_ITEM": mission_fold.after_item,
-    "MISSION_ITEM_INT": mission_fold.after_item,
+    "MISSION_CURRENT": _mission(mission_fold.after_current),
+    "MISSION_ITEM_REACHED": _mission(mission_fold.after_reached),
+    "MISSION_COUNT": _mission(mission_fold.after_count),
+    "MISSION_ITEM": _mission(mission_fold.after_item),
+    "MISSION_ITEM_INT": _mission(mission_fold.after_item),
     "ESC_STATUS": _rotors,
     "ESC_TELEMETRY_1_TO_4": _esc_telemetry,
     "ESC_TELEMETRY_5_TO_8": _esc_telemetry,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from gcs_cli.autopilots.autopilot import Autopilot
 from gcs_cli.autopilots.registry import autopilot_of
@@ -375,9 +375,21 @@ class VehicleView(NamedTuple):
 
     def lost(self, now_s: float) -> bool:
         """True if the heartbeat has timed out."""
-        silent = self.silent_s(now_s)
-        return silent is not None and silent > LOST_AFTER_S
+        return self.last_heartbeat_s is not None and now_s - self.last_heartbeat_s > LOST_AFTER_S
 
     def texts_since(self, count: int) -> tuple[StatusText, ...]:
         """Return the kept status texts after the first ``count``."""
         return tuple(text for text in self.texts if text.number >= count)
+
+
+Changes: TypeAlias = dict[str, Any]
+"""New values of a view by field: an argument of ``view_with``."""
+_PLACES = {name: place for place, name in enumerate(VehicleView._fields)}
+
+
+def view_with(view: VehicleView, changes: Changes) -> VehicleView:
+    """Return ``view`` with other values; ``_replace`` looks up all fields, not only the changed ones."""
+    values = list(view)
+    for name, value in changes.items():
+        values[_PLACES[name]] = value
+    return VehicleView._make(values)

@@ -13,7 +13,7 @@ from textual.widget import Widget
 from gcs_cli.tui.app import REDRAWS_HZ, WatchApp
 from gcs_cli.tui.key_bar import KeyBar
 from gcs_cli.tui.screens import SCREENS, ScreenEntry
-from gcs_cli.tui.widgets.drawing import KeepsLines
+from gcs_cli.tui.widgets.drawing import KeepsLines, LinesWidget
 from gcs_cli.tui.widgets.line_list import LineList
 from gcs_cli.vehicle.view_types import Vector
 from tests.support.watch_plays import play
@@ -46,6 +46,37 @@ def test_redraws_of_a_moving_vehicle_compute_no_layout(
         assert not layouts
 
     play(story, size=(120, 35))
+
+
+@pytest.mark.parametrize("size", [(200, 50), (120, 35), (80, 24), (60, 10)])
+@pytest.mark.parametrize("entry", SCREENS, ids=lambda entry: entry.mode)
+def test_changed_lines_equal_those_that_textual_renders(entry: ScreenEntry, size: tuple[int, int]) -> None:
+    """Changed lines are put between borders and padding that were rendered before."""
+
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        app.feed.history = flown_history()
+        await pilot.press(entry.key)
+        await pilot.pause(4 / REDRAWS_HZ)
+        for step in range(1, 7):  # the mission and the texts end: fewer lines
+            place = Vector(FULL.position_ned_m.x + step, 0.0, -5.0)
+            texts = FULL.texts if step % 2 else ()
+            app.feed.shown = FULL._replace(position_ned_m=place, time_s=100.0 + step, texts=texts)
+            app.redraw()
+            await pilot.pause()
+            framed = [widget for widget in app.screen.query(LinesWidget) if widget._frame is not None]
+            assert framed
+            for widget in framed:
+                _check_kept(widget)
+
+    play(story, size=size)
+
+
+def _check_kept(widget: LinesWidget) -> None:
+    crop = widget.outer_size.region
+    kept = widget.render_lines(crop)
+    widget._styles_cache.clear()
+    rendered = Widget.render_lines(widget, crop)
+    assert [list(strip.simplify()) for strip in kept] == [list(strip.simplify()) for strip in rendered]
 
 
 def test_list_draws_only_changed_lines_again(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -119,15 +119,15 @@ def test_action_ends_after_the_connection_was_closed() -> None:
 
 
 def test_messages_of_every_system_are_observed() -> None:
-    fleet, seen = Fleet(), list[tuple[int, str]]()
+    fleet, seen = Fleet(), list[tuple[int, str, float]]()
 
-    def observe(message: Message) -> None:
-        seen.append((message.get_srcSystem(), message.get_type()))
+    def observe(message: Message, now_s: float) -> None:
+        seen.append((message.get_srcSystem(), message.get_type(), now_s))
 
     fleet.observe = observe
     other = Link(254, 190).encode(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-    fleet.receive(other, HERE, 0.0)
-    assert (seen, fleet.sessions) == ([(254, "HEARTBEAT")], {})
+    fleet.receive(other, HERE, 2.5)
+    assert (seen, fleet.sessions) == ([(254, "HEARTBEAT", 2.5)], {})
 
 
 def test_unknown_messages_do_not_count_as_lost() -> None:

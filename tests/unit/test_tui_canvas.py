@@ -109,11 +109,23 @@ def test_rows_fill_the_width_and_colours_make_runs():
     first, second = canvas.rows()
     assert [(text, str(style)) for text, style in first] == [
         ("⠁⠁", "red"),
-        ("⠁", "green"),
-        ("   ", "none"),
+        ("⠁   ", "green"),
     ]
     assert [text for text, _ in second] == [" " * 6]
     assert canvas.text().plain == "⠁⠁⠁   \n      "
+
+
+def test_blank_cells_continue_only_styles_that_do_not_show_on_them():
+    canvas = Canvas(6, 1)
+    canvas.label(1, 0, "a", "bold red")
+    canvas.label(3, 0, "b", "red on blue")
+    (row,) = canvas.rows()
+    assert [(text, str(style)) for text, style in row] == [
+        (" ", "none"),
+        ("a ", "bold red"),
+        ("b", "red on blue"),
+        ("  ", "none"),
+    ]
 
 
 @pytest.mark.parametrize("size", [(0, 0), (0, 4), (4, 0), (-3, 2)])

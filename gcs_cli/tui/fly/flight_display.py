@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 from gcs_cli.charts.canvas import Run, Runs
 from gcs_cli.tui.fly.horizon import heading_tape, horizon
@@ -69,6 +70,7 @@ def _tape(
     return lines
 
 
+@lru_cache(1000)
 def _tick(label: str, is_target: bool, colours: Palette, on_right: bool) -> Runs:
     if on_right:
         mark, style = ("◂", f"bold {colours.target}") if is_target else ("├", colours.muted)

@@ -5,14 +5,16 @@ Written by the thread of the link, read by the screens.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from operator import itemgetter
+from struct import Struct
 from threading import Lock
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flightstack.mavlink.link import Message, is_unknown
+from flightstack.mavlink.link import Message
 
 ROWS_KEPT = 12_000
 """Samples kept of each message type: 4 min at 50 Hz, 20 min at 10 Hz."""
@@ -45,7 +47,9 @@ class Stream:
             self.name += f"[{key.instance}]"
         self.last = message
         self.count = 0
-        self._plain, self._lists, self.fields = _numeric_fields(message)
+        plain, self._lists, self.fields = _numeric_fields(message)
+        self._plain: Callable[[Mapping[str, Any]], tuple[float, ...]] = _getter(plain)
+        self._row = Struct(f"{1 + len(self.fields)}d")
         self._rows = np.empty((_FIRST_ROWS, 1 + len(self.fields)))
 
     def record(self, message: Message, now_s: float) -> None:
@@ -56,11 +60,11 @@ class Stream:
             grown[: len(self._rows)] = self._rows
             self._rows = grown
         values = message.__dict__
-        row: list[Any] = [now_s, *[values[name] for name in self._plain]]
+        row = self._plain(values)
         for name, size in self._lists:
             listed = values[name]
-            row.extend(listed if len(listed) == size else [np.nan] * size)
-        self._rows[at] = row
+            row += tuple(listed) if len(listed) == size else (np.nan,) * size
+        self._row.pack_into(self._rows.data, at * self._row.size, now_s, *row)
         self.last = message
         self.count += 1
 
@@ -84,6 +88,13 @@ class Stream:
         period_s = float(recent[-1] - recent[0]) / max(1, len(recent) - 1)
         is_stopped = now_s - recent[-1] > max(_LEAST_SILENCE_S, _SILENT_PERIODS * period_s)
         return 0.0 if is_stopped or period_s <= 0.0 else 1.0 / period_s
+
+
+def _getter(names: Sequence[str]) -> Callable[[Mapping[str, Any]], tuple[Any, ...]]:
+    """Return a function that looks up the values of ``names``."""
+    if len(names) > 1:
+        return itemgetter(*names)
+    return lambda values: tuple(values[name] for name in names)
 
 
 def _numeric_fields(message: Message) -> tuple[list[str], list[tuple[str, int]], list[str]]:
@@ -113,25 +124,30 @@ class History:
     """The streams of all vehicles on the link."""
 
     def __init__(self) -> None:
-        self._streams: dict[StreamKey, Stream] = {}
+        self._streams: dict[tuple[int, int, int, int | None], Stream] = {}
         self._lock = Lock()
 
     def record(self, message: Message, now_s: float) -> None:
         """Record a message, received at ``now_s``."""
-        instance_name = getattr(message, "instance_field", None)
+        header, instance_name = message.get_header(), message.instance_field
         instance = None if instance_name is None else getattr(message, instance_name)
-        key = StreamKey(message.get_srcSystem(), message.get_srcComponent(), message.get_msgId(), instance)
+        key = (header.srcSystem, header.srcComponent, header.msgId, instance)
         with self._lock:
-            before = self._streams.get(key._replace(instance=None))
-            if before is not None and is_unknown(before.last) and not is_unknown(message):
-                # the dialect of an autopilot is known from its first heartbeat on
-                del self._streams[before.key]
             stream = self._streams.get(key)
-            if stream is None:
-                if len(self._streams) >= MOST_STREAMS:
-                    return
-                stream = self._streams[key] = Stream(key, message)
-            stream.record(message, now_s)
+            if stream is None or stream.last.__class__ is not message.__class__:
+                stream = self._new_stream(StreamKey(*key), message)
+            if stream is not None:
+                stream.record(message, now_s)
+
+    def _new_stream(self, key: StreamKey, message: Message) -> Stream | None:
+        """Add a stream; return None if there are too many."""
+        self._streams.pop(key, None)  # the class has changed
+        # the dialect of an autopilot is known from its first heartbeat on: it was unknown, without an instance
+        self._streams.pop(key._replace(instance=None), None)
+        if len(self._streams) >= MOST_STREAMS:
+            return None
+        self._streams[key] = Stream(key, message)
+        return self._streams[key]
 
     def streams(self, system_id: int | None = None) -> list[Stream]:
         """Return the streams of one vehicle, or of all, by name."""

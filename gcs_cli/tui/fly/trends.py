@@ -15,7 +15,7 @@ from gcs_cli.tui.palette import Palette
 from gcs_cli.vehicle.field_units import number
 
 WINDOW_S = 120.0
-_BLOCKS = " ▁▂▃▄▅▆▇█"
+_BLOCKS = np.array(list(" ▁▂▃▄▅▆▇█"))
 
 
 class Trend(NamedTuple):
@@ -84,9 +84,6 @@ def _range(columns: NDArray[np.float64], smallest: float) -> tuple[float, float]
 def curve(columns: NDArray[np.float64], low: float, high: float, rows: int, style: str) -> list[Text]:
     """Draw one value per column as a filled curve between ``low`` and ``high``."""
     eighths = np.nan_to_num((columns - low) / (high - low) * (8 * rows - 1) + 1, nan=0.0).round().astype(int)
-    lines = []
-    for row in range(rows - 1, -1, -1):
-        lines.append(
-            Text("".join(_BLOCKS[min(8, max(0, e - 8 * row))] for e in eighths), style, no_wrap=True)
-        )
-    return lines
+    below = 8 * np.arange(rows - 1, -1, -1)[:, None]
+    marks = _BLOCKS[np.clip(eighths - below, 0, 8)]
+    return [Text("".join(row), style, no_wrap=True) for row in marks.tolist()]
