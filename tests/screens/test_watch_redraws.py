@@ -63,7 +63,7 @@ def test_changed_lines_equal_those_that_textual_renders(entry: ScreenEntry, size
             app.feed.shown = FULL._replace(position_ned_m=place, time_s=100.0 + step, texts=texts)
             app.redraw()
             await pilot.pause()
-            framed = [widget for widget in app.screen.query(LinesWidget) if widget._frame is not None]
+            framed = [widget for widget in app.screen.query(LinesWidget) if widget.replaces_lines]
             assert framed
             for widget in framed:
                 _check_kept(widget)

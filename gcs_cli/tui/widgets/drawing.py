@@ -83,6 +83,11 @@ class LinesWidget(KeepsLines):
         self._frame: _Frame | None = None
         """The frame of the kept lines; None if they cannot be replaced one by one."""
 
+    @property
+    def replaces_lines(self) -> bool:
+        """True if changed lines are put between the borders that are rendered."""
+        return self._frame is not None
+
     def show_lines(self, lines: Sequence[Text | Runs], width: int | None = None) -> None:
         """Show ``lines`` from the top; ``width`` is that of the content, if it is known."""
         if width is None:
