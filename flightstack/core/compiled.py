@@ -85,6 +85,11 @@ def compiled(function: F) -> F:
     return _compile(function, frozenset({function.__module__}))
 
 
+def plain(kernel: F) -> F:
+    """Return ``kernel`` as a Python function, for calls that are not worth its compilation."""
+    return getattr(kernel, "py_func", kernel)
+
+
 def direct(kernel: Callable[..., Any], *examples: Any) -> Callable[..., Any]:
     """Return ``kernel`` compiled for the types of ``examples``, without Numba's type check at each call.
 

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from flightstack.core.compiled import direct
+from flightstack.core.compiled import direct, plain
 from flightstack.core.contract import FloatArray, RecordArray
 from flightstack.estimation.delayed_filter import field_kernel, imu_kernel, push_kernel
 from flightstack.estimation.estimator_params import EstimatorParams
@@ -61,7 +61,7 @@ class PythonCore:
         """Start with an empty memory."""
         self.memory[:] = 0
         self.set_params(params)
-        getattr(start_memory, "py_func", start_memory)(self.memory)  # once: not worth its compilation
+        plain(start_memory)(self.memory)
 
     def set_params(self, params: EstimatorParams) -> None:
         """Set the parameters."""

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from flightstack.core.compiled import plain
 from flightstack.core.contract import FloatArray, Vector3
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.estimation.sensed import Sensed
@@ -159,7 +160,7 @@ class SensorRecorder:
         fill_local_position(self._recorder.estimate, sensed)
 
     def _record_truth(self, log: FlightLog, time_us: int, truth: FloatArray) -> None:
-        store_truth(log.sampled[TRUTH_GROUP.name].append(time_us), truth, self.offset_m)
+        plain(store_truth)(log.sampled[TRUTH_GROUP.name].append(time_us), truth, self.offset_m)
         if time_us >= self._global_us:
             self._global_us = time_us + GLOBAL_INTERVAL_US
             place = self._true_frame.to_geo(Vector3(*truth[:3].tolist()))

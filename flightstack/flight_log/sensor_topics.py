@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 
+from flightstack.core.compiled import plain
 from flightstack.core.contract import STATE_SIZE, FloatArray
 from flightstack.core.portable_math import atan2, distance
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, MagSample, RangeSample
@@ -131,13 +132,13 @@ RANGE_GROUP = Group(
 
 def fill_mag(row: FloatArray, sample: MagSample) -> None:
     """Fill a row of ``MAG_GROUP``."""
-    store_mag(row, round(sample.time_s * 1e6), *sample.field_frd_gauss)
+    plain(store_mag)(row, round(sample.time_s * 1e6), *sample.field_frd_gauss)
 
 
 def fill_baro(row: FloatArray, sample: BaroSample) -> None:
     """Fill a row of ``BARO_GROUP``."""
     time_us = round(sample.time_s * 1e6)
-    store_baro(row, time_us, sample.pressure_hpa, sample.pressure_altitude_m, sample.temperature_c)
+    plain(store_baro)(row, time_us, sample.pressure_hpa, sample.pressure_altitude_m, sample.temperature_c)
 
 
 def fill_gnss(row: FloatArray, sample: GnssSample) -> None:

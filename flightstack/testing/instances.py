@@ -22,19 +22,22 @@ class ServerError(RuntimeError):
     """A vehicle could not be started, or its processes ended."""
 
 
-def free_instance(taken: Collection[int] = ()) -> int:
-    """Return an instance with free ports that is not in ``taken``; raise ServerError if there is none.
+def free_instance(taken: Collection[int] = (), count: int = 1) -> int:
+    """Return the first of ``count`` successive instances with free ports, none in ``taken``.
 
-    Parallel workers of pytest-xdist try different instances, and processes begin at different ones.
+    Each parallel worker of pytest-xdist has instances of its own, and tries those of others last; processes begin at
+    different ones. Raise ServerError if there are none.
     """
     workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
     worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
-    own = list(range(FIRST + worker % COUNT, FIRST + COUNT, workers))
-    begin = os.getpid() % len(own)
-    others = [instance for instance in range(FIRST, FIRST + COUNT) if instance not in own]
-    for instance in (*own[begin:], *own[:begin], *others):
-        if instance not in taken and _is_free(instance):
-            return instance
+    size = max(count, COUNT // workers)
+    start = FIRST + worker * size % COUNT
+    own = list(range(start, min(start + size, FIRST + COUNT) - count + 1))
+    begin = os.getpid() % len(own) if own else 0
+    others = [first for first in range(FIRST, FIRST + COUNT - count + 1) if first not in own]
+    for first in (*own[begin:], *own[:begin], *others):
+        if all(instance not in taken and _is_free(instance) for instance in range(first, first + count)):
+            return first
     raise ServerError(f"all ports of instances {FIRST} to {FIRST + COUNT - 1} are in use")
 
 

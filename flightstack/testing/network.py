@@ -137,7 +137,11 @@ class Clock:
         """
         rates = self._engine.stack.rates
         periods = max(1, math.ceil(most_s * rates.outer_hz - _ROUNDING))
-        self._run_period(periods * rates.divisor, self._idle_until_s())
+        self.run_on_ticks(periods * rates.divisor)
+
+    def run_on_ticks(self, most: int) -> int:
+        """Run as ``run_on``, for ``most`` inner ticks at most; return their number."""
+        return self._run_period(most, self._idle_until_s())
 
     def _run_period(self, most: int, until_s: float) -> int:
         """Run up to the end of a period, and on until ``until_s`` if nothing happens; ``most`` inner ticks at most."""

@@ -161,10 +161,11 @@ class QuietBlock:
     def _changing(self, count: int, is_taken: bool, log: Trace, imu_log: Trace) -> _Arguments:
         """Return the other arguments of the kernel."""
         now, estimation = self._stack.now, self._estimation
+        boot_us = self._simulator.time_us - self._stack.simulator.time_us
+        estimate = self._estimates[0 if estimation is None else estimation.feed.selected]
         return (
             count, is_taken, self._stack.parts.autopilot.next_outer, now.time_us, self._actuators.flags, self._flies,
-            now.row, self._estimates[0 if estimation is None else estimation.feed.selected], self._slow.following(),
-            self.outer.arguments(),
+            now.row, estimate, self._slow.following(boot_us), self.outer.arguments(),
             (log.rows, log.times_us, log.n), (imu_log.rows, imu_log.times_us, imu_log.n),
         )  # fmt: skip
 

@@ -120,8 +120,11 @@ class QuietSlow:
         ]
         return min(left)
 
-    def following(self) -> tuple[Any, ...]:
-        """Return the argument ``following`` of the kernel; call once before each of its calls."""
+    def following(self, boot_us: int) -> tuple[Any, ...]:
+        """Return the argument ``following`` of the kernel; call once before each of its calls.
+
+        ``boot_us`` is the simulator's time at the start of the vehicle's, not 0 after a power cycle.
+        """
         marks, estimation = self._marks, self._estimation
         marks[:TRUTH_US] = 0
         if estimation is not None:
@@ -129,7 +132,7 @@ class QuietSlow:
             self._delay_s[:] = params.mag_delay_s, params.baro_delay_s
             marks[TRUTH_US] = estimation.recorder.truth_due_us
         logs = ((trace.rows, trace.times_us, trace.n) for trace in self._open_traces())
-        return (_RINGS, self._delay_s, *logs)
+        return (_RINGS, self._delay_s, *logs, boot_us)
 
     def _open_traces(self) -> list[Trace]:
         """Return the traces of the open log; without one, traces that are not recorded."""

@@ -176,17 +176,19 @@ class World:
         is_true, is_of_events = condition_of(
             condition, lambda: self.state, lambda: reported_by(self.engine.stack)
         )
-        end_s = self.time_s + timeout_s
+        rates = self.engine.stack.rates
+        left = round(timeout_s * rates.outer_hz) * rates.divisor
         while not is_true():
-            left_s = end_s - self.time_s
-            if left_s < 0.5 / self.engine.stack.rates.outer_hz:
+            if left <= 0:
                 break
             if is_of_events:
-                self.run_on(left_s)
+                left -= self._clock.run_on_ticks(left)
             else:
                 self.step()
+                left -= rates.divisor
         else:
             return self.state
+        self.step()  # the limit itself counts
         what = f"{condition!r}" if isinstance(condition, str) else "the condition"
         raise ConditionTimeoutError(
             f"{what} did not come true within {timeout_s:g} s of simulated time; {self.state}{self._last_texts()}"

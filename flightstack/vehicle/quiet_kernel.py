@@ -92,7 +92,7 @@ def _advance(
         resets_before = _sum_at(resets, reset_counts)
         at = record_at + counters[SENSED]
         record_times[at] = time_us
-        measure_slow(slow_calls, slow, time_us, memory, sensing[2], sensing[3])
+        measure_slow(slow_calls, slow, time_us + following[5], memory, sensing[2], sensing[3])
         _sense(calls, sensing, time_us, interval_us, selected, records[at])
         take_slow(slow_calls, slow, time_us, sensing[8], following)
         counters[SENSED] += 1

@@ -45,7 +45,10 @@ def _next_row(noise: FloatArray, cursor: Any) -> Any:
 def measure_slow(
     calls: Any, slow: Any, time_us: int, memory: Any, state: FloatArray, rotor_speeds: Any
 ) -> None:
-    """Measure with magnetometer and barometer if they are due; ``memory`` has the bytes of the plant."""
+    """Measure with magnetometer and barometer if they are due at ``time_us``, the simulator's time.
+
+    ``memory`` has the bytes of the plant.
+    """
     due_us, period_us, marks, mag, baro, _row, _truth = slow
     marks[IS_MAG_NEW], marks[IS_BARO_NEW] = 0, 0
     if _is_due(due_us, period_us, MAG, time_us):
@@ -75,9 +78,13 @@ def _push(calls: Any, filters: Any, ring: int, values: FloatArray, row: FloatArr
 
 @compiled
 def take_slow(calls: Any, slow: Any, time_us: int, filters: Any, following: Any) -> None:
-    """Give new measurements to the filters and the log; those that are not finite are none."""
+    """Give new measurements at ``time_us``, the vehicle's time, to the filters and the log.
+
+    Those that are not finite are none. ``following`` has rings, delays and logs, and the simulator's time at the start
+    of the vehicle's.
+    """
     _due_us, _period_us, marks, mag, baro, rows, _truth = slow
-    rings, delay_s, mag_log, baro_log, _truth_log = following
+    rings, delay_s, mag_log, baro_log, _truth_log, _boot_us = following
     mag_sample, mag_copy, baro_sample, baro_copy = rows
     if marks[IS_MAG_NEW] != 0:
         x, y, z = float(mag[4][0]), float(mag[4][1]), float(mag[4][2])

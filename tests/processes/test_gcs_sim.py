@@ -2,30 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import signal
 from pathlib import Path
 
-from flightstack.core.port_numbers import INSTANCES
-from flightstack.testing.instances import ServerError, free_instance
+from flightstack.testing.instances import free_instance
 from tests.support.commands import gcs
 from tests.support.process import Process, children_of, ends_of
 from tests.support.terminal import terminal
 
 
-def free_pair() -> int:
-    """Return an instance that is free together with the next one."""
-    taken: list[int] = []
-    while True:
-        taken.append(free_instance(taken))
-        with contextlib.suppress(ServerError):
-            return free_instance(set(range(INSTANCES)) - {taken[-1] + 1}) - 1
-
-
 def test_sim_serves_vehicles_until_interrupted(tmp_path: Path) -> None:
-    first = free_pair()
+    first = free_instance(count=2)
     sim = Process(
         "gcs_cli", "sim", "--json", "--vehicles", "2", "--instance", str(first), "--speed", "10",
         "--log", str(tmp_path / "a.ulg"), "--state-dir", str(tmp_path / "state"),

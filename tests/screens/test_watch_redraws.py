@@ -71,6 +71,26 @@ def test_changed_lines_equal_those_that_textual_renders(entry: ScreenEntry, size
     play(story, size=size)
 
 
+@pytest.mark.parametrize("sizes", [((72, 30), (109, 30)), ((110, 40), (150, 40)), ((200, 50), (80, 24))])
+def test_no_line_is_left_over_when_lines_become_fewer_in_a_new_size(
+    sizes: tuple[tuple[int, int], ...],
+) -> None:
+    """Long texts take fewer lines in a wider terminal."""
+    texts = tuple(text._replace(text=f"{text.text} {'word ' * 30}") for text in FULL.texts[:2])
+
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        app.feed.shown = FULL._replace(texts=texts)
+        await pilot.pause(4 / REDRAWS_HZ)
+        await pilot.resize_terminal(*sizes[1])
+        for _ in range(6):
+            app.redraw()
+            await pilot.pause()
+        for widget in app.screen.query(LinesWidget):
+            _check_kept(widget)
+
+    play(story, size=sizes[0])
+
+
 def _check_kept(widget: LinesWidget) -> None:
     crop = widget.outer_size.region
     kept = widget.render_lines(crop)

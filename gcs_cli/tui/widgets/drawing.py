@@ -92,18 +92,17 @@ class LinesWidget(KeepsLines):
         """Show ``lines`` from the top; ``width`` is that of the content, if it is known."""
         if width is None:
             width = self.content_size.width
-        colours = watch_app(self).palette
+        colours, is_anew = watch_app(self).palette, width != self._width
+        self._width = width
         if colours is not self._palette:  # rich_style collects the styles of all ancestors
             self._palette, background = colours, self.rich_style
-            if background != self._background:
-                self._background, self._lines, self._rows = background, [], []
-        if width != self._width:
-            self._width, self._lines, self._rows = width, [], []
+            is_anew = is_anew or background != self._background
+            self._background = background
         background = self._background
         rows: list[list[Segment]] = []
         changed = []
         for y, (new, old) in enumerate(zip_longest(lines, self._lines)):
-            if new is not None and new == old:
+            if not is_anew and new is not None and new == old:
                 rows.append(self._rows[y])
                 continue
             changed.append(y)
