@@ -171,7 +171,7 @@ def test_most_measurements_of_the_magnetometer_are_compiled(monkeypatch: pytest.
         world.run_for(1.0)
     assert (
         0 < len(calls) <= 0.5 * 100
-    )  # measured: 43; are in ticks with work for Python, such as a fix of GNSS
+    )  # measured: 43, in ticks with work for Python, such as a fix of GNSS
 
 
 def _signals(state: State) -> dict[str, object]:
