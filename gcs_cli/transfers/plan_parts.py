@@ -21,7 +21,7 @@ from gcs_cli.plans.check import plan_problems
 
 RESTORE_TIMEOUT_S = 30.0
 """Longest time to restore the former plans after an interrupt."""
-_FORMER, _NEW, _UNKNOWN = "former", "new", "unknown"
+_FORMER, _NEW, _UNKNOWN, _INCOMPLETE = "former", "new", "unknown", "perhaps incomplete"
 
 
 class PlanPart(NamedTuple):
@@ -106,17 +106,20 @@ class Uploads:
     def state(self) -> str:
         """Description of what the vehicle holds now."""
         holds = dict(self._holds)
-        if self._current is not None and self._is_all_sent:
-            holds[self._current] = _UNKNOWN
+        if self._current is not None:
+            holds[self._current] = self._held_of_current
         if set(holds.values()) == {_FORMER}:
             return "the vehicle holds its former plans"
         return "the vehicle holds: " + ", ".join(f"{part.name} {holds[part.kind]}" for part in self._parts)
 
     @property
-    def _is_all_sent(self) -> bool:
-        """True if the vehicle may have accepted the current part: it replaces a part after the last item."""
+    def _held_of_current(self) -> str:
+        """What the vehicle may hold of the current part, which it has not accepted."""
+        assert self._current is not None
         sent, count = self._call.progress if self._call else (0, 0)
-        return sent >= count
+        if sent >= count:
+            return _UNKNOWN
+        return _INCOMPLETE if self._is_gradual else self._holds[self._current]
 
     def answer(self, now_s: float) -> Answer | None:
         """Continue; return the answer after the last part, or the first one that is not an acceptance."""
@@ -186,19 +189,17 @@ class Uploads:
                 if kept.kind == MissionType.FENCE
             ]
         if before:
-            reasons.append((yield from self._restore(before, current, part.kind)))
+            reasons.append((yield from self._restore(before, current)))
         elif not is_refused:
             self._clients[part.kind].cancel()
             reasons.append(self.state)
         return answer._replace(reason="; ".join(reasons))
 
-    def _restore(
-        self, before: Sequence[PlanPart], current: int, failed: MissionType
-    ) -> Generator[Call, Answer, str]:
+    def _restore(self, before: Sequence[PlanPart], current: int) -> Generator[Call, Answer, str]:
         """Upload the former parts that were replaced; return a description of the vehicle's plans."""
         self._is_restoring = True
         for part in before:
-            if self._holds[part.kind] == _FORMER and not (self._is_gradual and part.kind == failed):
+            if self._holds[part.kind] == _FORMER:
                 continue
             answer = yield from self._send(part, _FORMER)
             if not answer.accepted:
@@ -225,8 +226,10 @@ class Uploads:
         answer = yield self._transfer(part.kind, part.items)
         if answer.accepted:
             self._holds[part.kind] = which
-        elif (answer.silent or answer.cancelled) and self._is_all_sent:
-            self._holds[part.kind] = _UNKNOWN
+        elif answer.silent or answer.cancelled:
+            self._holds[part.kind] = self._held_of_current
+        elif self._is_gradual:  # refused, perhaps at one of its items
+            self._holds[part.kind] = _INCOMPLETE
         self._current = None
         return answer
 

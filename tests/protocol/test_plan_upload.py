@@ -50,6 +50,7 @@ class World:
         self.deaf_after: int | None = None
         """The vehicle hears no more than so many messages of the mission protocol."""
         self.current = 0
+        self.autopilot: int = mavlink.MAV_AUTOPILOT_PX4
         self.heard: list[Message] = []
 
     @property
@@ -82,7 +83,7 @@ class World:
         messages = answers + [message for _, message in self.server.poll(now_s)]
         if now_s >= self.heartbeat_s:
             self.heartbeat_s = now_s + 1.0
-            messages.append(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3))
+            messages.append(mavlink.MAVLink_heartbeat_message(2, self.autopilot, 0, 0, 4, 3))
         for message in messages:
             is_ack = message.get_type() == "MISSION_ACK" and message.mission_type == MISSION
             if is_ack and self.plans[MISSION] == self.unconfirmed:
@@ -185,6 +186,28 @@ def test_a_vehicle_that_falls_silent_is_told_with_what_it_may_hold() -> None:
     assert answer.silent
     assert "; the former geofence could not be restored: " in answer.reason
     assert answer.reason.endswith("; the vehicle holds: geofence new, mission former")
+
+
+@pytest.mark.parametrize("heard", [3, 4])
+def test_a_vehicle_that_overwrites_items_may_hold_an_incomplete_mission(heard: int) -> None:
+    """ArduPilot replaces a mission item by item: it falls silent in the middle, or the restore is ended."""
+    world = World()
+    world.autopilot = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
+    world.hold(Plan(mission(3)))
+    counts = lambda: [m.get_type() for m in world.heard].count("MISSION_COUNT")  # noqa: E731
+    states = set()
+
+    def note() -> bool:
+        if counts() and world.deaf_after is None:
+            world.deaf_after = len(world.heard) + heard - 3  # items of the new mission
+        if counts():
+            states.add(world.uploads.state)
+        return False
+
+    answer = world.upload(Plan(mission(9, mark=1)), interrupted=note)
+    assert answer.silent
+    assert answer.reason.endswith("; the vehicle holds: mission perhaps incomplete")
+    assert states == {"the vehicle holds: mission perhaps incomplete"}
 
 
 @LINKS

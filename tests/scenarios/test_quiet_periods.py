@@ -169,9 +169,7 @@ def test_most_measurements_of_the_magnetometer_are_compiled(monkeypatch: pytest.
         world.run_for(4.0)
         monkeypatch.setattr(Magnetometer, "measure", counted)
         world.run_for(1.0)
-    assert (
-        0 < len(calls) <= 0.5 * 100
-    )  # measured: 43, in ticks with work for Python, such as a fix of GNSS
+    assert 0 < len(calls) <= 0.5 * 100  # measured: 43, in ticks with work for Python, such as a fix of GNSS
 
 
 def _signals(state: State) -> dict[str, object]:
