@@ -85,6 +85,10 @@ class WatchScreen(KeepsLines, Screen[None]):
     def on_mount(self) -> None:
         """Find the drawings once: all widgets are mounted now, and stay."""
         self._drawings = list(self.query(Drawing))
+        self.app.theme_changed_signal.subscribe(self, lambda _theme: self.call_after_refresh(self.recolour))
+
+    def recolour(self) -> None:
+        """Draw anew, in the colours of another theme, what ``show`` draws only after a change; by default nothing."""
 
     def compose(self) -> ComposeResult:
         """Yield the frame around the body."""

@@ -56,3 +56,20 @@ def test_without_colour_warnings_and_the_horizon_differ_by_brightness(
         assert grey["sky"] - grey["ground"] > 30  # measured: 36 and more
 
     play(story)
+
+
+@pytest.mark.parametrize("key", ["5", "7"])
+def test_lines_that_are_drawn_after_changes_follow_the_theme(key: str) -> None:
+    """The texts and the state of their filter; the titles of the parameters."""
+
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        app.theme = "gcs-dark"
+        await pilot.press(key)
+        await pilot.pause(0.5)
+        app.theme = "gcs-light"
+        await pilot.pause(0.5)
+        widget = app.screen.query_one("#filter" if key == "5" else "#param-titles")
+        [segment, *_] = widget.render_line(0)
+        assert segment.style.bgcolor.name == LIGHT.background
+
+    play(story)

@@ -84,6 +84,10 @@ class MessagesScreen(WatchScreen):
             text += f", with “{self._words}”"
         self.query_one("#filter", LineWidget).show_line(Text(text))
 
+    def recolour(self) -> None:
+        """Write the lines again."""
+        self._rewrite()
+
     def on_resize(self) -> None:
         """Wrap the lines anew."""
         self.call_after_refresh(self._rewrite)

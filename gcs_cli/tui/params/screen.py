@@ -106,6 +106,11 @@ class ParamScreen(JobScreen):
             self.action_update()
         self._show_state()
 
+    def recolour(self) -> None:
+        """Draw titles and details again; the rows follow the theme themselves."""
+        self._show_titles()
+        self._show_details()
+
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Return False for keys that have no effect now."""
         if action in ("changed_only", "edit", "reset", "save", "load", "compare"):
