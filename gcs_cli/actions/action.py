@@ -35,6 +35,8 @@ class Step(NamedTuple):
     """True if a disarm before the effect ends the action."""
     instead: Callable[[int, int], Message] | None = None
     """Message to system and component of the same effect, which has no answer, if the command is not supported."""
+    reached_before: Condition = lambda _view: False
+    """State in which a refusal only says that there is nothing left to do."""
     refusal: str = ""
     """Reason of a refusal that the vehicle does not explain; empty: its answer is the reason."""
     advice: str = ""

@@ -183,6 +183,8 @@ class ActionRun:
             self._end(Outcome.SILENT, f"{self.step.name}: {answer.reason}")
         elif answer.result == mavlink.MAV_RESULT_UNSUPPORTED and self.step.instead is not None:
             self._send_instead(self.step.instead(*self._vehicle(view)), view, now_s)
+        elif not answer.accepted and self.step.reached_before(view):
+            self._next_step(view, now_s)
         elif not answer.accepted:
             self._refuse(view, answer.reason, now_s)
         elif self.step.effect is None or not (self._waits or self._steps):

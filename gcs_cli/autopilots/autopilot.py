@@ -29,7 +29,6 @@ class Role(Enum):
     GUIDED = "guided"
     """Flies to positions that the ground station commands."""
     MISSION = "mission"
-    TERMINATION = "termination"
 
 
 class Phase(Enum):

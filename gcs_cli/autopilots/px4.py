@@ -71,7 +71,6 @@ PX4 = Autopilot(
         Role.TAKEOFF: "TAKEOFF",
         Role.GUIDED: "HOLD",
         Role.MISSION: "MISSION",
-        Role.TERMINATION: "TERMINATION",
     },
     aliases={
         "LOITER": "HOLD",

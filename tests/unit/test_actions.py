@@ -8,7 +8,8 @@ import pytest
 from typer.core import TyperGroup
 from typer.main import get_command
 
-from flightstack.mavlink.link import Address
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Address, Link
 from gcs_cli.actions import in_flight, in_mission, on_vehicle
 from gcs_cli.actions.action import Action
 from gcs_cli.actions.conditions import ConditionError, parse_condition
@@ -171,6 +172,29 @@ def test_rotors_are_stopped_also_without_a_heartbeat(action: Action) -> None:
 def test_termination_ends_when_the_vehicle_reports_it(flying: World) -> None:
     assert perform(flying, on_vehicle.terminate())[:2] == (Outcome.DONE, "flight terminated")
     assert seen(flying).mode == "TERMINATION"
+
+
+def test_a_terminated_vehicle_may_be_terminated_again(flying: World) -> None:
+    assert perform(flying, on_vehicle.terminate()).outcome is Outcome.DONE
+    assert perform(flying, on_vehicle.terminate())[:2] == (Outcome.DONE, "flight terminated")
+
+
+@pytest.mark.parametrize(("state", "expected"), [(8, Outcome.DONE), (4, Outcome.REFUSED)])
+def test_px4_may_refuse_a_second_termination(state: int, expected: Outcome) -> None:
+    """It refuses each change out of that mode, also the one into itself."""
+    vehicle = Vehicle()
+    vehicle.send(heartbeat(base=129, state=state))
+    run = ActionRun(on_vehicle.terminate(), lambda: vehicle.view, 1.0, Address(255, 190))
+    assert [message.get_type() for message in run.poll(1.0)] == ["COMMAND_LONG"]
+    refused = mavlink.MAVLink_command_ack_message(
+        mavlink.MAV_CMD_DO_FLIGHTTERMINATION, mavlink.MAV_RESULT_TEMPORARILY_REJECTED, 0, 0, 255, 190
+    )
+    for answer in Link(1, 1).decode(vehicle.link.encode(refused)):
+        run.receive(answer, 1.1)
+    run.poll(1.1)
+    run.poll(2.0)
+    assert run.result is not None
+    assert run.result.outcome is expected
 
 
 def test_an_injected_failure_needs_permission(world: World) -> None:

@@ -77,6 +77,14 @@ def in_air(view: VehicleView) -> bool:
     return view.armed and view.on_ground is not True
 
 
+def _flies(view: VehicleView) -> bool:
+    return in_air(view) and not view.terminated
+
+
+def _can_fly(view: VehicleView) -> bool:
+    return view.armed and not view.terminated
+
+
 def _asks_to_arm(view: VehicleView) -> str:
     return f"Arm {vehicle_name(view)}? The rotors start."
 
@@ -90,6 +98,8 @@ def _asks_to_reboot(view: VehicleView) -> str:
 
 
 def _asks_to_terminate(view: VehicleView) -> str:
+    if view.terminated:
+        return ""
     return f"Terminate the flight of {vehicle_name(view)}? The rotors stop at once, in the air too."
 
 
@@ -124,7 +134,15 @@ def _has_takeoff_altitude(view: VehicleView) -> bool:
 _ALTITUDE = Field("altitude", "m above home", smallest=0.1, largest=10_000.0, is_optional=_always)
 ORDERS = (
     Order(
-        "arm", "A", "Arm", "Start the rotors", on_vehicle.arm, (), _asks_to_arm, lambda v: not v.armed, True
+        "arm",
+        "A",
+        "Arm",
+        "Start the rotors",
+        on_vehicle.arm,
+        (),
+        _asks_to_arm,
+        lambda view: not (view.armed or view.terminated),
+        True,
     ),
     Order(
         "disarm",
@@ -144,18 +162,18 @@ ORDERS = (
         "Arm and climb to an altitude above the ground",
         in_flight.takeoff,
         (_ALTITUDE._replace(default="5", is_optional=_has_takeoff_altitude, omitted="the vehicle's own"),),
-        applies=lambda view: not in_air(view),
+        applies=lambda view: not (in_air(view) or view.terminated),
         in_footer=True,
     ),
-    Order("hold", "H", "Hold", "Hold the position", in_flight.hold, applies=in_air, in_footer=True),
-    Order("land", "L", "Land", "Land here", in_flight.land, applies=in_air, in_footer=True),
+    Order("hold", "H", "Hold", "Hold the position", in_flight.hold, applies=_flies, in_footer=True),
+    Order("land", "L", "Land", "Land here", in_flight.land, applies=_flies, in_footer=True),
     Order(
         "return",
         "R",
         "Return",
         "Return to launch and land",
         in_flight.return_to_launch,
-        applies=in_air,
+        applies=_flies,
         in_footer=True,
     ),
     Order(
@@ -169,7 +187,7 @@ ORDERS = (
             Field("longitude", "°", smallest=-180.0, largest=180.0),
             _ALTITUDE,
         ),
-        applies=lambda view: view.armed,
+        applies=_can_fly,
     ),
     Order(
         "speed",
@@ -186,7 +204,7 @@ ORDERS = (
         "Turn to a heading",
         in_flight.yaw,
         (Field("heading", "° clockwise from north", smallest=0.0, largest=360.0),),
-        applies=lambda view: view.armed,
+        applies=_can_fly,
     ),
     Order(
         "mission",
