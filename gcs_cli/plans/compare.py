@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
+from flightstack.mavlink.dialect import mavlink
 from flightstack.plan import Frame, MissionItem
 from flightstack.plan.commands import RALLY_POINT, FenceCommand
 from gcs_cli.plans.names import any_command_name
@@ -28,6 +29,8 @@ class Difference(NamedTuple):
     wanted: Any
     found: Any
     """None for a missing item."""
+    cannot_be_held: bool = False
+    """True if the vehicle's storage has no room for the wanted value: another upload ends alike."""
 
     @property
     def sentence(self) -> str:
@@ -36,7 +39,8 @@ class Difference(NamedTuple):
             which = "is not on the vehicle" if self.found is None else "is only on the vehicle"
             item = self.wanted if self.found is None else self.found
             return f"item {self.seq} ({any_command_name(item.command)}) {which}"
-        return f"item {self.seq}: {self.field} is {_text(self.found)}, expected {_text(self.wanted)}"
+        why = ", which the vehicle cannot hold" if self.cannot_be_held else ""
+        return f"item {self.seq}: {self.field} is {_text(self.found)}, expected {_text(self.wanted)}{why}"
 
 
 class Tolerance(NamedTuple):
@@ -49,11 +53,18 @@ class Tolerance(NamedTuple):
     keeps_autocontinue: bool = True
     keeps_idle_frames: bool = True
     """The vehicle stores the frame of an item without a position."""
+    keeps_parameters: bool = True
+    """The vehicle stores the four parameters of an item as they are; else whole numbers, or none."""
 
 
 EXACT = Tolerance()
 PACKED = Tolerance(  # ArduPilot packs an item into 15 bytes
-    altitude_m=0.01, degrees_e7=1, nan_is_zero=True, keeps_autocontinue=False, keeps_idle_frames=False
+    altitude_m=0.01,
+    degrees_e7=1,
+    nan_is_zero=True,
+    keeps_autocontinue=False,
+    keeps_idle_frames=False,
+    keeps_parameters=False,
 )
 
 
@@ -81,7 +92,8 @@ def _field_differences(
         yield Difference(seq, "frame", wanted.frame, found.frame)
     for number, (one, other) in enumerate(zip(wanted.params, found.params, strict=True), start=1):
         if not _same(one, other, 0.0, tolerance):
-            yield Difference(seq, f"parameter {number}", one, other)
+            cannot = not tolerance.keeps_parameters and _is_packed(wanted.command, number, one, other)
+            yield Difference(seq, f"parameter {number}", one, other, cannot)
     for name, one_e7, other_e7 in (("latitude", wanted.x, found.x), ("longitude", wanted.y, found.y)):
         if abs(one_e7 - other_e7) > tolerance.degrees_e7:
             shown = (one_e7 / 1e7, other_e7 / 1e7) if wanted.is_global else (one_e7, other_e7)
@@ -90,6 +102,13 @@ def _field_differences(
         yield Difference(seq, "altitude", wanted.z, found.z)
     if _has_autocontinue(wanted, tolerance) and wanted.autocontinue != found.autocontinue:
         yield Difference(seq, "autocontinue", wanted.autocontinue, found.autocontinue)
+
+
+def _is_packed(command: int, number: int, wanted: float, found: float) -> bool:
+    """Return True if ``found`` is what storage of a few bytes makes of a parameter: a whole number, a sign or 0."""
+    if (command, number) == (mavlink.MAV_CMD_NAV_LOITER_TIME, 3):  # of the radius, its sign
+        return found == math.copysign(1.0, wanted)
+    return math.isfinite(wanted) and found in (0.0, float(math.trunc(wanted)))
 
 
 def _has_autocontinue(item: MissionItem, tolerance: Tolerance) -> bool:

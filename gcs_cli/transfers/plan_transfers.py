@@ -83,12 +83,17 @@ def say_lost(output: Output, lost: str, file: Path) -> None:
 
 
 def say_verified(output: Output, compared: Sequence[tuple[PlanPart, list[Difference]]], file: Path) -> None:
-    """Print the differences between the parts of a file and the vehicle's; raise CliError if there are any."""
-    count = sum(len(found) for _, found in compared)
+    """Print the differences between the parts of a file and the vehicle's.
+
+    Raise CliError if there are any, other than of values that the vehicle cannot hold.
+    """
+    count = 0
     for part, found in compared:
+        wrong = [difference for difference in found if not difference.cannot_be_held]
+        count += len(wrong)
         for difference in found:
             output.say(
-                "difference",
+                "cannot_be_held" if difference.cannot_be_held else "difference",
                 f"{part.name}: {difference.sentence}",
                 part=part.name,
                 seq=difference.seq,
@@ -96,16 +101,24 @@ def say_verified(output: Output, compared: Sequence[tuple[PlanPart, list[Differe
                 expected=_plain(difference.wanted),
                 found=_plain(difference.found),
             )
-        if not found:
+        if not wrong:
             output.say(
                 "equal",
-                f"{part.name} of {len(part.items)} items: equal",
+                f"{part.name} of {len(part.items)} items: {equality(found)}",
                 part=part.name,
                 items=len(part.items),
             )
     if count:
         many = "1 difference" if count == 1 else f"{count} differences"
         raise CliError(f"{file}: {many} from the plan on the vehicle", FAILED)
+
+
+def equality(found: Sequence[Difference]) -> str:
+    """Return in words that a part is equal, except for ``found``, values that the vehicle cannot hold."""
+    if not found:
+        return "equal"
+    values = "1 value" if len(found) == 1 else f"{len(found)} values"
+    return f"equal except for {values} that the vehicle cannot hold"
 
 
 def _plain(value: object) -> object:

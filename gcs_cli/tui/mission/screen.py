@@ -330,10 +330,18 @@ class MissionScreen(JobScreen):
     def _compare(self, connection: Connection, plan: Plan) -> Comparison:
         """Return the differences of the vehicle's plan, or the parts that are equal."""
         compared = plan_transfers.compare_with_vehicle(connection, parts_to_send(plan))
-        lines = [f"{part.name}: {difference.sentence}" for part, found in compared for difference in found]
+        lines = [
+            f"{part.name}: {difference.sentence}"
+            for part, found in compared
+            for difference in found
+            if not difference.cannot_be_held
+        ]
         if lines:
             return Comparison(f"the vehicle's plan differs: {some_of(lines)}", is_equal=False)
-        equal = ", ".join(f"{part.name} of {len(part.items)} items equal" for part, _ in compared)
+        equal = ", ".join(
+            f"{part.name} of {len(part.items)} items {plan_transfers.equality(found)}"
+            for part, found in compared
+        )
         return Comparison(equal, is_equal=True)
 
     @work

@@ -1,0 +1,72 @@
+"""A plan beside the one that a vehicle holds: what its storage makes of a value is no damage."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from flightstack.mavlink.dialect import mavlink
+from flightstack.plan import Frame, MissionItem, MissionType
+from gcs_cli.errors import CliError
+from gcs_cli.output import Output
+from gcs_cli.plans.compare import EXACT, PACKED, Tolerance, differences
+from gcs_cli.transfers.plan_parts import PlanPart
+from gcs_cli.transfers.plan_transfers import say_verified
+
+PLACE = MissionItem(
+    command=mavlink.MAV_CMD_NAV_WAYPOINT,
+    frame=Frame.GLOBAL_RELATIVE_ALT,
+    param1=2.5,
+    param2=1.5,
+    x=473977420,
+    y=85455940,
+    z=10.0,
+)
+LOITER = replace(PLACE, command=mavlink.MAV_CMD_NAV_LOITER_TIME, param1=10.0, param2=0.0, param3=-8.0)
+
+
+def with_params(item: MissionItem, *params: float) -> MissionItem:
+    return replace(item, **{f"param{number}": value for number, value in enumerate(params, start=1)})
+
+
+@pytest.mark.parametrize(
+    ("item", "stored", "held"),
+    [
+        (
+            PLACE,
+            (2.0, 0.0, 0.0, 0.0),
+            [True, True],
+        ),  # ArduCopter: whole seconds of a hold, no acceptance radius
+        (PLACE, (2.5, 1.0, 0.0, 0.0), [True]),  # ArduPlane: whole metres of it
+        (PLACE, (25.0, 1.5, 0.0, 0.0), [False]),
+        (PLACE, (2.5, 1.5, 1.0, 0.0), [False]),
+        (LOITER, (10.0, 0.0, -1.0, 0.0), [True]),
+        (LOITER, (10.0, 0.0, 1.0, 0.0), [False]),
+    ],
+)
+def test_what_packed_storage_makes_of_parameters_is_told_apart(
+    item: MissionItem, stored: tuple[float, float, float, float], held: list[bool]
+) -> None:
+    found = [with_params(item, *stored)]
+    assert [each.cannot_be_held for each in differences([item], found, PACKED)] == held
+    assert not any(each.cannot_be_held for each in differences([item], found, EXACT))
+
+
+@pytest.mark.parametrize(("tolerance", "equal"), [(PACKED, True), (EXACT, False)])
+def test_verify_names_each_value_that_the_vehicle_cannot_hold(
+    tolerance: Tolerance, equal: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    part = PlanPart(MissionType.MISSION, "mission", (PLACE,))
+    found = list(differences(part.items, [with_params(PLACE, 2.0, 0.0, 0.0, 0.0)], tolerance))
+    if equal:
+        say_verified(Output(as_json=False), [(part, found)], Path("a.plan"))
+        assert capsys.readouterr().out.splitlines() == [
+            "mission: item 0: parameter 1 is 2, expected 2.5, which the vehicle cannot hold",
+            "mission: item 0: parameter 2 is 0, expected 1.5, which the vehicle cannot hold",
+            "mission of 1 items: equal except for 2 values that the vehicle cannot hold",
+        ]
+    else:
+        with pytest.raises(CliError, match="2 differences"):
+            say_verified(Output(as_json=False), [(part, found)], Path("a.plan"))
