@@ -127,11 +127,22 @@ class Canvas:
                 self._codes[row, offset] = ord(mark if _is_narrow(mark) else "·")
                 self._text_styles[row, offset] = index
 
-    def is_free(self, column: int, row: int, length: int) -> bool:
-        """True if cells from (column, row) to the right are on the canvas and without text."""
+    def label_near(self, column: int, row: int, text: str, style: str = "") -> None:
+        """Write ``text`` at a cell, or around it if other text is there; nowhere if all around is taken.
+
+        A cell between two labels stays free: 1 beside 18 is not 118.
+        """
+        length = len(text)
+        for dx, dy in ((0, 0), (2, 0), (-length - 1, 0), (0, -1), (0, 1), (2, -1), (2, 1), (4, 0)):
+            if self._is_free(column + dx, row + dy, length):
+                self.label(column + dx, row + dy, text, style)
+                return
+
+    def _is_free(self, column: int, row: int, length: int) -> bool:
+        """True if cells from (column, row) to the right are on the canvas, without text in or beside them."""
         if not (0 <= row < self.height and column >= 0 and column + length <= self.width):
             return False
-        return not self._codes[row, column : column + length].any()
+        return not self._codes[row, max(0, column - 1) : column + length + 1].any()
 
     def rows(self) -> list[Runs]:
         """Return the rows, each as runs of equal style that fill the width.

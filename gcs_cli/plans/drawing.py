@@ -100,18 +100,9 @@ def draw(places: PlanPlaces, width: int, height: int) -> Canvas:
     marks += [(label, place, ITEM) for label, place in places.items]
     for label, place, style in marks:
         x, y = (int(value[0]) for value in dots(np.array([place])))
-        _label(canvas, x // DOTS_X, y // DOTS_Y, label, style)
+        canvas.label_near(x // DOTS_X, y // DOTS_Y, label, style)
     _scale(canvas, scale)
     return canvas
-
-
-def _label(canvas: Canvas, column: int, row: int, label: str, style: str) -> None:
-    """Write a label at its cell, or beside it if another label is there."""
-    length = len(label)
-    for dx, dy in ((0, 0), (2, 0), (-length - 1, 0), (0, -1), (0, 1), (2, -1), (2, 1), (4, 0)):
-        if canvas.is_free(column + dx, row + dy, length):
-            canvas.label(column + dx, row + dy, label, style)
-            return
 
 
 def _scale(canvas: Canvas, dots_per_m: float) -> None:

@@ -93,13 +93,19 @@ def test_control_and_wide_characters_keep_the_columns():
     assert shown(canvas) == "a···b"
 
 
-def test_label_is_free_only_on_the_canvas_beside_other_text():
-    canvas = Canvas(6, 1)
-    canvas.label(2, 0, "x")
-    assert canvas.is_free(0, 0, 2)
-    assert not canvas.is_free(0, 0, 3)
-    assert not canvas.is_free(5, 0, 2)
-    assert not canvas.is_free(0, 1, 1)
+def test_labels_near_each_other_do_not_merge():
+    canvas = Canvas(6, 3)
+    for number in ("1", "18", "2", "3", "4"):
+        canvas.label_near(1, 1, number)
+    assert shown(canvas) == " 2 4\n 1 18\n 3"
+
+
+def test_a_label_without_room_is_left_out():
+    canvas = Canvas(3, 1)
+    canvas.label_near(1, 0, "1")
+    canvas.label_near(1, 0, "2")
+    canvas.label_near(9, 9, "3")
+    assert shown(canvas) == " 1"
 
 
 def test_rows_fill_the_width_and_colours_make_runs():

@@ -118,12 +118,7 @@ def _draw_marks(canvas: Canvas, view: Viewport, scene: MapScene, colours: Palett
         return
     x, y = view.to_dots(np.array([place for place, _, _ in marks]))
     for across, down, (_, text, style) in zip(x, y, marks, strict=True):
-        column, row = _cell(across, down)
-        for offset_x, offset_y in ((0, 0), (1, 0), (0, -1), (0, 1), (-len(text), 0)):
-            at = column + offset_x, row + offset_y
-            if canvas.is_free(*at, len(text)):
-                canvas.label(*at, text, style)
-                break
+        canvas.label_near(*_cell(across, down), text, style)
 
 
 def _cell(x: float, y: float) -> tuple[int, int]:
