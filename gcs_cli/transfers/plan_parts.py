@@ -61,6 +61,7 @@ class Uploads:
     With ``restores``, the former parts are downloaded first, and restored if a new one is not accepted. Without, a
     vehicle keeps the parts that it has accepted. ``interrupted`` returns a reason to end early, or an empty text: then
     the former plans are restored too, for RESTORE_TIMEOUT_S at most. With ``only``, the other parts stay.
+    ``on_restore`` is called before the first item of a former plan is sent.
     """
 
     def __init__(
@@ -71,6 +72,7 @@ class Uploads:
         restores: bool,
         interrupted: Callable[[], str] = str,
         only: MissionType | None = None,
+        on_restore: Callable[[], None] = lambda: None,
     ) -> None:
         self._session = session
         self._parts = parts_to_send(plan, only)
@@ -79,6 +81,7 @@ class Uploads:
         self._restores = restores
         self._interrupted = interrupted
         self._only = only
+        self._on_restore = on_restore
         self._steps = self._run()
         self._call: Call | None = None
         self._answer: Answer | None = None
@@ -198,9 +201,10 @@ class Uploads:
     def _restore(self, before: Sequence[PlanPart], current: int) -> Generator[Call, Answer, str]:
         """Upload the former parts that were replaced; return a description of the vehicle's plans."""
         self._is_restoring = True
-        for part in before:
-            if self._holds[part.kind] == _FORMER:
-                continue
+        replaced = [part for part in before if self._holds[part.kind] != _FORMER]
+        if replaced:
+            self._on_restore()
+        for part in replaced:
             answer = yield from self._send(part, _FORMER)
             if not answer.accepted:
                 return f"the former {part.name} could not be restored: {answer.reason}; {self.state}"

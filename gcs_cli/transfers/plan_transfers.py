@@ -44,6 +44,11 @@ def compare_with_vehicle(
     return [(part, list(differences(part.items, held[part.kind], tolerance))) for part in parts]
 
 
+def say_restoring(output: Output) -> None:
+    """Print that the vehicle gets its former plans again, which takes a while."""
+    output.say("restoring", "restoring the vehicle's former plans")
+
+
 def say_uploaded(output: Output, parts: Sequence[PlanPart], uploads: Uploads) -> None:
     """Print the uploaded parts, and those that the vehicle keeps."""
     for part in parts:

@@ -79,6 +79,7 @@ class WatchApp(App[None]):
         Binding("ctrl+z", "suspend_process", "Suspend", show=False),
         Binding("q", "quit", "Quit"),
         Binding("question_mark", "keys", "Keys"),
+        Binding("escape", "hide_keys", "Hide keys", show=False, priority=True),
         Binding("ctrl+c", "quit", "Quit", show=False, priority=True),
     ]
 
@@ -171,6 +172,8 @@ class WatchApp(App[None]):
             return any(map(order_named(str(parameters[0])).applies, self.feed.targets))
         if action in ("vehicles", "next_vehicle"):
             return len(self.feed.views) > 1
+        if action == "hide_keys":
+            return self._keys_are_shown
         return True
 
     @work(exclusive=True, group="quit")
@@ -237,10 +240,18 @@ class WatchApp(App[None]):
 
     def action_keys(self) -> None:
         """Show or hide the panel of all keys."""
-        if self.screen.query("HelpPanel"):
+        if self._keys_are_shown:
             self.action_hide_help_panel()
         else:
             self.action_show_help_panel()
+
+    def action_hide_keys(self) -> None:
+        """Hide the panel of all keys."""
+        self.action_hide_help_panel()
+
+    @property
+    def _keys_are_shown(self) -> bool:
+        return bool(self.screen.query("HelpPanel"))
 
     def get_system_commands(self, screen: Screen[Any]) -> Iterable[SystemCommand]:
         """Yield the entries of the command palette."""

@@ -51,6 +51,8 @@ class World:
         """The vehicle hears no more than so many messages of the mission protocol."""
         self.current = 0
         self.autopilot: int = mavlink.MAV_AUTOPILOT_PX4
+        self.restores: list[int] = []
+        """Number of heard messages when the former plans were begun to be restored."""
         self.heard: list[Message] = []
 
     @property
@@ -109,7 +111,11 @@ class World:
         while self.session.view.identity is None:
             self.step()
         uploads = Uploads(
-            self.session, plan, restores=restores, interrupted=lambda: "interrupted" * interrupted()
+            self.session,
+            plan,
+            restores=restores,
+            interrupted=lambda: "interrupted" * interrupted(),
+            on_restore=lambda: self.restores.append(len(self.heard)),
         )
         self.uploads = uploads
         end_s = self.now_s + 300.0
@@ -233,6 +239,16 @@ def test_an_interrupt_leaves_a_mission_that_was_not_replaced() -> None:
     assert (world.plans[FENCE], world.plans[MISSION], world.current) == (OLD.fence, OLD.items, 2)
     counts = [message for message in world.heard if message.get_type() == "MISSION_COUNT"]
     assert [message.mission_type for message in counts] == [FENCE, FENCE]
+    assert world.heard[world.restores[0]] is counts[1]
+
+
+def test_nothing_is_restored_before_a_part_was_replaced() -> None:
+    plan = Plan(mission(2, mark=1), fence=ELSEWHERE)
+    world = World()
+    world.hold(OLD)
+    assert world.upload(plan, interrupted=lambda: len(world.heard) >= 3).cancelled
+    assert world.upload(plan).accepted
+    assert world.restores == []
 
 
 def test_a_restored_mission_keeps_its_current_item() -> None:

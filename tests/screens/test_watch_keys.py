@@ -91,6 +91,29 @@ def test_keys_of_all_screens_are_shown_at_any_width(width: int) -> None:
     play(story, size=(width, 24))
 
 
+@pytest.mark.parametrize("screen", ["1", "5"])  # Messages has an escape of its own
+def test_escape_closes_the_panel_of_keys_before_it_does_anything_else(screen: str) -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await pilot.press(screen, "question_mark", "escape")
+        await pilot.pause()
+        assert not app.screen.query("HelpPanel")
+        assert not isinstance(app.screen, Confirm)
+
+    play(story)
+
+
+def test_escape_still_answers_a_question() -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await pilot.press("X")
+        await pilot.pause()
+        assert isinstance(app.screen, Confirm)
+        await pilot.press("escape")
+        await pilot.pause()
+        assert not isinstance(app.screen, Confirm)
+
+    assert asked(play(story)) == []
+
+
 def test_click_on_the_end_of_a_key_presses_that_key(monkeypatch: pytest.MonkeyPatch) -> None:
     pressed: list[str] = []
 
