@@ -58,7 +58,7 @@ class GroundMonitor:
         if abs(down_m_s) > FALL_M_S:
             self._fell_us = time_us
 
-    def fell(self, time_us: int) -> None:
+    def note_fall(self, time_us: int) -> None:
         """Record that the vehicle fell or rose, or was disarmed in the air."""
         self._fell_us = time_us
 

@@ -106,7 +106,7 @@ class Network:
         raise AssertionError(f"clients and vehicle exchange messages without end at t = {now_s:.3f} s")
 
 
-class Clock:
+class EngineRunner:
     """Runs the engine, with an exchange of messages whenever some may be due."""
 
     def __init__(self, engine: Engine, network: Network, after_outer: Callable[[], None]) -> None:

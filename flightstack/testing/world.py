@@ -20,7 +20,7 @@ from flightstack.testing.flight import Event, Flight
 from flightstack.testing.link import Link
 from flightstack.testing.log import Log
 from flightstack.testing.mission_flight import await_first_state, fly_plan
-from flightstack.testing.network import Clock, Network
+from flightstack.testing.network import EngineRunner, Network
 from flightstack.testing.setup import Setup, built
 from flightstack.testing.state import State, condition_of, reported_by, state_of
 from gcs_cli.link import calls
@@ -99,7 +99,7 @@ class World:
         """The plan that was uploaded last."""
         self._network = Network(self.setup.seed)
         self._failsafes: tuple[Failsafe, ...] = ()
-        self._clock = Clock(self.engine, self._network, self._note_failsafes)
+        self._runner = EngineRunner(self.engine, self._network, self._note_failsafes)
         self.gcs: Client = self.add_client(GROUND)
         """The ground station."""
         self.sender = self.gcs
@@ -148,15 +148,15 @@ class World:
 
     def tick(self) -> None:
         """Run one inner tick, and exchange messages after an outer tick."""
-        self._clock.run(1)
+        self._runner.run(1)
 
     def step(self) -> None:
         """Run for one period of the outer loop: the shortest time between two exchanges of messages."""
-        self._clock.run(self.engine.stack.rates.divisor)
+        self._runner.run(self.engine.stack.rates.divisor)
 
     def run_for(self, seconds: float) -> None:
         """Run for ``seconds`` of simulated time."""
-        self._clock.run(round(seconds * self.engine.stack.rates.inner_hz))
+        self._runner.run(round(seconds * self.engine.stack.rates.inner_hz))
 
     def run_on(self, most_s: float) -> None:
         """Run as ``step``, and on until there are messages to exchange, for ``most_s`` at most.
@@ -164,7 +164,7 @@ class World:
         What the vehicle does by events, such as to disarm or to reach an item, ends it too, and so does a period that
         is not compiled: on the ground, with a watch, on loops in C. The time is of whole periods, at least one.
         """
-        self._clock.run_on(most_s)
+        self._runner.run_on(most_s)
 
     def run_until(self, condition: Callable[[State], object] | str, timeout_s: float = 120.0) -> State:
         """Run until ``condition`` of the state is true; return that state.
@@ -182,7 +182,7 @@ class World:
             if left <= 0:
                 break
             if is_of_events:
-                left -= self._clock.run_on_ticks(left)
+                left -= self._runner.run_on_ticks(left)
             else:
                 self.step()
                 left -= rates.divisor
@@ -200,11 +200,11 @@ class World:
 
     def watch(self, callback: Callable[[], None]) -> None:
         """Call ``callback`` after every outer tick."""
-        self._clock.watch(callback)
+        self._runner.watch(callback)
 
     def after(self, seconds: float, callback: Callable[[], None]) -> None:
         """Call ``callback`` once, ``seconds`` of simulated time from now."""
-        self._clock.after(seconds, callback)
+        self._runner.after(seconds, callback)
 
     def _note_failsafes(self) -> None:
         active = self.engine.stack.parts.failsafes.active

@@ -80,7 +80,7 @@ class FlightMonitor:
     def pass_by(self, time_us: int, found: int, fell_us: int) -> None:
         """Follow updates up to ``time_us`` that did nothing; arguments as in ``Autopilot.pass_outer``."""
         if fell_us:
-            self._ground.fell(fell_us)
+            self._ground.note_fall(fell_us)
         self._failsafes.pass_by(time_us, found)
 
     def _apply_failsafes(self, conditions: frozenset[Failsafe]) -> None:

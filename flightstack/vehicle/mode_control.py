@@ -190,7 +190,7 @@ class ModeControl:
             if now.landed:
                 journal.say(Severity.NOTICE, "Disarmed")
             else:
-                self._ground.fell(now.time_us)
+                self._ground.note_fall(now.time_us)
                 journal.say(Severity.CRITICAL, "Disarmed in the air")
         if after != before:
             journal.status(after)

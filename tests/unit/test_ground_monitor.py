@@ -66,5 +66,5 @@ def test_a_vehicle_is_at_rest_half_a_second_after_its_fall() -> None:
     watch.update(1_200_000, 0.0)  # the top of a bounce
     assert not watch.is_at_rest(1_500_000)
     assert watch.is_at_rest(1_510_000)
-    watch.fell(2_000_000)
+    watch.note_fall(2_000_000)
     assert not watch.is_at_rest(2_000_000)
