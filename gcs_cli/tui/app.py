@@ -147,7 +147,9 @@ class WatchApp(App[None]):
         while self.feed.notices:
             notice = self.feed.notices.popleft()
             self.notify(notice.text, severity=_toast_severity(notice.severity), markup=False)
-        targets = [(each.identity, each.armed, each.landed_state) for each in self.feed.targets]
+        targets = [
+            (each.identity, each.armed, each.landed_state, each.terminated) for each in self.feed.targets
+        ]
         state = (view.identity, targets, len(self.feed.views))
         if state != self._state:  # other keys work
             self._state = state

@@ -94,11 +94,14 @@ def test_the_footer_shows_the_keys_that_work_now() -> None:
 
 def test_a_terminated_flight_has_no_keys_of_a_flight_and_no_question() -> None:
     async def story(app: WatchApp, pilot: Pilot) -> None:
+        app.feed.shown = FULL._replace(system_status=8)
+        app.redraw()
+        await pilot.pause()
         assert not any(word in shown(app)[-1] for word in ("Land", "Return", "Hold", "Arm", "Take off"))
         await pilot.press("X")
         await pilot.pause()
 
-    assert asked(play(story, FULL._replace(system_status=8), size=(120, 24))) == ["terminate"]
+    assert asked(play(story, size=(120, 24))) == ["terminate"]
 
 
 def test_a_safe_order_is_performed_at_once() -> None:
