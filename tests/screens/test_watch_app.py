@@ -94,6 +94,9 @@ def test_the_footer_shows_the_keys_that_work_now() -> None:
 
 def test_a_terminated_flight_has_no_keys_of_a_flight_and_no_question() -> None:
     async def story(app: WatchApp, pilot: Pilot) -> None:
+        app.redraw()
+        await pilot.pause()
+        assert "L Land" in shown(app)[-1]
         app.feed.shown = FULL._replace(system_status=8)
         app.redraw()
         await pilot.pause()
