@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import signal
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
@@ -53,6 +54,8 @@ THEMES = (_theme("gcs-dark", DARK, dark=True), _theme("gcs-light", LIGHT, dark=F
 
 REDRAWS_HZ = 5.0
 """Redraws of the screen a second. Fly at 200x50 takes 7.4 % of a core, about half of it for them."""
+COVERED_EVERY = 5
+"""A screen below a dialog is drawn in every fifth redraw: Textual then composes all of both screens."""
 _ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -123,7 +126,8 @@ class WatchApp(App[None]):
         self.run_worker(self.keys.run(), group="keys")
         self.feed.start()
         self.switch_mode(self._first_mode)
-        self.set_interval(1 / REDRAWS_HZ, self.redraw)
+        beats = itertools.count()
+        self.set_interval(1 / REDRAWS_HZ, lambda: self.redraw(draws_covered=next(beats) % COVERED_EVERY == 0))
 
     async def on_event(self, event: Event) -> None:
         """Handle an event; an input of the user waits for the effect of the one before."""
@@ -136,8 +140,8 @@ class WatchApp(App[None]):
         """End the thread of the link."""
         self.feed.stop()
 
-    def redraw(self) -> None:
-        """Draw the newest state on the visible screen; end if the link failed."""
+    def redraw(self, *, draws_covered: bool = True) -> None:
+        """Draw the newest state on the visible screen, and on one that a dialog covers; end if the link failed."""
         if not self.is_running:  # the screens are being removed
             return
         if self.feed.error is not None:
@@ -155,7 +159,8 @@ class WatchApp(App[None]):
             self._state = state
             self.refresh_bindings()
         screens = self.screen_stack  # empty while a mode begins
-        if screens and isinstance(screens[0], WatchScreen) and screens[0].is_composed:
+        draws = draws_covered or len(screens) == 1
+        if screens and draws and isinstance(screens[0], WatchScreen) and screens[0].is_composed:
             screens[0].show(view, self.feed.now_s)
             self.redraws += 1
         if screens and isinstance(screens[-1], VehicleList):

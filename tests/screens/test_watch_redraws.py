@@ -140,3 +140,22 @@ def test_redraw_renders_only_widgets_that_changed(
         assert {widget for widget in rendered if isinstance(widget, KeepsLines)} == {top, bottom}
 
     play(story, size=(120, 35))
+
+
+def test_a_covered_screen_is_drawn_less_often() -> None:
+    """Textual composes the dialog and all below it for each change."""
+
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await pilot.pause(2 / REDRAWS_HZ)
+        before = app.redraws
+        app.redraw(draws_covered=False)
+        assert app.redraws == before + 1
+        await pilot.press("X")
+        await pilot.pause()
+        before = app.redraws
+        app.redraw(draws_covered=False)
+        assert app.redraws == before
+        app.redraw()
+        assert app.redraws == before + 1
+
+    play(story)
