@@ -21,7 +21,7 @@ from gcs_cli.link.lines import Line
 from gcs_cli.link.opening import SeveralLines, instances_text, open_line
 from gcs_cli.link.playback import PlaybackLine
 from gcs_cli.link.session import Service, Session
-from gcs_cli.link.share import ShareServer
+from gcs_cli.link.share import SharedLine, ShareServer
 
 _LONGEST_WAIT_S = 0.25
 """Longest time until Ctrl-C, the end of a child or a resized terminal is noticed."""
@@ -117,7 +117,7 @@ class Connection:
         """Called in every step after the messages were received."""
         self._is_lent = False
         self._server: ShareServer | None = None
-        self._share_due_s = math.inf
+        self._share_due_s = -math.inf if isinstance(line, SharedLine) else math.inf
 
     @property
     def session(self) -> Session:
@@ -174,7 +174,10 @@ class Connection:
         self._send()
 
     def share(self) -> None:
-        """Serve this link to other ``gcs`` processes of this user, until the connection is closed."""
+        """Serve this link to other ``gcs`` processes of this user, until the connection is closed.
+
+        A connection that began on the link of another process does so once it has opened the endpoint itself.
+        """
         if not self.is_recording:
             self._share_due_s = -math.inf
 
@@ -182,6 +185,8 @@ class Connection:
         if self._server is not None:
             for frame in self._server.receive(now_s):
                 self._forward(frame)
+        elif isinstance(self._line, SharedLine) and not self._line.is_own:
+            return  # a server of a link that another process serves would be its own client
         elif now_s >= self._share_due_s:  # another process may serve it, and end
             self._share_due_s = now_s + _SHARE_PERIOD_S
             self._server = ShareServer.open(self.endpoint)

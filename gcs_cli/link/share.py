@@ -73,7 +73,10 @@ def open_shared(endpoint: VehicleEndpoint) -> Line | None:
 
 
 class SharedLine:
-    """A client of another process's link. When that process ends, it opens the endpoint itself."""
+    """A client of another process's link. When that process ends, it opens the endpoint itself.
+
+    Several clients may lose the link at once: the one whose link then ``is_own`` serves the others.
+    """
 
     def __init__(self, endpoint: VehicleEndpoint, connected: socket.socket) -> None:
         self._endpoint = endpoint
@@ -81,6 +84,11 @@ class SharedLine:
         self._line: Line = self._shared
         self._closed: list[Address] = []
         self._retry_s = 0.0
+
+    @property
+    def is_own(self) -> bool:
+        """True once it has opened the endpoint itself."""
+        return self._shared is None
 
     @property
     def peers(self) -> Sequence[Address]:

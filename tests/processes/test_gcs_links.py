@@ -163,6 +163,50 @@ def test_second_process_takes_the_link_over_when_the_first_ends() -> None:
             assert second.wait_for(lambda: second.session.view.link.received > received + 20, LONG_S)
 
 
+def test_process_that_takes_the_link_over_serves_the_others() -> None:
+    port, vehicle = free_port(), FakeVehicle()
+    endpoint = parse_endpoint(f"udp:{port}")
+
+    def shared() -> Connection:
+        line = open_shared(endpoint)
+        assert line is not None
+        return Connection(endpoint, line=line)
+
+    with udp_vehicles(vehicle, to_port=port):
+        with Connection(endpoint) as first:
+            first.share()
+            first.wait_for_vehicle(LONG_S)
+            first.step(first.now_s)
+            second, third = shared(), shared()
+            with running(lambda: first.step(first.now_s + 0.05)):
+                second.wait_for_vehicle(LONG_S)
+                third.wait_for_vehicle(LONG_S)
+        received = [each.session.view.link.received for each in (second, third)]
+        with second, third, running(lambda: second.step(second.now_s + 0.05)):
+            assert third.wait_for(lambda: third.session.view.link.received > received[1] + 20, LONG_S)
+            assert second.session.view.link.received > received[0]
+
+
+def test_process_without_the_link_does_not_serve_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It would be its own client, and never open the endpoint."""
+    endpoint = parse_endpoint("udp:14550")
+    server = ShareServer.open(endpoint)
+    assert server is not None
+    line = open_shared(endpoint)
+    assert line is not None
+    server.close()
+
+    def busy(_endpoint: VehicleEndpoint) -> Line:
+        raise CliError("the port is in use")
+
+    monkeypatch.setattr("gcs_cli.link.share.open_line", busy)
+    with Connection(endpoint, line=line) as connection:
+        connection.share()
+        for _ in range(3):
+            connection.step(connection.now_s)
+        assert open_shared(endpoint) is None
+
+
 def test_shared_link_needs_a_private_folder() -> None:
     endpoint = parse_endpoint("udp:14550")
     folder = share_path(endpoint).parent
