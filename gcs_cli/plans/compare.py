@@ -17,6 +17,8 @@ _EQUIVALENT_FRAMES = {
     11: 10,  # GLOBAL_TERRAIN_ALT_INT
 }
 
+_SIGNS = {(mavlink.MAV_CMD_NAV_LOITER_TIME, 3), (mavlink.MAV_CMD_NAV_LAND, 4)}
+"""Commands and numbers of the parameters, a radius and a yaw, of which packed storage keeps the sign alone."""
 _PLACES_ONLY = frozenset(FenceCommand) | {RALLY_POINT}
 
 
@@ -106,8 +108,8 @@ def _field_differences(
 
 def _is_packed(command: int, number: int, wanted: float, found: float) -> bool:
     """Return True if ``found`` is what storage of a few bytes makes of a parameter: a whole number, a sign or 0."""
-    if (command, number) == (mavlink.MAV_CMD_NAV_LOITER_TIME, 3):  # of the radius, its sign
-        return found == math.copysign(1.0, wanted)
+    if (command, number) in _SIGNS:
+        return found == (-1.0 if wanted < 0.0 else 1.0)
     return math.isfinite(wanted) and found in (0.0, float(math.trunc(wanted)))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,6 +27,8 @@ PLACE = MissionItem(
 )
 LOITER = replace(PLACE, command=mavlink.MAV_CMD_NAV_LOITER_TIME, param1=10.0, param2=0.0, param3=-8.0)
 
+LAND = replace(PLACE, command=mavlink.MAV_CMD_NAV_LAND, param1=0.0, param2=0.0, param4=math.nan)
+
 
 def with_params(item: MissionItem, *params: float) -> MissionItem:
     return replace(item, **{f"param{number}": value for number, value in enumerate(params, start=1)})
@@ -44,6 +47,8 @@ def with_params(item: MissionItem, *params: float) -> MissionItem:
         (PLACE, (2.5, 1.5, 1.0, 0.0), [False]),
         (LOITER, (10.0, 0.0, -1.0, 0.0), [True]),
         (LOITER, (10.0, 0.0, 1.0, 0.0), [False]),
+        (LAND, (0.0, 0.0, 0.0, 1.0), [True]),
+        (LAND, (0.0, 0.0, 0.0, 5.0), [False]),
     ],
 )
 def test_what_packed_storage_makes_of_parameters_is_told_apart(
