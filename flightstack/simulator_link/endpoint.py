@@ -101,7 +101,7 @@ class SimulatorEndpoint:
         self.battery = NO_BATTERY
         self.finder = FrameFinder()
         """Frame parser of received bytes."""
-        self._state_us = 0  # time stamp of the newest state
+        self.stamp_us = 0  # time stamp of the newest state
         self.has_arrived = False
         """True if a state with a new time arrived since the last call of ``freshness``."""
         self._arrived_us = 0
@@ -118,7 +118,7 @@ class SimulatorEndpoint:
         """Continue the connection of another endpoint after a reboot."""
         self.state[:], self.truth[:] = other.state, other.truth
         self.rotor_speed_rad_s[:] = other.rotor_speed_rad_s
-        self._state_us = other._state_us  # the vehicle clock restarts
+        self.stamp_us = other.stamp_us  # the vehicle clock restarts
         self.battery, self.has_state, self._uses_hil = other.battery, other.has_state, other._uses_hil
         self._has_hil_state = other._has_hil_state
 
@@ -182,7 +182,7 @@ class SimulatorEndpoint:
 
     def pass_by(self, count: int) -> None:
         """Count states, which were written to ``frame`` one interval after another, as taken."""
-        self._state_us += count * self._interval_us
+        self.stamp_us += count * self._interval_us
         self.time_us += count * self._interval_us
         self.has_arrived = True
 
@@ -282,8 +282,8 @@ class SimulatorEndpoint:
             self.peer_is_shutting_down = message.system_status == mavlink.MAV_STATE_POWEROFF
 
     def _take_time(self, state_us: int) -> None:
-        step_us = state_us - self._state_us
-        self._state_us = state_us
+        step_us = state_us - self.stamp_us
+        self.stamp_us = state_us
         if step_us == self._interval_us and self.has_state:  # typical
             self.time_us += step_us
             self.has_arrived = True
@@ -378,7 +378,7 @@ class SimulatorEndpoint:
         if self._uses_hil:
             return self._hil_answer(rotor_speed_rad_s, armed)
         self._actuators.rotor_speed_rad_s[:] = rotor_speed_rad_s
-        return self._actuators.seal(self._state_us, self.flags(armed))
+        return self._actuators.seal(self.stamp_us, self.flags(armed))
 
     def _hil_answer(self, rotor_speed_rad_s: FloatArray, armed: bool) -> bytes:
         count = self._max_speed_rad_s.size
@@ -389,7 +389,7 @@ class SimulatorEndpoint:
             controls = [0.0] * 16
         return self._link.encode(
             mavlink.MAVLink_hil_actuator_controls_message(
-                self._state_us,
+                self.stamp_us,
                 controls,
                 HIL_ARMED if armed else HIL_DISARMED,
                 HIL_LOCKSTEP if self._lockstep else 0,

@@ -30,7 +30,7 @@ class QuietTicks:
 
     def count(self, simulator: Simulator, actuators: ActuatorsFrame) -> int:
         """Return how many of the next ticks are quiet. The last tick's answer was taken and is not applied yet."""
-        if simulator.interval_us != self._interval_us or not self._lockstep.is_quiet:
+        if not (self._is_in_step(simulator) and self._lockstep.is_quiet):
             return 0
         block = self._fitting(simulator, actuators)
         count = min(
@@ -38,6 +38,10 @@ class QuietTicks:
             self._quiet_intervals(simulator, self._now.time_us, block is not None),
         )
         return count if block is None or count <= 0 else min(count, block.room())
+
+    def _is_in_step(self, simulator: Simulator) -> bool:
+        """Return True if the simulator's next state comes one interval of the vehicle after the newest one."""
+        return simulator.interval_us == self._interval_us and simulator.stamp_us == self._link.stamp_us
 
     def _fitting(self, simulator: Simulator, actuators: ActuatorsFrame) -> QuietBlock | None:
         """Return the compiled ticks, None if a part of them is not compiled, or is not that of the start."""
@@ -57,10 +61,12 @@ class QuietTicks:
     def run_periods(self, simulator: Simulator, actuators: ActuatorsFrame, most: int) -> int:
         """Run the outer tick on the newest state and the ticks that follow it while nothing happens, ``most`` at most.
 
-        Return their number; 0 if vehicle and simulator are not in step, or not compiled.
+        Return their number; 0 if vehicle and simulator are not in step, or not compiled, or if the next tick is not an
+        outer one: after a jump of the clock there were ticks without a state, or a state without a tick.
         """
         block = self._fitting(simulator, actuators)
-        if block is None or simulator.interval_us != self._interval_us or not self._lockstep.is_due:
+        is_due = self._autopilot.next_outer == 0 and self._lockstep.is_due
+        if block is None or not (is_due and self._is_in_step(simulator)):
             return 0
         time_us, done = self._now.time_us + self._interval_us, 0
         if self._estimation is not None:
