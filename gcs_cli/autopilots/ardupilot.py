@@ -13,7 +13,8 @@ from typing import Any
 
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, ardupilot_dialect, mavlink
 from gcs_cli.autopilots import common_commands
-from gcs_cli.autopilots.autopilot import Autopilot, Phase, Role, VehicleCommand
+from gcs_cli.autopilots.ardupilot_items import PACKED, PACKED_BY_PLANES
+from gcs_cli.autopilots.autopilot import Autopilot, Packing, Phase, Role, VehicleCommand
 
 _ENUM_OF_TYPE = {
     mavlink.MAV_TYPE_FIXED_WING: "PLANE_MODE",
@@ -45,6 +46,10 @@ def _select_mode(custom_mode: int) -> VehicleCommand:
 def _speed_modes(vehicle_type: int) -> tuple[str, ...]:
     """Return the modes of ArduCopter with a ``set_speed_xy_cms`` of their own."""
     return () if vehicle_type in _ENUM_OF_TYPE else ("AUTO", "GUIDED", "RTL")
+
+
+def _packing(vehicle_type: int) -> Packing:
+    return PACKED_BY_PLANES if _ENUM_OF_TYPE.get(vehicle_type) == "PLANE_MODE" else PACKED
 
 
 def _yaw(heading_deg: float) -> VehicleCommand:
@@ -110,5 +115,6 @@ ARDUPILOT = Autopilot(
     counters=frozenset(
         {"MIS_TOTAL", "FENCE_TOTAL", "RALLY_TOTAL", "STAT_BOOTCNT", "STAT_FLTTIME", "STAT_RUNTIME"}
     ),
+    packing=_packing,
     log_suffix=".bin",
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 
 class VehicleCommand(NamedTuple):
@@ -19,6 +19,12 @@ class VehicleCommand(NamedTuple):
     frame: int | None = None
 
 
+Storage: TypeAlias = Callable[[float], float]
+"""Returns what a vehicle keeps of a value."""
+Packing: TypeAlias = Mapping[int, tuple[Storage, Storage, Storage, Storage]]
+"""For a MAV_CMD, the storage of its first four parameters; without an entry they are kept as they are."""
+
+
 class Role(Enum):
     """Tasks that every autopilot has a mode for, each by another name."""
 
@@ -29,6 +35,8 @@ class Role(Enum):
     GUIDED = "guided"
     """Flies to positions that the ground station commands."""
     MISSION = "mission"
+    TERMINATION = "termination"
+    """The flight has ended for good."""
 
 
 class Phase(Enum):
@@ -102,6 +110,8 @@ class Autopilot(NamedTuple):
     """True if the vehicle answers requests for logs while it is armed."""
     counters: frozenset[str] = frozenset()
     """Parameters that the vehicle counts itself and does not let others set: a file of parameters is loaded without."""
+    packing: Callable[[int], Packing] = lambda _vehicle_type: {}
+    """What is kept of the parameters of a mission item, for a MAV_TYPE."""
     log_suffix: str = ".ulg"
     """End of the name of a downloaded log."""
 

@@ -71,6 +71,7 @@ PX4 = Autopilot(
         Role.TAKEOFF: "TAKEOFF",
         Role.GUIDED: "HOLD",
         Role.MISSION: "MISSION",
+        Role.TERMINATION: "TERMINATION",
     },
     aliases={
         "LOITER": "HOLD",

@@ -15,7 +15,7 @@ from flightstack.plan import MissionItem, MissionResult, MissionType
 from gcs_cli.clients.command_client import CommandClient, CommandResult
 from gcs_cli.clients.mission_client import Done, Failed, MissionClient
 from gcs_cli.link.session import Session
-from gcs_cli.plans.compare import EXACT, PACKED, Tolerance
+from gcs_cli.plans.compare import EXACT, PACKED_ITEMS, Tolerance
 from gcs_cli.plans.names import any_command_name
 
 TEXT_WAIT_S = 0.3
@@ -172,7 +172,10 @@ def mission_client(session: Session, kind: MissionType) -> MissionClient:
 
 def storage_tolerance(session: Session) -> Tolerance:
     """Return the differences that the vehicle's storage makes."""
-    return EXACT if session.view.autopilot.stores_items_exactly else PACKED
+    autopilot = session.view.autopilot
+    if autopilot.stores_items_exactly:
+        return EXACT
+    return PACKED_ITEMS._replace(packing=autopilot.packing(session.view.vehicle_type))
 
 
 def vehicle_address(session: Session) -> Address:

@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
-from flightstack.mavlink.dialect import mavlink
 from flightstack.plan import Frame, MissionItem
 from flightstack.plan.commands import RALLY_POINT, FenceCommand
+from gcs_cli.autopilots.autopilot import Packing
 from gcs_cli.plans.names import any_command_name
 
 _EQUIVALENT_FRAMES = {
@@ -17,8 +17,7 @@ _EQUIVALENT_FRAMES = {
     11: 10,  # GLOBAL_TERRAIN_ALT_INT
 }
 
-_SIGNS = {(mavlink.MAV_CMD_NAV_LOITER_TIME, 3), (mavlink.MAV_CMD_NAV_LAND, 4)}
-"""Commands and numbers of the parameters, a radius and a yaw, of which packed storage keeps the sign alone."""
+_ALL_KEPT: Packing = {}
 _PLACES_ONLY = frozenset(FenceCommand) | {RALLY_POINT}
 
 
@@ -55,18 +54,13 @@ class Tolerance(NamedTuple):
     keeps_autocontinue: bool = True
     keeps_idle_frames: bool = True
     """The vehicle stores the frame of an item without a position."""
-    keeps_parameters: bool = True
-    """The vehicle stores the four parameters of an item as they are; else whole numbers, or none."""
+    packing: Packing = _ALL_KEPT
+    """What the vehicle keeps of parameters that it does not store as they are."""
 
 
 EXACT = Tolerance()
-PACKED = Tolerance(  # ArduPilot packs an item into 15 bytes
-    altitude_m=0.01,
-    degrees_e7=1,
-    nan_is_zero=True,
-    keeps_autocontinue=False,
-    keeps_idle_frames=False,
-    keeps_parameters=False,
+PACKED_ITEMS = Tolerance(  # as ArduPilot
+    altitude_m=0.01, degrees_e7=1, nan_is_zero=True, keeps_autocontinue=False, keeps_idle_frames=False
 )
 
 
@@ -94,7 +88,7 @@ def _field_differences(
         yield Difference(seq, "frame", wanted.frame, found.frame)
     for number, (one, other) in enumerate(zip(wanted.params, found.params, strict=True), start=1):
         if not _same(one, other, 0.0, tolerance):
-            cannot = not tolerance.keeps_parameters and _is_packed(wanted.command, number, one, other)
+            cannot = _is_all_kept(tolerance.packing, wanted.command, number, one, other)
             yield Difference(seq, f"parameter {number}", one, other, cannot)
     for name, one_e7, other_e7 in (("latitude", wanted.x, found.x), ("longitude", wanted.y, found.y)):
         if abs(one_e7 - other_e7) > tolerance.degrees_e7:
@@ -106,11 +100,11 @@ def _field_differences(
         yield Difference(seq, "autocontinue", wanted.autocontinue, found.autocontinue)
 
 
-def _is_packed(command: int, number: int, wanted: float, found: float) -> bool:
-    """Return True if ``found`` is what storage of a few bytes makes of a parameter: a whole number, a sign or 0."""
-    if (command, number) in _SIGNS:
-        return found == (-1.0 if wanted < 0.0 else 1.0)
-    return math.isfinite(wanted) and found in (0.0, float(math.trunc(wanted)))
+def _is_all_kept(packing: Packing, command: int, number: int, wanted: float, found: float) -> bool:
+    """Return True if ``found`` is all that the vehicle can keep of ``wanted``, parameter ``number`` from 1."""
+    row = packing.get(command)
+    sent = 0.0 if math.isnan(wanted) else wanted
+    return row is not None and math.isfinite(sent) and row[number - 1](sent) == found
 
 
 def _has_autocontinue(item: MissionItem, tolerance: Tolerance) -> bool:

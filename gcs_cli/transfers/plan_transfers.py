@@ -112,6 +112,7 @@ def say_verified(output: Output, compared: Sequence[tuple[PlanPart, list[Differe
                 f"{part.name} of {len(part.items)} items: {equality(found)}",
                 part=part.name,
                 items=len(part.items),
+                cannot_be_held=len(found),
             )
     if count:
         many = "1 difference" if count == 1 else f"{count} differences"

@@ -35,7 +35,7 @@ from gcs_cli.tui.mission.rows import (
     mission_table,
     summary,
 )
-from gcs_cli.tui.orders.orders import asks_to_start, in_air, vehicle_name
+from gcs_cli.tui.orders.orders import asks_to_start, goes_on, in_air, takes_orders, vehicle_name
 from gcs_cli.tui.widgets.drawing import LineWidget, watch_app
 from gcs_cli.tui.widgets.entry_form import EntryForm
 from gcs_cli.tui.widgets.job_screen import JobScreen, some_of
@@ -124,7 +124,7 @@ class MissionScreen(JobScreen):
             self._table = mission_table(self.draft.plan, home)
         table = self._table
         self._progress = Progress() if self.draft.is_changed else mission_progress(table, view)
-        keys = (bool(self.items), bool(self.draft.past), self.draft.is_changed, view.armed)
+        keys = (bool(self.items), bool(self.draft.past), self.draft.is_changed, view.armed, goes_on(view))
         if keys != self._keys:
             self._keys = keys
             self.refresh_bindings()
@@ -180,7 +180,9 @@ class MissionScreen(JobScreen):
         if action == "jump":
             return bool(self.items) and not self.draft.is_changed
         if action == "pause":
-            return watch_app(self).feed.view.armed
+            return takes_orders(watch_app(self).feed.view)
+        if action == "start":
+            return goes_on(watch_app(self).feed.view)
         return True
 
     # -- edits
@@ -330,19 +332,17 @@ class MissionScreen(JobScreen):
     def _compare(self, connection: Connection, plan: Plan) -> Comparison:
         """Return the differences of the vehicle's plan, or the parts that are equal."""
         compared = plan_transfers.compare_with_vehicle(connection, parts_to_send(plan))
-        lines = [
-            f"{part.name}: {difference.sentence}"
-            for part, found in compared
-            for difference in found
-            if not difference.cannot_be_held
-        ]
-        if lines:
-            return Comparison(f"the vehicle's plan differs: {some_of(lines)}", is_equal=False)
+        lines: dict[bool, list[str]] = {False: [], True: []}
+        for part, found in compared:
+            for difference in found:
+                lines[difference.cannot_be_held].append(f"{part.name}: {difference.sentence}")
+        if lines[False]:
+            return Comparison(f"the vehicle's plan differs: {some_of(lines[False])}", is_equal=False)
         equal = ", ".join(
             f"{part.name} of {len(part.items)} items {plan_transfers.equality(found)}"
             for part, found in compared
         )
-        return Comparison(equal, is_equal=True)
+        return Comparison("\n".join(filter(None, [equal, some_of(lines[True])])), is_equal=True)
 
     @work
     async def action_verify(self) -> None:
