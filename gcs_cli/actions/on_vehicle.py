@@ -118,7 +118,7 @@ def terminate() -> Action:
         common_commands.TERMINATE,
         lambda view: view.terminated or not view.armed,
         "is still armed",
-        reached_before=lambda view: view.terminated,  # PX4 refuses a second termination
+        reached_before=lambda view: view.terminated_for_good,  # PX4 refuses a second termination
     )
     doing, done = "terminating the flight", "flight terminated"
     return Action("terminate", lambda _view: (step,), doing, done, goes_on_without_link=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple, TypeAlias
 
-from gcs_cli.autopilots.autopilot import Autopilot
+from gcs_cli.autopilots.autopilot import Autopilot, Role
 from gcs_cli.autopilots.registry import autopilot_of
 from gcs_cli.vehicle.link_counts import LinkCounts
 
@@ -319,8 +319,14 @@ class VehicleView(NamedTuple):
 
     @property
     def terminated(self) -> bool:
-        """True if the vehicle has terminated the flight."""
+        """True if the vehicle has terminated the flight, or its rotors are switched off: PX4's kill switch."""
         return self.system_status == _TERMINATED
+
+    @property
+    def terminated_for_good(self) -> bool:
+        """True if the flight has ended until a reboot; by the mode, if the autopilot has one for it."""
+        mode = self.autopilot.role_mode(Role.TERMINATION, self.vehicle_type)
+        return self.terminated and mode in (None, self.custom_mode)
 
     @property
     def has_position(self) -> bool:

@@ -12,6 +12,7 @@ from textual.pilot import Pilot
 from flightstack.core.enums import Severity
 from gcs_cli.tui.app import REDRAWS_HZ, WatchApp
 from gcs_cli.tui.feed import Notice
+from gcs_cli.tui.orders.form import Confirm
 from gcs_cli.tui.orders.orders import ORDERS
 from gcs_cli.tui.screens import SCREENS, ScreenEntry
 from gcs_cli.vehicle.view_types import Identity, VehicleView
@@ -97,14 +98,28 @@ def test_a_terminated_flight_has_no_keys_of_a_flight_and_no_question() -> None:
         app.redraw()
         await pilot.pause()
         assert "L Land" in shown(app)[-1]
-        app.feed.shown = FULL._replace(system_status=8)
+        app.feed.shown = FULL._replace(system_status=8, custom_mode=10 << 16)
         app.redraw()
         await pilot.pause()
         assert not any(word in shown(app)[-1] for word in ("Land", "Return", "Hold", "Arm", "Take off"))
-        await pilot.press("X")
+        await pilot.press("X", "C", "S", "M", "H")
         await pilot.pause()
 
     assert asked(play(story, size=(120, 24))) == ["terminate"]
+
+
+def test_a_kill_switch_of_px4_is_no_termination() -> None:
+    """PX4 reports both by the same state; a killed vehicle may fly on."""
+
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await pilot.pause()
+        assert "rotors switched off" in "\n".join(shown(app))
+        assert "L Land" in shown(app)[-1]
+        await pilot.press("X")
+        await pilot.pause()
+        assert isinstance(app.screen, Confirm)
+
+    assert asked(play(story, FULL._replace(system_status=8), size=(120, 24))) == []
 
 
 def test_a_safe_order_is_performed_at_once() -> None:

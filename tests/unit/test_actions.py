@@ -17,10 +17,11 @@ from gcs_cli.actions.run import ActionRun, Outcome, Result
 from gcs_cli.clients.command_client import ModeClient
 from gcs_cli.commands import actions
 from gcs_cli.vehicle.view_types import VehicleView
-from tests.support.folded_vehicle import Vehicle, heartbeat
+from tests.support.folded_vehicle import HOLD_MODE, Vehicle, heartbeat
 from tests.support.truth import World
 
 LIMIT_S = 200.0
+TERMINATION_MODE = 10 << 16
 
 
 @pytest.fixture
@@ -179,11 +180,18 @@ def test_a_terminated_vehicle_may_be_terminated_again(flying: World) -> None:
     assert perform(flying, on_vehicle.terminate())[:2] == (Outcome.DONE, "flight terminated")
 
 
-@pytest.mark.parametrize(("state", "expected"), [(8, Outcome.DONE), (4, Outcome.REFUSED)])
-def test_px4_may_refuse_a_second_termination(state: int, expected: Outcome) -> None:
+@pytest.mark.parametrize(
+    ("state", "mode", "expected"),
+    [
+        (8, TERMINATION_MODE, Outcome.DONE),
+        (8, HOLD_MODE, Outcome.REFUSED),  # the kill switch
+        (4, HOLD_MODE, Outcome.REFUSED),
+    ],
+)
+def test_px4_may_refuse_a_second_termination(state: int, mode: int, expected: Outcome) -> None:
     """It refuses each change out of that mode, also the one into itself."""
     vehicle = Vehicle()
-    vehicle.send(heartbeat(base=129, state=state))
+    vehicle.send(heartbeat(base=129, mode=mode, state=state))
     run = ActionRun(on_vehicle.terminate(), lambda: vehicle.view, 1.0, Address(255, 190))
     assert [message.get_type() for message in run.poll(1.0)] == ["COMMAND_LONG"]
     refused = mavlink.MAVLink_command_ack_message(

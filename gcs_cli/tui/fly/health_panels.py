@@ -52,6 +52,8 @@ def _failsafe(view: VehicleView, colours: Palette) -> Text:
     reasons = [entry.text for entry in view.texts if entry.severity <= Severity.WARNING]
     state = (
         "flight terminated"
+        if view.terminated_for_good
+        else "rotors switched off"
         if view.terminated
         else reasons[-1].removeprefix("Failsafe: ")
         if reasons

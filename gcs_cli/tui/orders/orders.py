@@ -77,12 +77,18 @@ def in_air(view: VehicleView) -> bool:
     return view.armed and view.on_ground is not True
 
 
+def goes_on(view: VehicleView) -> bool:
+    """Return True unless the flight has ended for good."""
+    return not view.terminated_for_good
+
+
 def _flies(view: VehicleView) -> bool:
-    return in_air(view) and not view.terminated
+    return in_air(view) and goes_on(view)
 
 
-def _can_fly(view: VehicleView) -> bool:
-    return view.armed and not view.terminated
+def takes_orders(view: VehicleView) -> bool:
+    """Return True if the vehicle is armed and takes orders for its flight."""
+    return view.armed and goes_on(view)
 
 
 def _asks_to_arm(view: VehicleView) -> str:
@@ -98,7 +104,7 @@ def _asks_to_reboot(view: VehicleView) -> str:
 
 
 def _asks_to_terminate(view: VehicleView) -> str:
-    if view.terminated:
+    if view.terminated_for_good:
         return ""
     return f"Terminate the flight of {vehicle_name(view)}? The rotors stop at once, in the air too."
 
@@ -141,7 +147,7 @@ ORDERS = (
         on_vehicle.arm,
         (),
         _asks_to_arm,
-        lambda view: not (view.armed or view.terminated),
+        lambda view: not view.armed and goes_on(view),
         True,
     ),
     Order(
@@ -162,7 +168,7 @@ ORDERS = (
         "Arm and climb to an altitude above the ground",
         in_flight.takeoff,
         (_ALTITUDE._replace(default="5", is_optional=_has_takeoff_altitude, omitted="the vehicle's own"),),
-        applies=lambda view: not (in_air(view) or view.terminated),
+        applies=lambda view: not in_air(view) and goes_on(view),
         in_footer=True,
     ),
     Order("hold", "H", "Hold", "Hold the position", in_flight.hold, applies=_flies, in_footer=True),
@@ -187,7 +193,7 @@ ORDERS = (
             Field("longitude", "°", smallest=-180.0, largest=180.0),
             _ALTITUDE,
         ),
-        applies=_can_fly,
+        applies=takes_orders,
     ),
     Order(
         "speed",
@@ -196,6 +202,7 @@ ORDERS = (
         "Set the ground speed; without a value, the default",
         in_flight.speed,
         (Field("speed", "m/s", smallest=0.1, largest=100.0, is_optional=_always),),
+        applies=goes_on,
     ),
     Order(
         "yaw",
@@ -204,7 +211,7 @@ ORDERS = (
         "Turn to a heading",
         in_flight.yaw,
         (Field("heading", "° clockwise from north", smallest=0.0, largest=360.0),),
-        applies=_can_fly,
+        applies=takes_orders,
     ),
     Order(
         "mission",
@@ -214,6 +221,7 @@ ORDERS = (
         in_flight.start_mission,
         (),
         asks_to_start,
+        goes_on,
     ),
     Order(
         "mode",
@@ -222,6 +230,7 @@ ORDERS = (
         "Select a flight mode",
         on_vehicle.select_mode,
         (Field("mode", choices=lambda view: list(on_vehicle.mode_choices(view))),),
+        applies=goes_on,
     ),
     Order(
         "sethome",
