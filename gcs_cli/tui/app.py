@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import itertools
 import signal
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
@@ -29,6 +28,7 @@ from gcs_cli.tui.palette import DARK, LIGHT, Palette, monochrome, palette_of
 from gcs_cli.tui.plot.fields import PlotFields
 from gcs_cli.tui.screens import SCREENS
 from gcs_cli.tui.watch_screen import WatchScreen
+from gcs_cli.tui.widgets.live_dialog import LiveDialog
 from gcs_cli.vehicle.view_types import VehicleView
 
 
@@ -54,8 +54,9 @@ THEMES = (_theme("gcs-dark", DARK, dark=True), _theme("gcs-light", LIGHT, dark=F
 
 REDRAWS_HZ = 5.0
 """Redraws of the screen a second. Fly at 200x50 takes 7.4 % of a core, about half of it for them."""
-COVERED_EVERY = 5
-"""A screen below a dialog is drawn in every fifth redraw: Textual then composes all of both screens."""
+COVERED_EVERY = 4
+"""A screen below a dialog is drawn in one of so many redraws: Textual then composes all of both screens. An even
+number, because parts of a screen are drawn in every other redraw."""
 _ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -126,8 +127,7 @@ class WatchApp(App[None]):
         self.run_worker(self.keys.run(), group="keys")
         self.feed.start()
         self.switch_mode(self._first_mode)
-        beats = itertools.count()
-        self.set_interval(1 / REDRAWS_HZ, lambda: self.redraw(draws_covered=next(beats) % COVERED_EVERY == 0))
+        self.set_interval(1 / REDRAWS_HZ, self.redraw)
 
     async def on_event(self, event: Event) -> None:
         """Handle an event; an input of the user waits for the effect of the one before."""
@@ -140,8 +140,8 @@ class WatchApp(App[None]):
         """End the thread of the link."""
         self.feed.stop()
 
-    def redraw(self, *, draws_covered: bool = True) -> None:
-        """Draw the newest state on the visible screen, and on one that a dialog covers; end if the link failed."""
+    def redraw(self) -> None:
+        """Draw the newest state on the visible screen, less often below a dialog; end if the link failed."""
         if not self.is_running:  # the screens are being removed
             return
         if self.feed.error is not None:
@@ -152,19 +152,20 @@ class WatchApp(App[None]):
             notice = self.feed.notices.popleft()
             self.notify(notice.text, severity=_toast_severity(notice.severity), markup=False)
         targets = [
-            (each.identity, each.armed, each.landed_state, each.terminated) for each in self.feed.targets
+            (each.identity, each.armed, each.landed_state, each.terminated_for_good)
+            for each in self.feed.targets
         ]
         state = (view.identity, targets, len(self.feed.views))
         if state != self._state:  # other keys work
             self._state = state
             self.refresh_bindings()
         screens = self.screen_stack  # empty while a mode begins
-        draws = draws_covered or len(screens) == 1
-        if screens and draws and isinstance(screens[0], WatchScreen) and screens[0].is_composed:
-            screens[0].show(view, self.feed.now_s)
+        if screens and isinstance(screens[0], WatchScreen) and screens[0].is_composed:
+            if len(screens) == 1 or self.redraws % COVERED_EVERY == 0:
+                screens[0].show(view, self.feed.now_s)
             self.redraws += 1
-        if screens and isinstance(screens[-1], VehicleList):
-            screens[-1].update(self.feed.views, self.feed.now_s)
+        if screens and isinstance(screens[-1], LiveDialog):
+            screens[-1].follow()
         for screen in screens:
             if (
                 screen.outer_size != self.size
@@ -234,7 +235,7 @@ class WatchApp(App[None]):
     @work(exclusive=True, group="vehicles")
     async def action_vehicles(self) -> None:
         """Select the vehicle to show and to command, or all for commands."""
-        chosen = await self.push_screen_wait(VehicleList(self.feed.views, self.feed.now_s))
+        chosen = await self.push_screen_wait(VehicleList())
         if chosen is not None:
             self.feed.select(None if chosen == ALL else chosen)
 

@@ -143,7 +143,7 @@ def test_field_list_shows_fields_and_values_that_arrive_while_it_is_open():
             named = mavlink.MAVLink_named_value_float_message(0, name, value)
             app.feed.history.record(received(named), END_S)
             app.redraws = 0
-            screen.show(VIEW, END_S)
+            picker.follow()
             await pilot.pause()
             assert any(f"{value:.3f}" in line for line in shown(app)), shown(app)
         assert picker.shown[picker.query_one(RowList).cursor] == selected

@@ -10,8 +10,10 @@ from textual.screen import Screen
 from textual.strip import Strip
 from textual.widget import Widget
 
-from gcs_cli.tui.app import REDRAWS_HZ, WatchApp
+from gcs_cli.tui.app import COVERED_EVERY, REDRAWS_HZ, WatchApp
+from gcs_cli.tui.fly.screen import FlyScreen
 from gcs_cli.tui.key_bar import KeyBar
+from gcs_cli.tui.plot.field_picker import FieldPicker
 from gcs_cli.tui.screens import SCREENS, ScreenEntry
 from gcs_cli.tui.widgets.drawing import KeepsLines, LinesWidget
 from gcs_cli.tui.widgets.line_list import LineList
@@ -142,20 +144,38 @@ def test_redraw_renders_only_widgets_that_changed(
     play(story, size=(120, 35))
 
 
-def test_a_covered_screen_is_drawn_less_often() -> None:
+def test_a_covered_screen_is_drawn_less_often(monkeypatch: pytest.MonkeyPatch) -> None:
     """Textual composes the dialog and all below it for each change."""
+    drawn = []
+    monkeypatch.setattr(FlyScreen, "show", lambda *_: drawn.append(0))
 
     async def story(app: WatchApp, pilot: Pilot) -> None:
-        await pilot.pause(2 / REDRAWS_HZ)
-        before = app.redraws
-        app.redraw(draws_covered=False)
-        assert app.redraws == before + 1
+        await pilot.pause()
+        drawn.clear()
+        for _ in range(COVERED_EVERY):
+            app.redraw()
+        assert len(drawn) == COVERED_EVERY
         await pilot.press("X")
         await pilot.pause()
-        before = app.redraws
-        app.redraw(draws_covered=False)
-        assert app.redraws == before
-        app.redraw()
-        assert app.redraws == before + 1
+        drawn.clear()
+        for _ in range(3 * COVERED_EVERY):
+            app.redraw()
+        assert len(drawn) == 3
+
+    play(story)
+
+
+def test_a_dialog_with_live_values_follows_at_its_own_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+    followed = []
+    monkeypatch.setattr(FieldPicker, "_load", lambda _: followed.append(0))
+
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await pilot.press("4", "enter")
+        await pilot.pause()
+        assert isinstance(app.screen, FieldPicker)
+        followed.clear()
+        for _ in range(10):
+            app.redraw()
+        assert len(followed) == 5
 
     play(story)

@@ -6,11 +6,12 @@ from typing import ClassVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.screen import ModalScreen
 from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
 from gcs_cli.tui.fly.panels import height_m
+from gcs_cli.tui.widgets.drawing import watch_app
+from gcs_cli.tui.widgets.live_dialog import LiveDialog
 from gcs_cli.vehicle.field_units import UNKNOWN, number
 from gcs_cli.vehicle.view_types import VehicleView
 
@@ -18,7 +19,7 @@ ALL = 0
 """Result if the orders go to all vehicles; no system has this id."""
 
 
-class VehicleList(ModalScreen[int | None]):
+class VehicleList(LiveDialog[int | None]):
     """Asks for a vehicle; the result is its system id, ``ALL``, or None."""
 
     DEFAULT_CSS = """
@@ -28,22 +29,22 @@ class VehicleList(ModalScreen[int | None]):
     AUTO_FOCUS = "OptionList"
     BINDINGS: ClassVar = [Binding("escape", "cancel", "Cancel")]
 
-    def __init__(self, views: tuple[VehicleView, ...], now_s: float) -> None:
-        super().__init__()
-        self._views, self._now_s = views, now_s
-
     def compose(self) -> ComposeResult:
         """Yield the list."""
-        listed = OptionList(*_options(self._views, self._now_s), markup=False)
+        listed = OptionList(*self._options(), markup=False)
         listed.border_title = "Vehicles"
         yield listed
 
-    def update(self, views: tuple[VehicleView, ...], now_s: float) -> None:
+    def _options(self) -> list[Option]:
+        feed = watch_app(self).feed
+        return _options(feed.views, feed.now_s)
+
+    def follow(self) -> None:
         """Show the vehicles of now; the selected one stays selected."""
         if not self.is_mounted:  # it was opened just now
             return
         listed = self.query_one(OptionList)
-        options = _options(views, now_s)
+        options = self._options()
         if [option.prompt for option in options] == [option.prompt for option in listed.options]:
             return
         before = None if listed.highlighted_option is None else listed.highlighted_option.id

@@ -10,11 +10,15 @@ from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
 from textual.events import Click
-from textual.screen import ModalScreen
 from textual.widgets import Input, Label
 
+from gcs_cli.tui.widgets.drawing import watch_app
 from gcs_cli.tui.widgets.fuzzy import Match, search
+from gcs_cli.tui.widgets.live_dialog import LiveDialog
 from gcs_cli.tui.widgets.row_list import RowList
+
+_EVERY = 2
+"""Followed in one of so many redraws: faster figures cannot be read."""
 
 
 class Choice(NamedTuple):
@@ -45,7 +49,7 @@ class _Names(RowList, can_focus=False):
             self.post_message(self.Chosen())
 
 
-class FieldPicker(ModalScreen[None]):
+class FieldPicker(LiveDialog[None]):
     """Enter toggles the selected name; the list stays open until Escape.
 
     ``choices`` returns the names now, ``toggle`` adds or removes one and returns a reason if it cannot.
@@ -92,9 +96,9 @@ class FieldPicker(ModalScreen[None]):
         """The names that match, best first."""
         return [match.name for match in self._found]
 
-    def update(self) -> None:
+    def follow(self) -> None:
         """Show the names and values of now; the selected name stays selected."""
-        if not self.is_mounted:  # it was opened just now
+        if not self.is_mounted or watch_app(self).redraws % _EVERY:  # opened just now, or too soon
             return
         rows = self.query_one(_Names)
         before = self._found[rows.cursor].name if self._found else ""

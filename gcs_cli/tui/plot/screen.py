@@ -22,8 +22,6 @@ _SPANS_S = (5.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0)
 _EVERY = 2
 """Drawn in one of so many redraws, and at once when the user moves the cursor."""
 
-_PICKER_EVERY = 2
-
 _LONGEST_STEP_S = 1.0
 
 
@@ -136,11 +134,8 @@ class PlotScreen(WatchScreen):
         return watch_app(self).plot_fields
 
     def show(self, view: VehicleView, now_s: float) -> None:
-        """Draw the curves up to now, unless paused; show new fields in the open list."""
+        """Draw the curves up to now, unless paused."""
         super().show(view, now_s)
-        picker = self.app.screen
-        if isinstance(picker, FieldPicker) and watch_app(self).redraws % _PICKER_EVERY == 0:
-            picker.update()
         if self._is_paused or watch_app(self).redraws % _EVERY:
             return
         if self.plot.step_end(now_s) > self.plot.end_s or watch_app(self).redraws == 0:
