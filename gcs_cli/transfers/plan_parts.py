@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Generator, Sequence
 from typing import NamedTuple
 
@@ -203,7 +204,10 @@ class Uploads:
         self._is_restoring = True
         replaced = [part for part in before if self._holds[part.kind] != _FORMER]
         if replaced:
-            self._on_restore()
+            with contextlib.suppress(
+                OSError
+            ):  # a pipe without a reader; the plans count more than the notice
+                self._on_restore()
         for part in replaced:
             answer = yield from self._send(part, _FORMER)
             if not answer.accepted:

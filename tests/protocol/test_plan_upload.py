@@ -53,6 +53,7 @@ class World:
         self.autopilot: int = mavlink.MAV_AUTOPILOT_PX4
         self.restores: list[int] = []
         """Number of heard messages when the former plans were begun to be restored."""
+        self.on_restore: Callable[[], object] = lambda: self.restores.append(len(self.heard))
         self.heard: list[Message] = []
 
     @property
@@ -115,7 +116,7 @@ class World:
             plan,
             restores=restores,
             interrupted=lambda: "interrupted" * interrupted(),
-            on_restore=lambda: self.restores.append(len(self.heard)),
+            on_restore=self.on_restore,
         )
         self.uploads = uploads
         end_s = self.now_s + 300.0
@@ -240,6 +241,19 @@ def test_an_interrupt_leaves_a_mission_that_was_not_replaced() -> None:
     counts = [message for message in world.heard if message.get_type() == "MISSION_COUNT"]
     assert [message.mission_type for message in counts] == [FENCE, FENCE]
     assert world.heard[world.restores[0]] is counts[1]
+
+
+def test_plans_are_restored_although_the_notice_has_no_reader() -> None:
+    def fail() -> None:
+        raise BrokenPipeError
+
+    world = World()
+    world.hold(OLD)
+    world.on_restore = fail
+    interrupted = lambda: world.plans[FENCE] == ELSEWHERE  # noqa: E731
+    answer = world.upload(Plan(mission(2, mark=1), fence=ELSEWHERE), interrupted=interrupted)
+    assert answer.reason == "interrupted; the vehicle holds its former plans"
+    assert world.plans == {MISSION: OLD.items, FENCE: OLD.fence, RALLY: OLD.rally}
 
 
 def test_nothing_is_restored_before_a_part_was_replaced() -> None:
