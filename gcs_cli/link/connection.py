@@ -117,7 +117,7 @@ class Connection:
         """Called in every step after the messages were received."""
         self._is_lent = False
         self._server: ShareServer | None = None
-        self._share_due_s = -math.inf if isinstance(line, SharedLine) else math.inf
+        self._share_due_s = math.inf
 
     @property
     def session(self) -> Session:
@@ -176,17 +176,17 @@ class Connection:
     def share(self) -> None:
         """Serve this link to other ``gcs`` processes of this user, until the connection is closed.
 
-        A connection that began on the link of another process does so once it has opened the endpoint itself.
+        A connection that began on the link of another process does so by itself once it has opened the endpoint.
         """
-        if not self.is_recording:
+        if not (self.is_recording or isinstance(self._line, SharedLine)):
             self._share_due_s = -math.inf
 
     def _serve(self, now_s: float) -> None:
+        if self._server is None and isinstance(self._line, SharedLine):
+            self._server = self._line.server
         if self._server is not None:
             for frame in self._server.receive(now_s):
                 self._forward(frame)
-        elif isinstance(self._line, SharedLine) and not self._line.is_own:
-            return  # a server of a link that another process serves would be its own client
         elif now_s >= self._share_due_s:  # another process may serve it, and end
             self._share_due_s = now_s + _SHARE_PERIOD_S
             self._server = ShareServer.open(self.endpoint)

@@ -8,6 +8,7 @@ MAVProxy's ``--out``. The socket is in a folder that only its user can enter.
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import hashlib
 import os
 import re
@@ -66,6 +67,20 @@ def _connected(path: Path) -> socket.socket | None:
     return made
 
 
+def _locked(path: Path) -> int | None:
+    """Return the descriptor of the file at ``path``, locked until it is closed; None if another process has it."""
+    try:
+        lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(lock)
+        return None
+    return lock
+
+
 def open_shared(endpoint: VehicleEndpoint) -> Line | None:
     """Return the link of another ``gcs`` that uses ``endpoint``; None if there is none."""
     connected = _connected(share_path(endpoint))
@@ -73,9 +88,9 @@ def open_shared(endpoint: VehicleEndpoint) -> Line | None:
 
 
 class SharedLine:
-    """A client of another process's link. When that process ends, it opens the endpoint itself.
+    """A client of another process's link. When that process ends, it opens the endpoint itself, and serves the others.
 
-    Several clients may lose the link at once: the one whose link then ``is_own`` serves the others.
+    Several clients lose the link at once. The one that may serve opens the endpoint: a TCP link can be opened twice.
     """
 
     def __init__(self, endpoint: VehicleEndpoint, connected: socket.socket) -> None:
@@ -84,11 +99,8 @@ class SharedLine:
         self._line: Line = self._shared
         self._closed: list[Address] = []
         self._retry_s = 0.0
-
-    @property
-    def is_own(self) -> bool:
-        """True once it has opened the endpoint itself."""
-        return self._shared is None
+        self.server: ShareServer | None = None
+        """Serves the others once it has opened the endpoint itself."""
 
     @property
     def peers(self) -> Sequence[Address]:
@@ -126,9 +138,16 @@ class SharedLine:
         if connected is not None:
             self._line = self._shared = StreamLine(socket.AF_UNIX, None, _SHARED, connected)
             return
-        with contextlib.suppress(CliError):  # another process may be faster
+        server = ShareServer.open(self._endpoint)
+        if server is None:  # another process begins to serve
+            return
+        try:
             self._line, self._shared = open_line(self._endpoint), None
-            self._closed.append(_SHARED)
+        except CliError:
+            server.close()
+            return
+        self.server = server
+        self._closed.append(_SHARED)
 
     def send(self, data: bytes, peer: Address) -> None:
         """Send one frame."""
@@ -147,32 +166,32 @@ class SharedLine:
 class ShareServer:
     """Serves the link of ``endpoint`` to other processes of the same user."""
 
-    def __init__(self, listener: socket.socket, path: Path) -> None:
+    def __init__(self, listener: socket.socket, path: Path, lock: int) -> None:
+        """``lock`` is the descriptor of the locked file that lets one process only serve an endpoint."""
         self.listener = listener
-        self._path = path
+        self._path, self._lock = path, lock
         self._clients: list[tuple[StreamLine, FrameReader]] = []
 
     @classmethod
     def open(cls, endpoint: VehicleEndpoint) -> ShareServer | None:
         """Listen; return None if another process serves this endpoint, or if no socket can be made."""
         path = share_path(endpoint)
+        with contextlib.suppress(OSError):
+            path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        lock = _locked(path.with_suffix(".lock")) if _is_private(path.parent) else None
+        if lock is None:
+            return None
         listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
-            path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            other = _connected(path)
-            if other is not None or not _is_private(path.parent):
-                if other is not None:
-                    other.close()
-                listener.close()
-                return None
             path.unlink(missing_ok=True)  # of a process that was killed
             listener.setblocking(False)
             listener.bind(str(path))
             listener.listen(_BACKLOG)
         except OSError:
             listener.close()
+            os.close(lock)
             return None
-        return cls(listener, path)
+        return cls(listener, path, lock)
 
     def interests(self) -> Iterable[Interest]:
         """Return the descriptors to wait for."""
@@ -197,9 +216,10 @@ class ShareServer:
             line.send(data, _SHARED)
 
     def close(self) -> None:
-        """Close all connections and remove the socket."""
-        for line, _ in self._clients:
-            line.close()
-        self.listener.close()
+        """Remove the socket and close all connections; the clients look for the next server at once."""
         with contextlib.suppress(OSError):
             self._path.unlink()
+        self.listener.close()
+        os.close(self._lock)
+        for line, _ in self._clients:
+            line.close()

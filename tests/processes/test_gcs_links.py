@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -163,28 +165,34 @@ def test_second_process_takes_the_link_over_when_the_first_ends() -> None:
             assert second.wait_for(lambda: second.session.view.link.received > received + 20, LONG_S)
 
 
-def test_process_that_takes_the_link_over_serves_the_others() -> None:
-    port, vehicle = free_port(), FakeVehicle()
-    endpoint = parse_endpoint(f"udp:{port}")
+@pytest.mark.parametrize("kind", ["udp", "tcp"])
+def test_process_that_takes_the_link_over_serves_the_others(kind: str) -> None:
+    """All clients lose the link at once. A TCP vehicle with room for one client hears one of them only."""
+    vehicle, port = FakeVehicle(), free_port()
 
     def shared() -> Connection:
         line = open_shared(endpoint)
         assert line is not None
         return Connection(endpoint, line=line)
 
-    with udp_vehicles(vehicle, to_port=port):
+    serving = udp_vehicles(vehicle, to_port=port) if kind == "udp" else tcp_server(vehicle)
+    with serving as served:
+        endpoint = parse_endpoint(f"udp:{port}" if kind == "udp" else f"tcp:127.0.0.1:{served}")
         with Connection(endpoint) as first:
             first.share()
             first.wait_for_vehicle(LONG_S)
-            first.step(first.now_s)
             second, third = shared(), shared()
             with running(lambda: first.step(first.now_s + 0.05)):
                 second.wait_for_vehicle(LONG_S)
                 third.wait_for_vehicle(LONG_S)
-        received = [each.session.view.link.received for each in (second, third)]
+        before = [each.session.view.link.received for each in (second, third)]
+
+        def both_hear() -> bool:
+            now = [each.session.view.link.received for each in (second, third)]
+            return now[0] > before[0] + 20 and now[1] > before[1] + 20
+
         with second, third, running(lambda: second.step(second.now_s + 0.05)):
-            assert third.wait_for(lambda: third.session.view.link.received > received[1] + 20, LONG_S)
-            assert second.session.view.link.received > received[0]
+            assert third.wait_for(both_hear, LONG_S)
 
 
 def test_process_without_the_link_does_not_serve_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -218,14 +226,28 @@ def test_shared_link_needs_a_private_folder() -> None:
 
 def test_socket_of_a_killed_process_is_replaced() -> None:
     endpoint = parse_endpoint("udp:14550")
-    first = ShareServer.open(endpoint)
-    assert first is not None
-    assert ShareServer.open(endpoint) is None
-    first.listener.close()
+    serve = "ShareServer.open(parse_endpoint('udp:14550')); os.kill(os.getpid(), signal.SIGKILL)"
+    imports = f"import os, signal; from {__name__} import ShareServer, parse_endpoint"
+    assert subprocess.run([sys.executable, "-c", f"{imports}; {serve}"], check=False).returncode == -9
+    assert share_path(endpoint).exists()
     second = ShareServer.open(endpoint)
     assert second is not None
     second.close()
     assert not share_path(endpoint).exists()
+
+
+def test_one_process_only_serves_an_endpoint_and_its_end_leaves_the_next_ones_socket() -> None:
+    endpoint = parse_endpoint("udp:14550")
+    first = ShareServer.open(endpoint)
+    assert first is not None
+    assert ShareServer.open(endpoint) is None
+    first.close()
+    second = ShareServer.open(endpoint)
+    assert second is not None
+    client = open_shared(endpoint)
+    assert client is not None
+    client.close()
+    second.close()
 
 
 def test_server_drops_a_client_that_disconnected() -> None:
