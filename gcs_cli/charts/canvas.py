@@ -128,10 +128,12 @@ class Canvas:
                 self._text_styles[row, offset] = index
 
     def label_near(self, column: int, row: int, text: str, style: str = "") -> None:
-        """Write ``text`` at a cell, or around it if other text is there; nowhere if all around is taken.
+        """Write ``text`` at a cell of the canvas, or around it if other text is there; nowhere if all is taken.
 
         A cell between two labels stays free: 1 beside 18 is not 118.
         """
+        if not (0 <= column < self.width and 0 <= row < self.height):
+            return
         length = len(text)
         for dx, dy in ((0, 0), (2, 0), (-length - 1, 0), (0, -1), (0, 1), (2, -1), (2, 1), (4, 0)):
             if self._is_free(column + dx, row + dy, length):

@@ -104,7 +104,8 @@ def test_a_label_without_room_is_left_out():
     canvas = Canvas(3, 1)
     canvas.label_near(1, 0, "1")
     canvas.label_near(1, 0, "2")
-    canvas.label_near(9, 9, "3")
+    for outside in ((-1, 0), (-2, 0), (3, 0), (4, 0), (1, -1), (1, 1)):
+        canvas.label_near(*outside, "3")
     assert shown(canvas) == " 1"
 
 
