@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Awaitable, Callable
-from typing import Any, TypeAlias
+from io import TextIOWrapper
+from typing import IO, Any, TypeAlias, cast
 
 from textual.app import App
 from textual.dom import DOMNode
@@ -76,12 +77,49 @@ class KeyQueue:
         await asyncio.sleep(0)  # an action that asks begins as a task
 
 
+class LastingFile:
+    """A file whose writing has no effect once it fails: a terminal that was closed, or whose connection ended.
+
+    The thread that writes for Textual ends at an error, and the program then waits forever for room in its queue.
+    ``on_lost`` is called at each failure.
+    """
+
+    def __init__(self, file: IO[str], on_lost: Callable[[], object]) -> None:
+        self._file, self._on_lost = file, on_lost
+
+    def write(self, text: str) -> int:
+        """Write ``text`` as far as that is possible."""
+        self._try(lambda: self._file.write(text))
+        return len(text)
+
+    def flush(self) -> None:
+        """Flush as far as that is possible."""
+        self._try(self._file.flush)
+
+    def fileno(self) -> int:
+        """Return the descriptor."""
+        return self._file.fileno()
+
+    def _try(self, call: Callable[[], object]) -> None:
+        try:
+            call()
+        except OSError:
+            self._on_lost()
+
+
 class TerminalDriver(LinuxDriver):
-    """Leaves the application mode before it enters it again.
+    """Ends also without its terminal, and leaves the application mode before it enters it again.
 
     SIGSTOP and a stop by the shell call no handler. Textual starts a second thread that reads the keys when the process
     continues, and the end of the program waits for the first one until another key is pressed.
     """
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self._file = cast(TextIOWrapper, LastingFile(cast(IO[str], self._file), self._end))
+
+    def _end(self) -> None:
+        self._app.call_later(self._app.exit)
 
     def _sigcont_application(self, *arguments: object) -> None:
         if self._auto_restart and not self._must_signal_resume:

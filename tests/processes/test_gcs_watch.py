@@ -118,6 +118,15 @@ def test_the_end_restores_the_terminal(link: list[str], ending: bytes | signal.S
         assert b"Traceback" not in screen.seen
 
 
+@pytest.mark.parametrize("is_own", [True, False], ids=["SIGHUP", "no signal"])
+def test_the_view_ends_with_its_terminal(link: list[str], is_own: bool) -> None:
+    with terminal(["-m", "gcs_cli", "watch", *link], is_own=is_own) as screen:
+        screen.read_until(b"Position")
+        screen.type(b"1234567" * 20)  # more than the terminal holds, which nobody reads
+        screen.hang_up()
+        assert screen.process.wait(LONG_S) == 0
+
+
 def test_an_exception_restores_the_terminal(link: list[str]) -> None:
     with terminal(["-c", FAILING, "watch", *link]) as screen:
         screen.read_until(b"drawing failed")

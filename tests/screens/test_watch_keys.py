@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import asyncio
+import errno
+import io
+import threading
+from typing import IO, cast
 
 import pytest
+from textual.drivers._writer_thread import WriterThread
 from textual.events import Key, Paste
 from textual.pilot import Pilot
 from textual.widgets import Input
 
 from gcs_cli.tui.app import WatchApp
+from gcs_cli.tui.input import LastingFile
 from gcs_cli.tui.orders.form import Confirm, OrderForm
 from tests.support.pilots import type_ahead
 from tests.support.screens import shown
 from tests.support.watch_plays import GROUNDED, asked, play
+
+LONG_S = 60
+"""Hang guard [s]."""
 
 
 def test_keys_typed_ahead_reach_the_form_that_opens() -> None:
@@ -125,3 +134,27 @@ def test_click_on_the_end_of_a_key_presses_that_key(monkeypatch: pytest.MonkeyPa
 
     play(story)
     assert pressed == ["ctrl+p"]
+
+
+def test_output_without_a_terminal_does_not_hold_up_the_program() -> None:
+    class Gone(io.StringIO):
+        def write(self, _text: str) -> int:
+            raise OSError(errno.EIO, "the terminal is gone")
+
+        def flush(self) -> None:
+            raise OSError(errno.EIO, "the terminal is gone")
+
+    lost: list[int] = []
+    writer = WriterThread(cast(IO[str], LastingFile(Gone(), lambda: lost.append(0))))
+    writer.start()
+
+    def write() -> None:
+        for _ in range(100):
+            writer.write("text")
+        writer.stop()
+
+    program = threading.Thread(target=write, daemon=True)
+    program.start()
+    program.join(LONG_S)
+    assert not program.is_alive()
+    assert lost

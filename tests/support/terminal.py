@@ -25,12 +25,13 @@ os.execv(sys.executable, [sys.executable, *sys.argv[1:]])
 class Terminal:
     """A process on a terminal of its own."""
 
-    def __init__(self, arguments: list[str]) -> None:
+    def __init__(self, arguments: list[str], *, is_own: bool = True) -> None:
+        """The process gets SIGHUP when a terminal of its own ends."""
         self._terminal, self._inner = pty.openpty()
         self._before = termios.tcgetattr(self._inner)
         self.process = subprocess.Popen(
-            [sys.executable, "-c", ON_ITS_TERMINAL, *arguments],
-            stdin=self._inner, stdout=self._inner, stderr=self._inner,
+            [sys.executable, *(["-c", ON_ITS_TERMINAL] if is_own else []), *arguments],
+            stdin=self._inner, stdout=self._inner, stderr=self._inner, start_new_session=not is_own,
             env={**os.environ, "TERM": "xterm-256color", "COLUMNS": "80", "LINES": "24"},
         )  # fmt: skip
         self.seen = b""
@@ -43,6 +44,12 @@ class Terminal:
     def type(self, keys: bytes) -> None:
         os.write(self._terminal, keys)
 
+    def hang_up(self) -> None:
+        """Close the terminal as its window or its connection does."""
+        os.close(self._terminal)
+        os.close(self._inner)
+        self._terminal = self._inner = -1
+
     @property
     def is_restored(self) -> bool:
         """True if the main screen, the cursor, the mouse and the line discipline are as before."""
@@ -52,13 +59,13 @@ class Terminal:
     def close(self) -> None:
         self.process.kill()
         self.process.wait()
-        os.close(self._terminal)
-        os.close(self._inner)
+        if self._terminal >= 0:
+            self.hang_up()
 
 
 @contextmanager
-def terminal(arguments: list[str]) -> Iterator[Terminal]:
-    made = Terminal(arguments)
+def terminal(arguments: list[str], *, is_own: bool = True) -> Iterator[Terminal]:
+    made = Terminal(arguments, is_own=is_own)
     try:
         yield made
     finally:
