@@ -33,6 +33,8 @@ CLIMBED_M = 0.3
 NOISY = 40
 """Changes of the pressure in turn, 2 s at the interval of the health, that show the noise of a barometer; the rotors
 of a vehicle that has landed stop sooner."""
+IDEAL = 3
+"""Equal pressures in turn that show a barometer without noise: two are equal by chance once in a hundred."""
 ACCURATE_SHARE, ACCURATE_S = 0.8, 1.0
 """Share of the limit below which an inaccurate position is accurate again, after this time there."""
 
@@ -133,6 +135,8 @@ class PressureTrack(NamedTuple):
     changes: int = 0
     is_ideal: bool = False
     """True if the pressure has repeated itself on the ground: a simulator's ideal barometer does at rest."""
+    repeats: int = 0
+    """Equal pressures in turn on the ground."""
 
     def is_stuck(self, landed: bool, height_m: float, time_s: float) -> bool:
         """Return True if the pressure should have changed: by its noise, or in a climb or descent."""
@@ -152,7 +156,10 @@ def pressure_step(
         return PressureTrack(pressure_hpa, time_s, height_m, changes, memory.is_ideal and changes < NOISY)
     if not landed or memory.changes == NOISY:
         return memory
-    return memory._replace(changes=0, height_m=height_m, is_ideal=True)
+    repeats = memory.repeats + 1
+    if repeats < IDEAL:
+        return memory._replace(height_m=height_m, repeats=repeats)
+    return memory._replace(changes=0, height_m=height_m, is_ideal=True, repeats=repeats)
 
 
 class Accuracy(NamedTuple):
