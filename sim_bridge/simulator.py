@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from flightstack.core.geodesy import GeoPoint
+from flightstack.core.periods import next_due
 from flightstack.mavlink.frames import HEADER_V2
 from flightstack.params.vehicle import Vehicle
 from flightstack.simulator_link.battery_frame import encode_battery
@@ -141,7 +142,7 @@ class Simulator:
         battery = self.plant.battery
         if self.time_us < self._battery_due_us or battery is None or self.vehicle.battery is None:
             return b""
-        self._battery_due_us = (self.time_us // BATTERY_INTERVAL_US + 1) * BATTERY_INTERVAL_US
+        self._battery_due_us = next_due(self.time_us, BATTERY_INTERVAL_US)
         report = battery_report(battery, self.vehicle.battery.cells)
         seq, self._battery_seq = self._battery_seq, (self._battery_seq + 1) & 255
         return encode_battery(report, seq, self._system_id, SIMULATOR_COMPONENT)

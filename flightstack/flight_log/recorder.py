@@ -21,6 +21,7 @@ from flightstack.core.contract import (
 )
 from flightstack.core.enums import NAVIGATION_STATE
 from flightstack.core.geodesy import GeoPoint
+from flightstack.core.periods import next_due
 from flightstack.flight_log.flight_log import FlightLog
 from flightstack.flight_log.topics import (
     ARMING_STATE_ARMED,
@@ -114,7 +115,7 @@ class FlightRecorder:
         if len(self.estimate):
             row[OUTER.size :] = self.estimate
         if time_us >= self._battery_due_us:
-            self._battery_due_us = time_us + _BATTERY_INTERVAL_US
+            self._battery_due_us = next_due(time_us, _BATTERY_INTERVAL_US)
             self._write_battery(time_us)
 
     def _write_battery(self, time_us: int) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from flightstack.core.compiled import plain
 from flightstack.core.contract import FloatArray, Vector3
 from flightstack.core.geodesy import GeoPoint, LocalFrame
+from flightstack.core.periods import next_due
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import Sample
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, MagSample, RangeSample
@@ -137,12 +138,12 @@ class SensorRecorder:
         log = self._log
         if log is None or time_us < self._truth_us:
             return
-        self._truth_us = time_us + TRUTH_INTERVAL_US
+        self._truth_us = next_due(time_us, TRUTH_INTERVAL_US)
         state = truth()
         if state is not None:
             self._record_truth(log, time_us, state)
         if time_us >= self._estimator_us:
-            self._estimator_us = time_us + ESTIMATOR_INTERVAL_US
+            self._estimator_us = next_due(time_us, ESTIMATOR_INTERVAL_US)
             sensed = sense()
             fill_estimator(log.sampled[ESTIMATOR.name].append(time_us), sensed)
             if sensed.report.wind_is_observed:
@@ -156,12 +157,12 @@ class SensorRecorder:
 
     def local_position(self, time_us: int, sensed: Sensed) -> None:
         """Update what the next rows of the outer loop record of the estimate; also call after a reset."""
-        self._local_us = time_us + LOCAL_INTERVAL_US
+        self._local_us = next_due(time_us, LOCAL_INTERVAL_US)
         fill_local_position(self._recorder.estimate, sensed)
 
     def _record_truth(self, log: FlightLog, time_us: int, truth: FloatArray) -> None:
         plain(store_truth)(log.sampled[TRUTH_GROUP.name].append(time_us), truth, self.offset_m)
         if time_us >= self._global_us:
-            self._global_us = time_us + GLOBAL_INTERVAL_US
+            self._global_us = next_due(time_us, GLOBAL_INTERVAL_US)
             place = self._true_frame.to_geo(Vector3(*truth[:3].tolist()))
             log.sampled[TRUTH_GLOBAL_GROUP.name].append(time_us)[:] = place

@@ -12,6 +12,7 @@ from flightstack.control.backend import ControlBackend
 from flightstack.core.contract import FloatArray, Vector3
 from flightstack.core.enums import Severity
 from flightstack.core.geodesy import earth_field_ned_gauss
+from flightstack.core.periods import next_due
 from flightstack.core.portable_math import distance
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits, tuning_of
@@ -259,7 +260,7 @@ class Estimation:
 
     def _update_health(self, time_us: int) -> None:
         now, users = self._now, self._users
-        self._health_due_us = time_us + HEALTH_US
+        self._health_due_us = next_due(time_us, HEALTH_US)
         limit_m = now.behaviour.position_accuracy_m
         self.health, is_selected = self._lanes.update(now.has_state, limit_m, time_us)
         if is_selected:

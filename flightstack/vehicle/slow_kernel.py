@@ -121,5 +121,5 @@ def log_truth(slow: Any, time_us: int, following: Any) -> None:
     if time_us < marks[TRUTH_US]:
         return
     state, offset_m, interval_us = slow[6]
-    marks[TRUTH_US] = time_us + interval_us
+    marks[TRUTH_US] = (time_us // interval_us + 1) * interval_us
     store_truth(_log_row(following[4], marks, TRUTH_ROWS, time_us), state, offset_m)

@@ -21,6 +21,7 @@ import numpy as np
 
 from flightstack.core.contract import FloatArray, RecordArray
 from flightstack.core.geodesy import GeoPoint, LocalFrame, earth_field_ned_gauss
+from flightstack.core.periods import next_due
 from flightstack.core.portable_math import sin_cos
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.fields import whole
@@ -285,7 +286,7 @@ class SensorSuite:
         for slot, period_us, channel, measure, send in self._sensors:
             out, is_direct = None, channel.is_direct
             if time_us >= due_us[slot]:
-                due_us[slot] = (time_us // period_us + 1) * period_us
+                due_us[slot] = next_due(time_us, period_us)
                 out = measure(time_us)
                 if not is_direct:
                     out = channel.pass_on(time_us, out if isinstance(out, tuple) else out.copy())

@@ -72,8 +72,7 @@ def timer(world: World) -> None:
     """Act at a time between two exchanges."""
     world.takeoff(3.0)
     world.after(3.333, lambda: world.fault("rotor:1:weak=0.8"))
-    world.run_for(5.0)
-    world.run_on(0.5)
+    world.run_for(5.5)
 
 
 def power_cycle(world: World) -> None:
