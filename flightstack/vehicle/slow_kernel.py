@@ -11,6 +11,7 @@ from typing import Any
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
 from flightstack.core.kernel_calls import call_kernel, call_kernel_float
+from flightstack.core.periods import take_due
 from flightstack.flight_log.sensor_rows import store_baro, store_mag, store_truth
 
 MEASURE_MAG, MEASURE_BARO, AIRSPEED, PUSH, SLOW_CALLS = range(5)
@@ -22,15 +23,6 @@ MAG_US, BARO_US, IS_MAG_NEW, IS_BARO_NEW, MAG_ROWS, BARO_ROWS, TRUTH_ROWS, TRUTH
 of the truth takes a row."""
 _ALTITUDE, _TEMPERATURE = 2, 3
 """Values of the barometer in HIL_SENSOR; the first one is the pressure."""
-
-
-@compiled
-def _is_due(due_us: Any, period_us: Any, sensor: int, time_us: int) -> bool:
-    """Return True if a measurement is due, and set the time of the next one."""
-    if time_us < due_us[sensor]:
-        return False
-    due_us[sensor] = (time_us // period_us[sensor] + 1) * period_us[sensor]
-    return True
 
 
 @compiled
@@ -51,13 +43,13 @@ def measure_slow(
     """
     due_us, period_us, marks, mag, baro, _row, _truth = slow
     marks[IS_MAG_NEW], marks[IS_BARO_NEW] = 0, 0
-    if _is_due(due_us, period_us, MAG, time_us):
+    if take_due(due_us, period_us, MAG, time_us):
         mags, out, noise, cursor, values, current_a = mag
         call_kernel(calls[MEASURE_MAG], (mags, state, current_a[0], _next_row(noise, cursor)))
         for i in range(3):
             values[i] = out[i]
         marks[IS_MAG_NEW] = 1
-    if _is_due(due_us, period_us, BARO, time_us):
+    if take_due(due_us, period_us, BARO, time_us):
         baros, out, noise, cursor, values = baro
         airspeed_m_s = call_kernel_float(calls[AIRSPEED], (memory,))
         call_kernel(

@@ -27,8 +27,7 @@ from gcs_cli.tui.orders.vehicle_list import ALL, VehicleList
 from gcs_cli.tui.palette import DARK, LIGHT, Palette, monochrome, palette_of
 from gcs_cli.tui.plot.fields import PlotFields
 from gcs_cli.tui.screens import SCREENS
-from gcs_cli.tui.watch_screen import WatchScreen
-from gcs_cli.tui.widgets.live_dialog import LiveDialog
+from gcs_cli.tui.watch_screen import LiveDialog, WatchScreen
 from gcs_cli.vehicle.view_types import VehicleView
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from abc import abstractmethod
+from typing import ClassVar, TypeVar
 
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Container
 from textual.events import Click
-from textual.screen import Screen
+from textual.screen import ModalScreen, Screen
 
 from gcs_cli.tui.key_bar import KeyBar
 from gcs_cli.tui.palette import Palette
@@ -52,6 +53,17 @@ class Tabs(KeepsLines):
 
 class Body(KeepsLines, Container):
     """The part of the screen between the tabs and the foot."""
+
+
+R = TypeVar("R")
+
+
+class LiveDialog(ModalScreen[R]):
+    """A dialog that shows what the vehicles send. The screen below it is drawn less often."""
+
+    @abstractmethod
+    def follow(self) -> None:
+        """Show the state of now; called in each redraw."""
 
 
 class WatchScreen(KeepsLines, Screen[None]):

@@ -12,7 +12,6 @@ from gcs_cli.vehicle.link_counts import LinkCounts
 TEXTS_KEPT = 100
 LOST_AFTER_S = 5.0
 """Heartbeat timeout of a vehicle: five missed heartbeats."""
-
 _SMALLEST_USE = 0.02
 """Consumption from which the remaining time is computed; charge is reported in steps of 0.01."""
 _POWEROFF, _TERMINATED = 7, 8  # MAV_STATE

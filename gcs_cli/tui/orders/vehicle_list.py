@@ -10,8 +10,8 @@ from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
 from gcs_cli.tui.fly.panels import height_m
+from gcs_cli.tui.watch_screen import LiveDialog
 from gcs_cli.tui.widgets.drawing import watch_app
-from gcs_cli.tui.widgets.live_dialog import LiveDialog
 from gcs_cli.vehicle.field_units import UNKNOWN, number
 from gcs_cli.vehicle.view_types import VehicleView
 

@@ -12,9 +12,9 @@ from textual.containers import Vertical
 from textual.events import Click
 from textual.widgets import Input, Label
 
+from gcs_cli.tui.watch_screen import LiveDialog
 from gcs_cli.tui.widgets.drawing import watch_app
 from gcs_cli.tui.widgets.fuzzy import Match, search
-from gcs_cli.tui.widgets.live_dialog import LiveDialog
 from gcs_cli.tui.widgets.row_list import RowList
 
 _EVERY = 2
