@@ -104,6 +104,13 @@ def newest_fix_time(rings: Rings) -> float:
 
 
 @compiled
+def read_row(row: FloatArray, values: FloatArray) -> None:
+    """Copy a row to the first of ``values``."""
+    for column in range(row.size):
+        values[column] = row[column]
+
+
+@compiled
 def write_row(row: FloatArray, values: FloatArray) -> None:
     """Copy the first ``values`` to a row."""
     for column in range(row.size):

@@ -20,10 +20,11 @@ from tests.support.filter_events import Event
 C = Path(__file__).parent / "c"
 INCLUDES = [*includes(*FOLDERS), f"-I{C}"]
 PARTS = (
-    "predict", "predict yaw models", "fuse GNSS", "fuse field", "fuse barometer", "fuse range", "fuse drag",
-    "fuse rest velocity", "fuse rest rate", "fuse hold", "update yaw models", "follow",
+    "predict", "predict yaw models", "drift of GNSS", "fuse GNSS velocity", "fuse GNSS position", "fuse field",
+    "fuse barometer", "fuse range", "fuse drag", "fuse rest velocity", "fuse rest rate", "fuse hold",
+    "update yaw models", "follow",
 )  # fmt: skip
-"""Parts of the filter in the order of filter_steps.c."""
+"""Parts of the filter in the order of filter_steps.c; of a sensor one axis."""
 
 
 _SMALL = (

@@ -50,7 +50,7 @@ int32_t fs_push(fs_rings *rings, int32_t ring, int32_t size)
     return slot;
 }
 
-/* rings.py:107 */
+/* rings.py:114 */
 void fs_write_row(fs_real row[], int32_t row_size, const fs_real values[])
 {
     for (int32_t column = 0; column < row_size; column++) {
@@ -84,19 +84,17 @@ bool fs_take_mean(fs_real mean[], fs_real row[], int32_t row_size, fs_real perio
     return true;
 }
 
-/* rings.py:44 */
-int32_t fs_count_of_measurements(const fs_rings *rings)
-{
-    int32_t total = 0;
-    for (int32_t ring = 0; ring < 4; ring++) {
-        total += rings->cursors[ring][1];
-    }
-    return total;
-}
-
 /* rings.py:53 */
 bool fs_is_due(const fs_rings *rings, int32_t ring, fs_real row_s, fs_real now_s)
 {
     const int32_t count = rings->cursors[ring][1];
     return count > 0 && row_s <= now_s;
+}
+
+/* rings.py:107 */
+void fs_read_row(const fs_real row[], int32_t row_size, fs_real values[])
+{
+    for (int32_t column = 0; column < row_size; column++) {
+        values[column] = row[column];
+    }
 }

@@ -31,16 +31,16 @@ void fs_pop(fs_rings *rings, int32_t ring, int32_t size);
 /* Return the slot for a new row; the oldest row of a full ring is dropped. rings.py:60 */
 int32_t fs_push(fs_rings *rings, int32_t ring, int32_t size);
 
-/* Copy the first values to a row. rings.py:107 */
+/* Copy the first values to a row. rings.py:114 */
 void fs_write_row(fs_real row[], int32_t row_size, const fs_real values[]);
 
 /* Add a sample to a mean; return True, with the mean in row, if period_s passed since the last one. rings.py:77 */
 bool fs_take_mean(fs_real mean[], fs_real row[], int32_t row_size, fs_real period_s);
 
-/* Return the number of rows that wait in all rings but that of the IMU. rings.py:44 */
-int32_t fs_count_of_measurements(const fs_rings *rings);
-
 /* Return True if the ring has rows and its oldest one, measured at row_s, is not in the future. rings.py:53 */
 bool fs_is_due(const fs_rings *rings, int32_t ring, fs_real row_s, fs_real now_s);
+
+/* Copy a row to the first of values. rings.py:107 */
+void fs_read_row(const fs_real row[], int32_t row_size, fs_real values[]);
 
 #endif
