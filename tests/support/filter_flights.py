@@ -306,6 +306,9 @@ STREAMS: dict[str, Callable[[], Events]] = {
     "accelerometer wrong without a barometer": lambda: _wrong_accelerometer(
         _without(_LONG(), BARO_RING), 2.0
     ),
+    "IMU lost, then the magnetometer": lambda: _without(
+        _without(_LONG(), IMU, _CLIMB_S, _CLIMB_S + 2.0), MAG_RING, _CLIMB_S + 1.2, _LATE_S
+    ),
     "other cut-offs of the rates": lambda: _other_cutoffs(flown()),
     "Earth's field changed": lambda: _new_earth_field(flown(), 0.2),
     "Earth's field far off": lambda: _new_earth_field(flown(), 1.0),
