@@ -211,11 +211,13 @@ def _account_for_gap(m: MemoryRecord, f: Filter) -> None:
 @compiled
 def _stands(m: MemoryRecord, params: EstimatorParams) -> bool:
     """Return True if the vehicle is on the ground and nothing moves it."""
+    if m["flags"][LANDED] == 0:
+        return False
     rate, force = mean_rate(m["sums"]), mean_force(m["sums"])
     bias = read_vector(m["nominal"], 10)
     off = math.sqrt(force.x * force.x + force.y * force.y + force.z * force.z) - params.gravity_m_s2
     largest = max(abs(rate.x - bias.x), abs(rate.y - bias.y), abs(rate.z - bias.z))
-    return m["flags"][LANDED] == 1 and abs(off) < _STILL_FORCE_M_S2 and largest < _STILL_RATE_RAD_S
+    return abs(off) < _STILL_FORCE_M_S2 and largest < _STILL_RATE_RAD_S
 
 
 @compiled

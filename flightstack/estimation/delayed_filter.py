@@ -7,18 +7,13 @@ import math
 from flightstack.core.array_items import as_tuple
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Vector3
-from flightstack.core.geometry import rotation_over
 from flightstack.estimation.agenda import work
 from flightstack.estimation.alignment import ALIGNMENT_S, WAIT_FOR_MAG_S, align
-from flightstack.estimation.error_state import (
-    read_nominal,
-    read_vector,
-    scaled,
-    write_vector,
-)
+from flightstack.estimation.error_state import read_nominal, read_vector, scaled, write_vector
 from flightstack.estimation.estimator_params import PARAMS_SIZE, EstimatorParams
 from flightstack.estimation.imu_input import (
     add_sample,
+    in_start_frame,
     take_step,
     write_step,
 )
@@ -125,13 +120,11 @@ def imu_kernel(memory: MemoryArray, sample: FloatArray) -> None:
     if m["flags"][ALIGNED] == 0:
         _collect(m, accel, time_s, dt_s, params)
         return
-    n = read_nominal(f.nominal)
-    angle = less_bias(scaled(gyro, dt_s), n.gyro_bias_rad_s, dt_s)
-    delta_velocity = less_bias(scaled(accel, dt_s), n.accel_bias_m_s2, dt_s)
-    start = read_motion(output)
-    # the mean specific force acts in the attitude in the middle of the sample
-    dv = _in_start_frame(angle, delta_velocity)
-    write_motion(output, time_s, moved(start, angle, dv, dt_s, params.gravity_m_s2))
+    gyro_bias = read_vector(f.nominal, 10)
+    angle = less_bias(scaled(gyro, dt_s), gyro_bias, dt_s)
+    delta_velocity = less_bias(scaled(accel, dt_s), read_vector(f.nominal, 13), dt_s)
+    dv = in_start_frame(angle, delta_velocity)
+    write_motion(output, time_s, moved(read_motion(output), angle, dv, dt_s, params.gravity_m_s2))
     if sums[0] >= params.period_s - 0.25 * dt_s:
         step = take_step(sums, time_s)
         for _ in range(_MOST_PARTS):
@@ -148,7 +141,7 @@ def imu_kernel(memory: MemoryArray, sample: FloatArray) -> None:
         if not _is_behind(r, horizon_s):
             break
     rates = filtered_rates(m["rate_filter"], gyro, dt_s, params.gyro_cutoff_hz)
-    _write_state(m, less_bias(rates, n.gyro_bias_rad_s, 1.0))
+    _write_state(m, less_bias(rates, gyro_bias, 1.0))
 
 
 @compiled
@@ -192,14 +185,6 @@ def _real_step(m: MemoryRecord, time_s: float, dt_s: float) -> float:
     m["imu_gap"][GAP_PENDING_S] += min(elapsed_s, _LONGEST_GAP_S) - dt_s
     covered_s: float = min(elapsed_s, _LONGEST_GAP_S)
     return covered_s
-
-
-@compiled
-def _in_start_frame(angle: Vector3, delta_velocity: Vector3) -> Vector3:
-    q = rotation_over(angle, 0.5)
-    x, y, z = 2.0 * q.x, 2.0 * q.y, 2.0 * q.z  # first order: half of the step's angle
-    v = delta_velocity
-    return Vector3(v.x + y * v.z - z * v.y, v.y + z * v.x - x * v.z, v.z + x * v.y - y * v.x)
 
 
 @compiled

@@ -16,7 +16,7 @@ IMU_COLUMNS, TRACK_COLUMNS = 14, 11
 _COUNT, _PUSHED_S, _LAST_S, MEAN_SIZE = 4, 5, 6, 7
 """Columns of a mean of samples: sums of a row (4), their number, times of the last row and of the last sample."""
 _ROUNDING_S = 2.5e-4
-"""Means of samples end at the time of a step, and the rounding of a float32 must not decide in which step they count."""
+"""Means of samples end at the time of a step: the rounding of a float32 must not decide in which step they count."""
 
 Cursors: TypeAlias = "Annotated[np.ndarray[tuple[int, int], np.dtype[np.int64]], RINGS, 2]"
 """For each ring the slot of its oldest row, and the number of its rows."""

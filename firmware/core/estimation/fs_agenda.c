@@ -94,15 +94,18 @@ static bool begin(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, fs_re
 /* Return True if the vehicle is on the ground and nothing moves it. agenda.py:212 */
 static bool stands(const fs_estimator_memory *m, const fs_estimator_params *params)
 {
+    if (m->flags[FS_LANDED] == 0) {
+        return false;
+    }
     const fs_vector3 rate = fs_mean_rate(m->sums);
     const fs_vector3 force = fs_mean_force(m->sums);
     const fs_vector3 bias = fs_read_vector(m->filter.nominal, 10);
     const fs_real off = fs_sqrt(force.x * force.x + force.y * force.y + force.z * force.z) - params->gravity_m_s2;
     const fs_real largest = fs_max(fs_max(fs_abs(rate.x - bias.x), fs_abs(rate.y - bias.y)), fs_abs(rate.z - bias.z));
-    return m->flags[FS_LANDED] == 1 && fs_abs(off) < FS_STILL_FORCE_M_S2 && largest < FS_STILL_RATE_RAD_S;
+    return fs_abs(off) < FS_STILL_FORCE_M_S2 && largest < FS_STILL_RATE_RAD_S;
 }
 
-/* Fuse rest ten times a second: three axes of the velocity, three of the rate. agenda.py:222 */
+/* Fuse rest ten times a second: three axes of the velocity, three of the rate. agenda.py:224 */
 static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t stage,
                     const fs_estimator_params *params)
 {
@@ -127,7 +130,7 @@ static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int
     return axis < 5 ? axis + 1 : 0;
 }
 
-/* Fuse drag in flight while the velocity over ground is measured, twenty times a second. agenda.py:241 */
+/* Fuse drag in flight while the velocity over ground is measured, twenty times a second. agenda.py:243 */
 static int32_t drag(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t axis,
                     const fs_estimator_params *params)
 {

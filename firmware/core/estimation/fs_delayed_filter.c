@@ -8,7 +8,6 @@
 #include "fs_agenda.h"
 #include "fs_alignment.h"
 #include "fs_error_state.h"
-#include "fs_geometry.h"
 #include "fs_imu_input.h"
 #include "fs_math.h"
 #include "fs_memory.h"
@@ -42,7 +41,7 @@
 #define FS_IMU_ROWS 64
 #define FS_BACKLOG_S FS_LIT(0.03)
 
-/* delayed_filter.py:73 */
+/* delayed_filter.py:68 */
 void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], int32_t row_size)
 {
     for (int32_t i = 0; i < row_size; i++) {
@@ -88,7 +87,7 @@ void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], in
 
 /*
  * Return the time that a sample has to cover: its own, or longer after a gap; zero for one that came too late.
- * delayed_filter.py:181
+ * delayed_filter.py:174
  */
 static fs_real real_step(fs_estimator_memory *m, fs_real time_s, fs_real dt_s)
 {
@@ -108,7 +107,7 @@ static fs_real real_step(fs_estimator_memory *m, fs_real time_s, fs_real dt_s)
     return covered_s;
 }
 
-/* Add a sample to the alignment; align when it is long enough. delayed_filter.py:206 */
+/* Add a sample to the alignment; align when it is long enough. delayed_filter.py:191 */
 static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real time_s, fs_real dt_s,
                     const fs_estimator_params *params)
 {
@@ -141,25 +140,9 @@ static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real tim
     }
 }
 
-/* delayed_filter.py:198 */
-static fs_vector3 in_start_frame(const fs_vector3 *angle, const fs_vector3 *delta_velocity)
-{
-    const fs_quaternion q = fs_rotation_over(angle, FS_LIT(0.5));
-    /* first order: half of the step's angle */
-    const fs_real x = FS_LIT(2.0) * q.x;
-    const fs_real y = FS_LIT(2.0) * q.y;
-    const fs_real z = FS_LIT(2.0) * q.z;
-    const fs_vector3 *v = delta_velocity;
-    return (fs_vector3){
-        .x = v->x + y * v->z - z * v->y,
-        .y = v->y + z * v->x - x * v->z,
-        .z = v->z + x * v->y - y * v->x,
-    };
-}
-
 /*
  * Return True if the filter is so far behind the horizon that a sample does more than a part of its work.
- * delayed_filter.py:155
+ * delayed_filter.py:148
  */
 static bool is_behind(const fs_rings *r, fs_real horizon_s)
 {
@@ -167,7 +150,7 @@ static bool is_behind(const fs_rings *r, fs_real horizon_s)
     return r->cursors[FS_IMU_RING][1] > 0 && oldest_s < horizon_s - FS_BACKLOG_S;
 }
 
-/* Write the output in the order of VehicleState. delayed_filter.py:162 */
+/* Write the output in the order of VehicleState. delayed_filter.py:155 */
 static void write_state(fs_estimator_memory *m, const fs_vector3 *rates)
 {
     for (int32_t i = 0; i < 3; i++) {
@@ -182,7 +165,7 @@ static void write_state(fs_estimator_memory *m, const fs_vector3 *rates)
     fs_write_vector(m->state, 10, rates);
 }
 
-/* delayed_filter.py:108 */
+/* delayed_filter.py:103 */
 void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
 {
     for (int32_t i = 0; i < 8; i++) {
@@ -206,15 +189,15 @@ void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
         collect(m, &accel, time_s, dt_s, params);
         return;
     }
-    const fs_nominal n = fs_read_nominal(f->nominal);
+    const fs_vector3 gyro_bias = fs_read_vector(f->nominal, 10);
     const fs_vector3 scaled = fs_scaled(&gyro, dt_s);
-    const fs_vector3 angle = fs_less_bias(&scaled, &n.gyro_bias_rad_s, dt_s);
+    const fs_vector3 angle = fs_less_bias(&scaled, &gyro_bias, dt_s);
     const fs_vector3 scaled_2 = fs_scaled(&accel, dt_s);
-    const fs_vector3 delta_velocity = fs_less_bias(&scaled_2, &n.accel_bias_m_s2, dt_s);
-    const fs_motion start = fs_read_motion(m->output);
-    /* the mean specific force acts in the attitude in the middle of the sample */
-    const fs_vector3 dv = in_start_frame(&angle, &delta_velocity);
-    const fs_motion moved = fs_moved(&start, &angle, &dv, dt_s, params->gravity_m_s2);
+    const fs_vector3 read_vector = fs_read_vector(f->nominal, 13);
+    const fs_vector3 delta_velocity = fs_less_bias(&scaled_2, &read_vector, dt_s);
+    const fs_vector3 dv = fs_in_start_frame(&angle, &delta_velocity);
+    const fs_motion read_motion = fs_read_motion(m->output);
+    const fs_motion moved = fs_moved(&read_motion, &angle, &dv, dt_s, params->gravity_m_s2);
     fs_write_motion(m->output, time_s, &moved);
     if (m->sums[0] >= params->period_s - FS_LIT(0.25) * dt_s) {
         const fs_delta_sample step = fs_take_step(m->sums, time_s);
@@ -239,11 +222,11 @@ void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
         }
     }
     const fs_vector3 rates = fs_filtered_rates(m->rate_filter, &gyro, dt_s, params->gyro_cutoff_hz);
-    const fs_vector3 less_bias = fs_less_bias(&rates, &n.gyro_bias_rad_s, FS_LIT(1.0));
+    const fs_vector3 less_bias = fs_less_bias(&rates, &gyro_bias, FS_LIT(1.0));
     write_state(m, &less_bias);
 }
 
-/* delayed_filter.py:173 */
+/* delayed_filter.py:166 */
 void fs_field_kernel(fs_estimator_memory *memory)
 {
     fs_estimator_memory *m = memory;
