@@ -33,7 +33,7 @@ from flightstack.estimation.position_sources import (
     is_velocity_measured,
     take_gnss,
 )
-from flightstack.estimation.prediction import motion_of, predict
+from flightstack.estimation.prediction import motion_of, predict, predict_errors
 from flightstack.estimation.resets import count_of_resets
 from flightstack.estimation.rings import (
     BARO_RING,
@@ -69,6 +69,8 @@ IDLE, REST_SOURCE, HOLD_SOURCE, MAG_SOURCE, BARO_SOURCE, RANGE_SOURCE, GNSS_SOUR
 """What the agenda is at; the sources of measurements in the order in which they are fused."""
 _LATE_S = 0.3
 """Measurements that are older than the horizon by this much are dropped."""
+_BEHIND_S = 0.035
+"""Time by which the covariance may be behind the state, plus a step: measurements come more often."""
 _REST_PERIOD_S, _REST_MEAN_S, _DRAG_PERIOD_S = 0.1, 0.1, 0.05
 _STILL_RATE_RAD_S, _STILL_FORCE_M_S2 = 0.08, 1.0
 _GAP_RATE_RAD_S, _GAP_FORCE_M_S2 = 0.3, 3.0
@@ -109,10 +111,27 @@ def _begin(m: MemoryRecord, f: Filter, r: Rings, horizon_s: float, params: Estim
     step = read_step(r.imu[slot])
     predict_yaw(m, f, step)
     predict(f, step, params)
+    if _is_covariance_due(m, f, r, params):
+        predict_errors(f, step, params)
     _account_for_gap(m, f)
     add_fault_noise(m["checks"], f, step.dt_s)
     agenda[SOURCE], agenda[AXIS], agenda[FUSED_ANY] = REST_SOURCE, 0, 0
     return True
+
+
+@compiled
+def _is_covariance_due(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorParams) -> bool:
+    """Return True if a measurement may be fused in the step at hand, or the covariance is behind by the most."""
+    now_s = f.clock[0]
+    rests = m["flags"][LANDED] == 1 and now_s - m["rest_s"][0] >= _REST_PERIOD_S
+    if f.behind[0] > _BEHIND_S or rests or params.drag_is_fused > 0.0 or not is_velocity_measured(f):
+        return True
+    return (
+        is_due(r, MAG_RING, r.mag[slot_of(r, MAG_RING, MAG_ROWS, 0), 0], now_s)
+        or is_due(r, BARO_RING, r.baro[slot_of(r, BARO_RING, BARO_ROWS, 0), 0], now_s)
+        or is_due(r, RANGE_RING, r.range[slot_of(r, RANGE_RING, RANGE_ROWS, 0), 0], now_s)
+        or is_due(r, GNSS_RING, r.gnss[slot_of(r, GNSS_RING, GNSS_ROWS, 0), 0], now_s)
+    )
 
 
 @compiled

@@ -105,7 +105,9 @@ def start_memory(memory: MemoryArray) -> None:
 @compiled
 def filter_of(m: MemoryRecord) -> Filter:
     """Return the filter's arrays of a record of ``MEMORY``."""
-    return Filter(m["nominal"], m["covariance"], m["observations"], m["h"], m["ph"], m["gain"], m["clock"])
+    return Filter(
+        m["nominal"], m["covariance"], m["observations"], m["h"], m["ph"], m["gain"], m["clock"], m["behind"]
+    )
 
 
 @compiled

@@ -22,7 +22,7 @@ INCLUDES = [*includes(*FOLDERS), f"-I{C}"]
 PARTS = (
     "predict", "predict yaw models", "drift of GNSS", "fuse GNSS velocity", "fuse GNSS position", "fuse field",
     "fuse barometer", "fuse range", "fuse drag", "fuse rest velocity", "fuse rest rate", "fuse hold",
-    "update yaw models", "follow",
+    "update yaw models", "follow", "predict errors",
 )  # fmt: skip
 """Parts of the filter in the order of filter_steps.c; of a sensor one axis."""
 

@@ -24,6 +24,7 @@ from tests.support.generated_c import compile_program, in_python
 COUNT = 4
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     "prediction": prediction.predict,
+    "prediction of errors": prediction.predict_errors,
     "covariance": derived_generated.predict_covariance,
     "scalar fusion": kalman.fuse,
     "reset of a variance": kalman.reset_variance,

@@ -22,6 +22,17 @@
 #define FS_IDLE 0
 #define FS_IMU_RING 4
 #define FS_IMU_ROWS 64
+#define FS_LANDED 1
+#define FS_REST_PERIOD_S FS_LIT(0.1)
+#define FS_BEHIND_S FS_LIT(0.035)
+#define FS_MAG_RING 1
+#define FS_MAG_ROWS 32
+#define FS_BARO_RING 2
+#define FS_BARO_ROWS 32
+#define FS_RANGE_RING 3
+#define FS_RANGE_ROWS 32
+#define FS_GNSS_RING 0
+#define FS_GNSS_ROWS 8
 #define FS_GAP_PENDING_S 0
 #define FS_GAP_RATE_RAD_S FS_LIT(0.3)
 #define FS_GAP_FORCE_M_S2 FS_LIT(3.0)
@@ -31,8 +42,6 @@
 #define FS_AXIS 1
 #define FS_FUSED_ANY 2
 #define FS_SOURCES 8
-#define FS_REST_PERIOD_S FS_LIT(0.1)
-#define FS_LANDED 1
 #define FS_STILL_FORCE_M_S2 FS_LIT(1.0)
 #define FS_STILL_RATE_RAD_S FS_LIT(0.08)
 #define FS_NOTHING -1
@@ -41,20 +50,30 @@
 #define FS_DRAG_SOURCE 7
 #define FS_DRAG_PERIOD_S FS_LIT(0.05)
 #define FS_MAG_SOURCE 3
-#define FS_MAG_RING 1
-#define FS_MAG_ROWS 32
 #define FS_BARO_SOURCE 4
-#define FS_BARO_RING 2
-#define FS_BARO_ROWS 32
 #define FS_RANGE_SOURCE 5
-#define FS_RANGE_RING 3
-#define FS_RANGE_ROWS 32
-#define FS_GNSS_RING 0
-#define FS_GNSS_ROWS 8
 #define FS_LATE_S FS_LIT(0.3)
 #define FS_YAW_STAGE 6
 
-/* Add the uncertainty of time without samples. agenda.py:200 */
+/*
+ * Return True if a measurement may be fused in the step at hand, or the covariance is behind by the most.
+ * agenda.py:123
+ */
+static bool is_covariance_due(const fs_estimator_memory *m, const fs_filter *f, const fs_rings *r,
+                              const fs_estimator_params *params)
+{
+    const fs_real now_s = f->clock[0];
+    const bool rests = m->flags[FS_LANDED] == 1 && now_s - m->rest_s[0] >= FS_REST_PERIOD_S;
+    if (f->behind[0] > FS_BEHIND_S || rests || params->drag_is_fused > FS_LIT(0.0) || !fs_is_velocity_measured(f)) {
+        return true;
+    }
+    return fs_is_due(r, FS_MAG_RING, r->mag[fs_slot_of(r, FS_MAG_RING, FS_MAG_ROWS, 0)][0], now_s) ||
+           fs_is_due(r, FS_BARO_RING, r->baro[fs_slot_of(r, FS_BARO_RING, FS_BARO_ROWS, 0)][0], now_s) ||
+           fs_is_due(r, FS_RANGE_RING, r->range[fs_slot_of(r, FS_RANGE_RING, FS_RANGE_ROWS, 0)][0], now_s) ||
+           fs_is_due(r, FS_GNSS_RING, r->gnss[fs_slot_of(r, FS_GNSS_RING, FS_GNSS_ROWS, 0)][0], now_s);
+}
+
+/* Add the uncertainty of time without samples. agenda.py:219 */
 static void account_for_gap(fs_estimator_memory *m, fs_filter *f)
 {
     const fs_real gap_s = m->imu_gap[FS_GAP_PENDING_S];
@@ -69,7 +88,7 @@ static void account_for_gap(fs_estimator_memory *m, fs_filter *f)
     }
 }
 
-/* Predict a step that is not later than the horizon; return False if there is none. agenda.py:101 */
+/* Predict a step that is not later than the horizon; return False if there is none. agenda.py:103 */
 static bool begin(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, fs_real horizon_s,
                   const fs_estimator_params *params)
 {
@@ -83,6 +102,9 @@ static bool begin(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, fs_re
     const fs_delta_sample step = fs_read_step(r->imu[slot]);
     fs_predict_yaw(m, f, &step);
     fs_predict(f, &step, params);
+    if (is_covariance_due(m, f, r, params)) {
+        fs_predict_errors(f, &step, params);
+    }
     account_for_gap(m, f);
     fs_add_fault_noise(m->checks, f, step.dt_s);
     m->agenda[FS_SOURCE] = FS_REST_SOURCE;
@@ -91,7 +113,7 @@ static bool begin(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, fs_re
     return true;
 }
 
-/* Return True if the vehicle is on the ground and nothing moves it. agenda.py:212 */
+/* Return True if the vehicle is on the ground and nothing moves it. agenda.py:231 */
 static bool stands(const fs_estimator_memory *m, const fs_estimator_params *params)
 {
     if (m->flags[FS_LANDED] == 0) {
@@ -105,7 +127,7 @@ static bool stands(const fs_estimator_memory *m, const fs_estimator_params *para
     return fs_abs(off) < FS_STILL_FORCE_M_S2 && largest < FS_STILL_RATE_RAD_S;
 }
 
-/* Fuse rest ten times a second: three axes of the velocity, three of the rate. agenda.py:224 */
+/* Fuse rest ten times a second: three axes of the velocity, three of the rate. agenda.py:243 */
 static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t stage,
                     const fs_estimator_params *params)
 {
@@ -130,7 +152,7 @@ static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int
     return axis < 5 ? axis + 1 : 0;
 }
 
-/* Fuse drag in flight while the velocity over ground is measured, twenty times a second. agenda.py:243 */
+/* Fuse drag in flight while the velocity over ground is measured, twenty times a second. agenda.py:262 */
 static int32_t drag(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t axis,
                     const fs_estimator_params *params)
 {
@@ -148,7 +170,7 @@ static int32_t drag(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int
     return 1 - axis;
 }
 
-/* Move the oldest row of a ring to row; return False if none is due. agenda.py:190 */
+/* Move the oldest row of a ring to row; return False if none is due. agenda.py:209 */
 static bool next_row(fs_rings *r, int32_t ring, int32_t size, const fs_real oldest[], int32_t oldest_size,
                      fs_real now_s, fs_real row[])
 {
@@ -160,7 +182,7 @@ static bool next_row(fs_rings *r, int32_t ring, int32_t size, const fs_real olde
     return true;
 }
 
-/* Move the oldest row of a source that is due to pending; drop those that are too late. agenda.py:164 */
+/* Move the oldest row of a source that is due to pending; drop those that are too late. agenda.py:183 */
 static bool take_row(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, int32_t source)
 {
     const fs_real now_s = f->clock[0];
@@ -193,7 +215,7 @@ static bool take_row(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, in
     return false;
 }
 
-/* Fuse the next scalar of the source at hand. agenda.py:135 */
+/* Fuse the next scalar of the source at hand. agenda.py:154 */
 static int32_t part(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_estimator_params *params)
 {
     const int32_t source = m->agenda[FS_SOURCE];
@@ -236,7 +258,7 @@ static int32_t part(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_
     return following;
 }
 
-/* Move the output as the filter has moved, and close the step. agenda.py:119 */
+/* Move the output as the filter has moved, and close the step. agenda.py:138 */
 static void finish(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, const fs_estimator_params *params)
 {
     const int32_t slot = fs_slot_of(r, FS_IMU_RING, FS_IMU_ROWS, 0);
@@ -257,7 +279,7 @@ static void finish(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, cons
     m->agenda[FS_SOURCE] = FS_IDLE;
 }
 
-/* agenda.py:79 */
+/* agenda.py:81 */
 bool fs_work(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_s, const fs_estimator_params *params)
 {
     if (m->agenda[FS_SOURCE] == FS_IDLE) {

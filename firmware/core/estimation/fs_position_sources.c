@@ -12,12 +12,12 @@
 #include "fs_resets.h"
 #include "fs_source_checks.h"
 
-#define FS_HAS_GNSS 3
-#define FS_GNSS_LOST_S FS_LIT(1.0)
-#define FS_MOVES_M_S FS_LIT(0.15)
-#define FS_HAS_YAW 6
 #define FS_GNSS_VELOCITY 0
 #define FS_FUSED_S 3
+#define FS_GNSS_LOST_S FS_LIT(1.0)
+#define FS_HAS_GNSS 3
+#define FS_MOVES_M_S FS_LIT(0.15)
+#define FS_HAS_YAW 6
 #define FS_VELOCITY 3
 #define FS_NOTHING -1
 #define FS_HOLD_PERIOD_S FS_LIT(0.2)
@@ -36,6 +36,13 @@
 #define FS_LONGEST_INTERVAL_S FS_LIT(2.5)
 #define FS_SPEED_SMOOTHING_S FS_LIT(2.0)
 
+/* position_sources.py:158 */
+bool fs_is_velocity_measured(const fs_filter *f)
+{
+    const fs_real fused_s = f->observations[FS_GNSS_VELOCITY][FS_FUSED_S];
+    return fused_s > FS_LIT(0.0) && f->clock[0] - fused_s < FS_GNSS_LOST_S;
+}
+
 /* position_sources.py:165 */
 bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f)
 {
@@ -43,13 +50,6 @@ bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f)
     const fs_real east = m->gnss_speed_m_s[1];
     const bool is_measured = m->flags[FS_HAS_GNSS] == 1 && f->clock[0] - m->last_gnss_s[0] < FS_GNSS_LOST_S;
     return !is_measured || fs_sqrt(north * north + east * east) < FS_MOVES_M_S;
-}
-
-/* position_sources.py:158 */
-bool fs_is_velocity_measured(const fs_filter *f)
-{
-    const fs_real fused_s = f->observations[FS_GNSS_VELOCITY][FS_FUSED_S];
-    return fused_s > FS_LIT(0.0) && f->clock[0] - fused_s < FS_GNSS_LOST_S;
 }
 
 /* position_sources.py:173 */

@@ -12,11 +12,11 @@
 #include "fs_rings.h"
 #include "fs_types.h"
 
-/* Return False if GNSS measures that what the vehicle stands on moves, as a boat does. position_sources.py:165 */
-bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f);
-
 /* Return True if a GNSS velocity was accepted within the last second. position_sources.py:158 */
 bool fs_is_velocity_measured(const fs_filter *f);
+
+/* Return False if GNSS measures that what the vehicle stands on moves, as a boat does. position_sources.py:165 */
+bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f);
 
 /*
  * Hold the horizontal position while the velocity is not measured, north before east; return the next axis.

@@ -161,6 +161,7 @@ void filter_steps_costs(filter_steps *s, uint32_t costs[FILTER_PARTS])
     step.angle_rad = still;
     step.velocity_m_s = force;
     COST(0, fs_predict(f, &step, p));
+    COST(14, fs_predict_errors(f, &step, p));
     COST(1, fs_predict_models(m->yaw_models, &still, &force, FS_LIT(0.01)));
     COST(2, fs_drift_gnss_bias(f, gnss, FS_LIT(0.2), p));
     COST(3, fs_fuse_gnss_velocity(f, gnss, 0, FS_LIT(0.0), p));
