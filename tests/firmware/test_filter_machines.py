@@ -22,7 +22,8 @@ MOST_OF_PART = {
     "fuse range": 5530, "fuse drag": 7730, "fuse rest velocity": 5650, "fuse rest rate": 5670, "fuse hold": 5650,
     "update yaw models": 6180, "follow": 4000,
 }  # fmt: skip
-"""5 % above what was measured, 1 % for the mean over the square: 4,000 is the target. The mean is that of a sample of the IMU at 500 Hz, with all that it caused."""
+"""5 % above what was measured; 1 % for the mean over the square, whose target is 4,000. The mean is that of a sample of
+the IMU at 500 Hz, with all that it caused."""
 
 
 @pytest.fixture(scope="module")
