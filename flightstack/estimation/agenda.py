@@ -93,6 +93,8 @@ def work(m: MemoryRecord, f: Filter, r: Rings, horizon_s: float, params: Estimat
         following = _part(m, f, r, params)
         if following != NOTHING:
             agenda[AXIS], agenda[FUSED_ANY] = following, 1
+            if count_of_resets(m) != m["followed"][0]:  # users of the output follow the count at once
+                _move_output(m, f, r, 1.0, params)
             return True
         agenda[SOURCE] += 1
     _finish(m, f, r, params)
@@ -137,17 +139,20 @@ def _is_covariance_due(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorPa
 @compiled
 def _finish(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorParams) -> None:
     """Move the output as the filter has moved, and close the step."""
-    agenda, slot = m["agenda"], slot_of(r, IMU_RING, IMU_ROWS, 0)
-    dt_s = r.imu[slot, 1]
-    has_changed = agenda[FUSED_ANY] == 1
-    share = 1.0 if params.output_s <= dt_s else dt_s / params.output_s
-    if count_of_resets(m) != m["followed"][0]:  # also one between two steps, by the Earth's field
-        share, m["followed"][0] = 1.0, count_of_resets(m)
-        has_changed = True
-    if has_changed or share < 1.0:  # else the output has moved as the filter has
-        follow(r, m["output"], motion_of(read_nominal(f.nominal)), share, params.gravity_m_s2)
+    agenda, dt_s = m["agenda"], r.imu[slot_of(r, IMU_RING, IMU_ROWS, 0), 1]
+    is_reset = count_of_resets(m) != m["followed"][0]  # between two steps, by the Earth's field
+    share = 1.0 if is_reset or params.output_s <= dt_s else dt_s / params.output_s
+    if is_reset or agenda[FUSED_ANY] == 1 or share < 1.0:  # else the output has moved as the filter has
+        _move_output(m, f, r, share, params)
     pop(r, IMU_RING, IMU_ROWS)
     agenda[SOURCE] = IDLE
+
+
+@compiled
+def _move_output(m: MemoryRecord, f: Filter, r: Rings, share: float, params: EstimatorParams) -> None:
+    """Move the output by a share of its difference to the filter."""
+    m["followed"][0] = count_of_resets(m)
+    follow(r, m["output"], motion_of(read_nominal(f.nominal)), share, params.gravity_m_s2)
 
 
 @compiled

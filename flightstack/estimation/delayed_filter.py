@@ -139,9 +139,8 @@ def imu_kernel(memory: MemoryArray, sample: FloatArray) -> None:
         write_row(r.track[slot], output)
     horizon_s = time_s - params.delay_s + 0.25 * dt_s  # between two samples, so that rounding does not matter
     for _ in range(_MOST_PARTS):
-        if not work(m, f, r, horizon_s, params):
-            break
-        if not _is_behind(r, horizon_s):
+        has_worked = work(m, f, r, horizon_s, params)
+        if not (has_worked and _is_behind(r, horizon_s)):
             break
     rates = filtered_rates(m["rate_filter"], gyro, dt_s, params.gyro_cutoff_hz)
     _write_state(m, less_bias(rates, gyro_bias, 1.0))

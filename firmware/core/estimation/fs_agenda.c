@@ -57,7 +57,7 @@
 
 /*
  * Return True if a measurement may be fused in the step at hand, or the covariance is behind by the most.
- * agenda.py:123
+ * agenda.py:125
  */
 static bool is_covariance_due(const fs_estimator_memory *m, const fs_filter *f, const fs_rings *r,
                               const fs_estimator_params *params)
@@ -73,7 +73,7 @@ static bool is_covariance_due(const fs_estimator_memory *m, const fs_filter *f, 
            fs_is_due(r, FS_GNSS_RING, r->gnss[fs_slot_of(r, FS_GNSS_RING, FS_GNSS_ROWS, 0)][0], now_s);
 }
 
-/* Add the uncertainty of time without samples. agenda.py:219 */
+/* Add the uncertainty of time without samples. agenda.py:224 */
 static void account_for_gap(fs_estimator_memory *m, fs_filter *f)
 {
     const fs_real gap_s = m->imu_gap[FS_GAP_PENDING_S];
@@ -88,7 +88,7 @@ static void account_for_gap(fs_estimator_memory *m, fs_filter *f)
     }
 }
 
-/* Predict a step that is not later than the horizon; return False if there is none. agenda.py:103 */
+/* Predict a step that is not later than the horizon; return False if there is none. agenda.py:105 */
 static bool begin(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, fs_real horizon_s,
                   const fs_estimator_params *params)
 {
@@ -113,7 +113,7 @@ static bool begin(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, fs_re
     return true;
 }
 
-/* Return True if the vehicle is on the ground and nothing moves it. agenda.py:231 */
+/* Return True if the vehicle is on the ground and nothing moves it. agenda.py:236 */
 static bool stands(const fs_estimator_memory *m, const fs_estimator_params *params)
 {
     if (m->flags[FS_LANDED] == 0) {
@@ -127,7 +127,7 @@ static bool stands(const fs_estimator_memory *m, const fs_estimator_params *para
     return fs_abs(off) < FS_STILL_FORCE_M_S2 && largest < FS_STILL_RATE_RAD_S;
 }
 
-/* Fuse rest ten times a second: three axes of the velocity, three of the rate. agenda.py:243 */
+/* Fuse rest ten times a second: three axes of the velocity, three of the rate. agenda.py:248 */
 static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t stage,
                     const fs_estimator_params *params)
 {
@@ -152,7 +152,7 @@ static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int
     return axis < 5 ? axis + 1 : 0;
 }
 
-/* Fuse drag in flight while the velocity over ground is measured, twenty times a second. agenda.py:262 */
+/* Fuse drag in flight while the velocity over ground is measured, twenty times a second. agenda.py:267 */
 static int32_t drag(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t axis,
                     const fs_estimator_params *params)
 {
@@ -170,7 +170,7 @@ static int32_t drag(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int
     return 1 - axis;
 }
 
-/* Move the oldest row of a ring to row; return False if none is due. agenda.py:209 */
+/* Move the oldest row of a ring to row; return False if none is due. agenda.py:214 */
 static bool next_row(fs_rings *r, int32_t ring, int32_t size, const fs_real oldest[], int32_t oldest_size,
                      fs_real now_s, fs_real row[])
 {
@@ -182,7 +182,7 @@ static bool next_row(fs_rings *r, int32_t ring, int32_t size, const fs_real olde
     return true;
 }
 
-/* Move the oldest row of a source that is due to pending; drop those that are too late. agenda.py:183 */
+/* Move the oldest row of a source that is due to pending; drop those that are too late. agenda.py:188 */
 static bool take_row(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, int32_t source)
 {
     const fs_real now_s = f->clock[0];
@@ -215,7 +215,7 @@ static bool take_row(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, in
     return false;
 }
 
-/* Fuse the next scalar of the source at hand. agenda.py:154 */
+/* Fuse the next scalar of the source at hand. agenda.py:159 */
 static int32_t part(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_estimator_params *params)
 {
     const int32_t source = m->agenda[FS_SOURCE];
@@ -258,22 +258,25 @@ static int32_t part(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_
     return following;
 }
 
-/* Move the output as the filter has moved, and close the step. agenda.py:138 */
+/* Move the output by a share of its difference to the filter. agenda.py:152 */
+static void move_output(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, fs_real share,
+                        const fs_estimator_params *params)
+{
+    m->followed[0] = fs_count_of_resets(m);
+    const fs_nominal read_nominal = fs_read_nominal(f->nominal);
+    const fs_motion motion_of = fs_motion_of(&read_nominal);
+    fs_follow(r, m->output, &motion_of, share, params->gravity_m_s2);
+}
+
+/* Move the output as the filter has moved, and close the step. agenda.py:140 */
 static void finish(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, const fs_estimator_params *params)
 {
-    const int32_t slot = fs_slot_of(r, FS_IMU_RING, FS_IMU_ROWS, 0);
-    const fs_real dt_s = r->imu[slot][1];
-    bool has_changed = m->agenda[FS_FUSED_ANY] == 1;
-    fs_real share = params->output_s <= dt_s ? FS_LIT(1.0) : dt_s / params->output_s;
-    if (fs_count_of_resets(m) != m->followed[0]) { /* also one between two steps, by the Earth's field */
-        share = FS_LIT(1.0);
-        m->followed[0] = fs_count_of_resets(m);
-        has_changed = true;
-    }
-    if (has_changed || share < FS_LIT(1.0)) { /* else the output has moved as the filter has */
-        const fs_nominal read_nominal = fs_read_nominal(f->nominal);
-        const fs_motion motion_of = fs_motion_of(&read_nominal);
-        fs_follow(r, m->output, &motion_of, share, params->gravity_m_s2);
+    const fs_real dt_s = r->imu[fs_slot_of(r, FS_IMU_RING, FS_IMU_ROWS, 0)][1];
+    const bool is_reset = fs_count_of_resets(m) != m->followed[0]; /* between two steps, by the Earth's field */
+    const fs_real share = is_reset || params->output_s <= dt_s ? FS_LIT(1.0) : dt_s / params->output_s;
+    /* else the output has moved as the filter has */
+    if (is_reset || m->agenda[FS_FUSED_ANY] == 1 || share < FS_LIT(1.0)) {
+        move_output(m, f, r, share, params);
     }
     fs_pop(r, FS_IMU_RING, FS_IMU_ROWS);
     m->agenda[FS_SOURCE] = FS_IDLE;
@@ -295,6 +298,9 @@ bool fs_work(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_
         if (following != FS_NOTHING) {
             m->agenda[FS_AXIS] = following;
             m->agenda[FS_FUSED_ANY] = 1;
+            if (fs_count_of_resets(m) != m->followed[0]) { /* users of the output follow the count at once */
+                move_output(m, f, r, FS_LIT(1.0), params);
+            }
             return true;
         }
         m->agenda[FS_SOURCE] += 1;

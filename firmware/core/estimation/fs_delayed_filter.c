@@ -88,7 +88,7 @@ void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], in
 
 /*
  * Return the time that a sample has to cover: its own, or longer after a gap; zero for one that came too late.
- * delayed_filter.py:177
+ * delayed_filter.py:176
  */
 static fs_real real_step(fs_estimator_memory *m, fs_real time_s, fs_real dt_s)
 {
@@ -108,7 +108,7 @@ static fs_real real_step(fs_estimator_memory *m, fs_real time_s, fs_real dt_s)
     return covered_s;
 }
 
-/* Add a sample to the alignment; align when it is long enough. delayed_filter.py:194 */
+/* Add a sample to the alignment; align when it is long enough. delayed_filter.py:193 */
 static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real time_s, fs_real dt_s,
                     const fs_estimator_params *params)
 {
@@ -143,7 +143,7 @@ static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real tim
 
 /*
  * Return True if the filter is so far behind the horizon that a sample does more than a part of its work.
- * delayed_filter.py:151
+ * delayed_filter.py:150
  */
 static bool is_behind(const fs_rings *r, fs_real horizon_s)
 {
@@ -151,7 +151,7 @@ static bool is_behind(const fs_rings *r, fs_real horizon_s)
     return r->cursors[FS_IMU_RING][1] > 0 && oldest_s < horizon_s - FS_BACKLOG_S;
 }
 
-/* Write the output in the order of VehicleState. delayed_filter.py:158 */
+/* Write the output in the order of VehicleState. delayed_filter.py:157 */
 static void write_state(fs_estimator_memory *m, const fs_vector3 *rates)
 {
     for (int32_t i = 0; i < 3; i++) {
@@ -215,10 +215,8 @@ void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
     /* between two samples, so that rounding does not matter */
     const fs_real horizon_s = time_s - params->delay_s + FS_LIT(0.25) * dt_s;
     for (int32_t count_2 = 0; count_2 < 256; count_2++) {
-        if (!fs_work(m, f, r, horizon_s, params)) {
-            break;
-        }
-        if (!is_behind(r, horizon_s)) {
+        const bool has_worked = fs_work(m, f, r, horizon_s, params);
+        if (!(has_worked && is_behind(r, horizon_s))) {
             break;
         }
     }
@@ -227,7 +225,7 @@ void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
     write_state(m, &less_bias);
 }
 
-/* delayed_filter.py:169 */
+/* delayed_filter.py:168 */
 void fs_field_kernel(fs_estimator_memory *memory)
 {
     fs_estimator_memory *m = memory;

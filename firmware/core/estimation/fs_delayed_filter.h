@@ -32,7 +32,7 @@ void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], in
  */
 void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[]);
 
-/* Take the Earth's field in earth. delayed_filter.py:169 */
+/* Take the Earth's field in earth. delayed_filter.py:168 */
 void fs_field_kernel(fs_estimator_memory *memory);
 
 #endif
