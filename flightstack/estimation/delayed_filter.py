@@ -57,8 +57,6 @@ _MOST_PARTS = 256
 """Bound of the parts of work in one sample: more than a step has."""
 _BACKLOG_S = 0.03
 """Time by which the filter may be behind the horizon, so that a sample does one part of its work."""
-_MAG_PERIOD_S = 0.06
-"""Least time between two measurements of the magnetometer, PX4's 0.067 (SENS_MAG_RATE) or less."""
 _MEASURED = 7
 """Time, position and velocity of a GNSS measurement; other measurements are shorter."""
 _GNSS_SPARE_ROWS, _WAIT_S = 2, 0.05
@@ -88,8 +86,7 @@ def push_kernel(memory: MemoryArray, ring: int, row: FloatArray) -> None:
         for i in range(3):
             m["alignment"][3 + i] += row[1 + i]
         m["alignment"][7] += 1.0
-    period_s = _MAG_PERIOD_S if ring == MAG_RING else params.height_period_s
-    if not take_mean(m["means"][ring], row, max(period_s, wait_s / (MAG_ROWS - 4))):
+    if not take_mean(m["means"][ring], row, max(params.sensor_period_s, wait_s / (MAG_ROWS - 4))):
         return
     if ring == MAG_RING:
         slot = push(r, MAG_RING, MAG_ROWS)

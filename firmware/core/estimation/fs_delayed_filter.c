@@ -24,7 +24,6 @@
 #define FS_GNSS_SPARE_ROWS 2
 #define FS_MAG_RING 1
 #define FS_ALIGNED 0
-#define FS_MAG_PERIOD_S FS_LIT(0.06)
 #define FS_MAG_ROWS 32
 #define FS_BARO_RING 2
 #define FS_BARO_ROWS 32
@@ -42,7 +41,7 @@
 #define FS_IMU_ROWS 64
 #define FS_BACKLOG_S FS_LIT(0.03)
 
-/* delayed_filter.py:70 */
+/* delayed_filter.py:68 */
 void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], int32_t row_size)
 {
     for (int32_t i = 0; i < row_size; i++) {
@@ -68,8 +67,8 @@ void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], in
         }
         m->alignment[7] += FS_LIT(1.0);
     }
-    const fs_real period_s = ring == FS_MAG_RING ? FS_MAG_PERIOD_S : params->height_period_s;
-    if (!fs_take_mean(m->means[ring], row, row_size, fs_max(period_s, wait_s / (fs_real)(FS_MAG_ROWS - 4)))) {
+    if (!fs_take_mean(m->means[ring], row, row_size,
+                      fs_max(params->sensor_period_s, wait_s / (fs_real)(FS_MAG_ROWS - 4)))) {
         return;
     }
     if (ring == FS_MAG_RING) {
@@ -88,7 +87,7 @@ void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], in
 
 /*
  * Return the time that a sample has to cover: its own, or longer after a gap; zero for one that came too late.
- * delayed_filter.py:176
+ * delayed_filter.py:173
  */
 static fs_real real_step(fs_estimator_memory *m, fs_real time_s, fs_real dt_s)
 {
@@ -108,7 +107,7 @@ static fs_real real_step(fs_estimator_memory *m, fs_real time_s, fs_real dt_s)
     return covered_s;
 }
 
-/* Add a sample to the alignment; align when it is long enough. delayed_filter.py:193 */
+/* Add a sample to the alignment; align when it is long enough. delayed_filter.py:190 */
 static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real time_s, fs_real dt_s,
                     const fs_estimator_params *params)
 {
@@ -143,7 +142,7 @@ static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real tim
 
 /*
  * Return True if the filter is so far behind the horizon that a sample does more than a part of its work.
- * delayed_filter.py:150
+ * delayed_filter.py:147
  */
 static bool is_behind(const fs_rings *r, fs_real horizon_s)
 {
@@ -151,7 +150,7 @@ static bool is_behind(const fs_rings *r, fs_real horizon_s)
     return r->cursors[FS_IMU_RING][1] > 0 && oldest_s < horizon_s - FS_BACKLOG_S;
 }
 
-/* Write the output in the order of VehicleState. delayed_filter.py:157 */
+/* Write the output in the order of VehicleState. delayed_filter.py:154 */
 static void write_state(fs_estimator_memory *m, const fs_vector3 *rates)
 {
     for (int32_t i = 0; i < 3; i++) {
@@ -166,7 +165,7 @@ static void write_state(fs_estimator_memory *m, const fs_vector3 *rates)
     fs_write_vector(m->state, 10, rates);
 }
 
-/* delayed_filter.py:106 */
+/* delayed_filter.py:103 */
 void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
 {
     for (int32_t i = 0; i < 8; i++) {
@@ -225,7 +224,7 @@ void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
     write_state(m, &less_bias);
 }
 
-/* delayed_filter.py:168 */
+/* delayed_filter.py:165 */
 void fs_field_kernel(fs_estimator_memory *memory)
 {
     fs_estimator_memory *m = memory;

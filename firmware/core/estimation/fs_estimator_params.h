@@ -54,7 +54,7 @@ typedef struct {
     fs_real rest_velocity_noise_m_s;
     fs_real rest_rate_noise_rad_s;
     fs_real delay_s;
-    fs_real height_period_s;
+    fs_real sensor_period_s;
     fs_real period_s;
     fs_real output_s;
     fs_real reset_s;
