@@ -7,29 +7,17 @@ import math
 from flightstack.core.array_items import as_tuple
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Vector3
-from flightstack.core.geometry import rotation_over
+from flightstack.estimation.agenda import work
 from flightstack.estimation.alignment import ALIGNMENT_S, WAIT_FOR_MAG_S, align
-from flightstack.estimation.error_state import (
-    ATTITUDE,
-    VELOCITY,
-    read_nominal,
-    read_vector,
-    scaled,
-    write_vector,
-)
+from flightstack.estimation.error_state import read_nominal, read_vector, scaled, write_vector
 from flightstack.estimation.estimator_params import PARAMS_SIZE, EstimatorParams
-from flightstack.estimation.fusion import fuse_drag, fuse_rest_rate, fuse_rest_velocity
-from flightstack.estimation.height_sources import take_baro, take_range
 from flightstack.estimation.imu_input import (
     add_sample,
-    mean_force,
-    mean_rate,
-    read_step,
+    in_start_frame,
     take_step,
     write_step,
 )
 from flightstack.estimation.imu_track import IMU_SIZE
-from flightstack.estimation.kalman import Filter
 from flightstack.estimation.memory import (
     ALIGNED,
     GAP_PENDING_S,
@@ -37,22 +25,14 @@ from flightstack.estimation.memory import (
     GAPS,
     HAS_MAG,
     HAS_YAW,
-    LANDED,
     MemoryArray,
     MemoryRecord,
     filter_of,
     rings_of,
 )
-from flightstack.estimation.output_predictor import follow, read_motion, write_motion
-from flightstack.estimation.position_sources import (
-    hold_position,
-    is_platform_at_rest,
-    is_velocity_measured,
-    take_gnss,
-)
-from flightstack.estimation.prediction import DeltaSample, less_bias, motion_of, moved, predict
+from flightstack.estimation.output_predictor import read_motion, write_motion
+from flightstack.estimation.prediction import less_bias, motion_of, moved
 from flightstack.estimation.rate_filter import filtered_rates
-from flightstack.estimation.resets import count_of_resets
 from flightstack.estimation.rings import (
     BARO_RING,
     BARO_ROWS,
@@ -65,31 +45,23 @@ from flightstack.estimation.rings import (
     RANGE_RING,
     RANGE_ROWS,
     Rings,
-    count_of_measurements,
-    is_due,
     newest_fix_time,
-    pop,
     push,
     slot_of,
     take_mean,
     write_row,
 )
-from flightstack.estimation.source_checks import add_fault_noise
-from flightstack.estimation.yaw_sources import predict_yaw, take_earth_field, take_field, take_velocity
+from flightstack.estimation.yaw_sources import take_earth_field
 
-_LATE_S = 0.3
-"""Measurements that are older than the horizon by this much are dropped."""
-_STEPS = 4
-"""Most predictions in one sample."""
+_MOST_PARTS = 256
+"""Bound of the parts of work in one sample: more than a step has."""
+_BACKLOG_S = 0.03
+"""Time by which the filter may be behind the horizon, so that a sample does one part of its work."""
 _MEASURED = 7
 """Time, position and velocity of a GNSS measurement; other measurements are shorter."""
 _GNSS_SPARE_ROWS, _WAIT_S = 2, 0.05
-_REST_PERIOD_S, _REST_MEAN_S, _DRAG_PERIOD_S = 0.1, 0.1, 0.05
-_STILL_RATE_RAD_S, _STILL_FORCE_M_S2 = 0.08, 1.0
 _LONGEST_GAP_S = 1.0
 """Longest time without samples that is bridged by the next one."""
-_GAP_RATE_RAD_S, _GAP_FORCE_M_S2 = 0.3, 3.0
-"""Deviation of the mean rate and specific force of a gap from those of the sample that bridges it."""
 
 
 @compiled
@@ -148,25 +120,34 @@ def imu_kernel(memory: MemoryArray, sample: FloatArray) -> None:
     if m["flags"][ALIGNED] == 0:
         _collect(m, accel, time_s, dt_s, params)
         return
-    n = read_nominal(f.nominal)
-    angle = less_bias(scaled(gyro, dt_s), n.gyro_bias_rad_s, dt_s)
-    delta_velocity = less_bias(scaled(accel, dt_s), n.accel_bias_m_s2, dt_s)
-    start = read_motion(output)
-    # the mean specific force acts in the attitude in the middle of the sample
-    dv = _in_start_frame(angle, delta_velocity)
-    write_motion(output, time_s, moved(start, angle, dv, dt_s, params.gravity_m_s2))
+    gyro_bias = read_vector(f.nominal, 10)
+    angle = less_bias(scaled(gyro, dt_s), gyro_bias, dt_s)
+    delta_velocity = less_bias(scaled(accel, dt_s), read_vector(f.nominal, 13), dt_s)
+    dv = in_start_frame(angle, delta_velocity)
+    write_motion(output, time_s, moved(read_motion(output), angle, dv, dt_s, params.gravity_m_s2))
     if sums[0] >= params.period_s - 0.25 * dt_s:
         step = take_step(sums, time_s)
-        if r.cursors[IMU_RING, 1] >= IMU_ROWS:  # move early, so that the filter integrates every step
-            _advance(m, f, r, time_s, params)
+        for _ in range(_MOST_PARTS):
+            if r.cursors[IMU_RING, 1] < IMU_ROWS:
+                break
+            work(m, f, r, time_s, params)  # move early, so that the filter integrates every step
         slot = push(r, IMU_RING, IMU_ROWS)
         write_step(r.imu[slot], step)
         write_row(r.track[slot], output)
-        for _ in range(_STEPS):
-            if not _advance(m, f, r, time_s - params.delay_s, params):
-                break
+    horizon_s = time_s - params.delay_s + 0.25 * dt_s  # between two samples, so that rounding does not matter
+    for _ in range(_MOST_PARTS):
+        has_worked = work(m, f, r, horizon_s, params)
+        if not (has_worked and _is_behind(r, horizon_s)):
+            break
     rates = filtered_rates(m["rate_filter"], gyro, dt_s, params.gyro_cutoff_hz)
-    _write_state(m, less_bias(rates, n.gyro_bias_rad_s, 1.0))
+    _write_state(m, less_bias(rates, gyro_bias, 1.0))
+
+
+@compiled
+def _is_behind(r: Rings, horizon_s: float) -> bool:
+    """Return True if the filter is so far behind the horizon that a sample does more than a part of its work."""
+    oldest_s: float = r.imu[slot_of(r, IMU_RING, IMU_ROWS, 0), 0]
+    return r.cursors[IMU_RING, 1] > 0 and oldest_s < horizon_s - _BACKLOG_S
 
 
 @compiled
@@ -206,14 +187,6 @@ def _real_step(m: MemoryRecord, time_s: float, dt_s: float) -> float:
 
 
 @compiled
-def _in_start_frame(angle: Vector3, delta_velocity: Vector3) -> Vector3:
-    q = rotation_over(angle, 0.5)
-    x, y, z = 2.0 * q.x, 2.0 * q.y, 2.0 * q.z  # first order: half of the step's angle
-    v = delta_velocity
-    return Vector3(v.x + y * v.z - z * v.y, v.y + z * v.x - x * v.z, v.z + x * v.y - y * v.x)
-
-
-@compiled
 def _collect(m: MemoryRecord, accel: Vector3, time_s: float, dt_s: float, params: EstimatorParams) -> None:
     """Add a sample to the alignment; align when it is long enough."""
     sums = m["alignment"]
@@ -236,120 +209,3 @@ def _collect(m: MemoryRecord, accel: Vector3, time_s: float, dt_s: float, params
         m["flags"][HAS_MAG], m["flags"][HAS_YAW] = 1, 1
         for i in range(3):
             m["field"][i] = sums[3 + i] / sums[7]
-
-
-@compiled
-def _advance(m: MemoryRecord, f: Filter, r: Rings, horizon_s: float, params: EstimatorParams) -> bool:
-    """Move the filter by one step if it is older than the horizon; return True if it moved."""
-    if r.cursors[IMU_RING, 1] == 0:
-        return False
-    slot = slot_of(r, IMU_RING, IMU_ROWS, 0)
-    if r.imu[slot, 0] > horizon_s:
-        return False
-    step = read_step(r.imu[slot])
-    predict_yaw(m, f, step)
-    predict(f, step, params)
-    _account_for_gap(m, f)
-    add_fault_noise(m["checks"], f, step.dt_s)
-    has_changed = _bound(m, f, step, params)
-    is_fused = _fuse_waiting(m, f, r, params)
-    if not is_fused:
-        is_fused = _drag(m, f, step, params)
-    has_changed = has_changed or is_fused
-    share = 1.0 if params.output_s <= step.dt_s else step.dt_s / params.output_s
-    if count_of_resets(m) != m["followed"][0]:  # also one between two steps, by the Earth's field
-        share, m["followed"][0] = 1.0, count_of_resets(m)
-        has_changed = True
-    if has_changed or share < 1.0:  # else the output has moved as the filter has
-        follow(r, m["output"], motion_of(read_nominal(f.nominal)), share, params.gravity_m_s2)
-    pop(r, IMU_RING, IMU_ROWS)
-    return True
-
-
-@compiled
-def _bound(m: MemoryRecord, f: Filter, step: DeltaSample, params: EstimatorParams) -> bool:
-    """Fuse rest of a vehicle that stands, or the held position without GNSS; return True if it was."""
-    if m["flags"][LANDED] == 1 and _stands(m, params):
-        return _rest(m, f, step, params)
-    return hold_position(m, f, params)
-
-
-@compiled
-def _account_for_gap(m: MemoryRecord, f: Filter) -> None:
-    """Add the uncertainty of time without samples."""
-    gap_s = m["imu_gap"][GAP_PENDING_S]
-    if gap_s > 0.0:
-        angle_rad, speed_m_s = _GAP_RATE_RAD_S * gap_s, _GAP_FORCE_M_S2 * gap_s
-        for axis in range(3):
-            f.covariance[ATTITUDE + axis, ATTITUDE + axis] += angle_rad * angle_rad
-            f.covariance[VELOCITY + axis, VELOCITY + axis] += speed_m_s * speed_m_s
-        m["imu_gap"][GAP_PENDING_S] = 0.0
-
-
-@compiled
-def _stands(m: MemoryRecord, params: EstimatorParams) -> bool:
-    rate, force = mean_rate(m["sums"]), mean_force(m["sums"])
-    bias = read_vector(m["nominal"], 10)
-    off = math.sqrt(force.x * force.x + force.y * force.y + force.z * force.z) - params.gravity_m_s2
-    largest = max(abs(rate.x - bias.x), abs(rate.y - bias.y), abs(rate.z - bias.z))
-    return abs(off) < _STILL_FORCE_M_S2 and largest < _STILL_RATE_RAD_S
-
-
-@compiled
-def _rest(m: MemoryRecord, f: Filter, step: DeltaSample, params: EstimatorParams) -> bool:
-    """Fuse rest ten times a second; return True if it was."""
-    if f.clock[0] - m["rest_s"][0] < _REST_PERIOD_S:
-        return False
-    m["rest_s"][0] = f.clock[0]
-    if is_platform_at_rest(m, f):
-        fuse_rest_velocity(f, params)
-    density = max(step.gyro_density.x, step.gyro_density.y, step.gyro_density.z)
-    fuse_rest_rate(f, mean_rate(m["sums"]), density / _REST_MEAN_S, params)
-    return True
-
-
-@compiled
-def _drag(m: MemoryRecord, f: Filter, step: DeltaSample, params: EstimatorParams) -> bool:
-    """Fuse drag in flight while the velocity over ground is measured, twenty times a second; return True if it was."""
-    is_due = f.clock[0] - m["drag_s"][0] >= _DRAG_PERIOD_S
-    if params.drag_is_fused == 0.0 or m["flags"][LANDED] == 1 or not is_due or not is_velocity_measured(f):
-        return False
-    m["drag_s"][0] = f.clock[0]
-    fuse_drag(f, scaled(step.velocity_m_s, 1.0 / step.dt_s), params)
-    return True
-
-
-@compiled
-def _fuse_waiting(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorParams) -> bool:
-    """Fuse all measurements that are due; drop those that are too late. Return False if none was due."""
-    now_s, waiting = f.clock[0], count_of_measurements(r)
-    for _ in range(MAG_ROWS):
-        field = r.mag[slot_of(r, MAG_RING, MAG_ROWS, 0)]
-        if not is_due(r, MAG_RING, field[0], now_s):
-            break
-        if field[0] > now_s - _LATE_S:
-            take_field(m, f, field, params)
-        pop(r, MAG_RING, MAG_ROWS)
-    for _ in range(BARO_ROWS):
-        altitude = r.baro[slot_of(r, BARO_RING, BARO_ROWS, 0)]
-        if not is_due(r, BARO_RING, altitude[0], now_s):
-            break
-        if altitude[0] > now_s - _LATE_S:
-            take_baro(m, f, altitude, params)
-        pop(r, BARO_RING, BARO_ROWS)
-    for _ in range(RANGE_ROWS):
-        distance = r.range[slot_of(r, RANGE_RING, RANGE_ROWS, 0)]
-        if not is_due(r, RANGE_RING, distance[0], now_s):
-            break
-        if distance[0] > now_s - _LATE_S:
-            take_range(m, f, distance, params)
-        pop(r, RANGE_RING, RANGE_ROWS)
-    for _ in range(GNSS_ROWS):
-        fix = r.gnss[slot_of(r, GNSS_RING, GNSS_ROWS, 0)]
-        if not is_due(r, GNSS_RING, fix[0], now_s):
-            break
-        if fix[0] > now_s - _LATE_S:
-            take_gnss(m, f, fix, params)
-            take_velocity(m, f, fix)
-        pop(r, GNSS_RING, GNSS_ROWS)
-    return count_of_measurements(r) != waiting

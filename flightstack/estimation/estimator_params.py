@@ -79,8 +79,9 @@ class EstimatorParams(NamedTuple):
     # timing
     delay_s: float = horizon_s(gnss_delay_s, baro_delay_s, range_delay_s, mag_delay_s)
     """Age of the state of the filter; measurements older than this are fused late."""
-    sensor_period_s: float = 0.02
-    """Least time between two measurements of magnetometer, barometer or range finder; samples between are averaged."""
+    sensor_period_s: float = 0.05
+    """Least time between two measurements of magnetometer, barometer or range finder; samples between are averaged.
+    PX4 has 0.067 and 0.05 (SENS_MAG_RATE, SENS_BARO_RATE)."""
     period_s: float = estimator_default("period_s")
     """Least time between two predictions of the filter."""
     output_s: float = estimator_default("output_s")

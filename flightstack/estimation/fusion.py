@@ -91,10 +91,9 @@ def gnss_bias_share(params: EstimatorParams, axis: int) -> float:
 
 
 @compiled
-def _drift_gnss_bias(
-    f: Filter, elapsed_s: float, eph_m: float, epv_m: float, params: EstimatorParams
-) -> None:
+def drift_gnss_bias(f: Filter, row: GnssRow, elapsed_s: float, params: EstimatorParams) -> None:
     """Propagate the Gauss-Markov process of the GNSS position bias."""
+    eph_m, epv_m = horizontal_accuracy(row), vertical_accuracy(row)
     kept = max(0.0, 1.0 - elapsed_s / params.gnss_bias_s)
     for at in range(GNSS_BIAS, ERROR_STATES):
         spread = gnss_bias_share(params, at - GNSS_BIAS) * (epv_m if at == GNSS_BIAS + 2 else eph_m)
@@ -118,43 +117,34 @@ def _confirm_imu_noise(f: Filter, row: int) -> None:
 
 
 @compiled
-def fuse_gnss(
-    f: Filter,
-    row: GnssRow,
-    age_s: float,
-    elapsed_s: float,
-    first: int,
-    faults: Vector3,
-    params: EstimatorParams,
-) -> None:
-    """Fuse position and velocity from axis ``first``, measured ``age_s`` before the time of the state.
+def fuse_gnss_velocity(f: Filter, row: GnssRow, axis: int, fault: float, params: EstimatorParams) -> None:
+    """Fuse the velocity along an axis; with the fault ``VELOCITY_IS_WRONG`` it has more noise."""
+    speed_m_s = speed_accuracy(row)
+    least = WRONG_VELOCITY_M_S if fault == VELOCITY_IS_WRONG else params.gnss_velocity_noise_m_s
+    noise = Noise(least, speed_m_s, max(2.0 * speed_m_s, least), params.gnss_velocity_gate, 0.0)
+    clear(f.h)
+    f.h[VELOCITY + axis] = 1.0
+    accepted = fuse(f, GNSS_VELOCITY + axis, row[4 + axis] - f.nominal[4 + axis], noise, 0.0)
+    if accepted and fault != VELOCITY_IS_WRONG:
+        _confirm_imu_noise(f, GNSS_VELOCITY + axis)
 
-    ``faults`` has the fault of each axis: a position that drifts is refused, a wrong velocity has more noise.
-    """
-    eph_m, epv_m, speed_m_s = horizontal_accuracy(row), vertical_accuracy(row), speed_accuracy(row)
-    _drift_gnss_bias(f, elapsed_s, eph_m, epv_m, params)
-    for axis in range(first, 3):
-        fault = faults.x if axis == 0 else faults.y if axis == 1 else faults.z
-        least = WRONG_VELOCITY_M_S if fault == VELOCITY_IS_WRONG else params.gnss_velocity_noise_m_s
-        noise = Noise(least, speed_m_s, max(2.0 * speed_m_s, least), params.gnss_velocity_gate, 0.0)
-        clear(f.h)
-        f.h[VELOCITY + axis] = 1.0
-        accepted = fuse(f, GNSS_VELOCITY + axis, row[4 + axis] - f.nominal[4 + axis], noise, 0.0)
-        if accepted and fault != VELOCITY_IS_WRONG:
-            _confirm_imu_noise(f, GNSS_VELOCITY + axis)
-    for axis in range(first, 3):
-        fault = faults.x if axis == 0 else faults.y if axis == 1 else faults.z
-        if fault == POSITION_DRIFTS:
-            f.observations[GNSS_POSITION + axis, REFUSED] += 1.0
-            continue
-        accuracy_m = epv_m if axis == 2 else eph_m
-        least = params.gnss_position_noise_m
-        noise = Noise(least, accuracy_m, max(2.0 * accuracy_m, least), params.gnss_position_gate, 0.0)
-        clear(f.h)
-        f.h[POSITION + axis] = 1.0
-        f.h[GNSS_BIAS + axis] = 1.0
-        then_m = f.nominal[7 + axis] - age_s * f.nominal[4 + axis]
-        fuse(f, GNSS_POSITION + axis, row[1 + axis] - then_m - f.nominal[25 + axis], noise, 0.0)
+
+@compiled
+def fuse_gnss_position(
+    f: Filter, row: GnssRow, age_s: float, axis: int, fault: float, params: EstimatorParams
+) -> None:
+    """Fuse the position along an axis, measured ``age_s`` before the time of the state; refuse one that drifts."""
+    if fault == POSITION_DRIFTS:
+        f.observations[GNSS_POSITION + axis, REFUSED] += 1.0
+        return
+    accuracy_m = vertical_accuracy(row) if axis == 2 else horizontal_accuracy(row)
+    least = params.gnss_position_noise_m
+    noise = Noise(least, accuracy_m, max(2.0 * accuracy_m, least), params.gnss_position_gate, 0.0)
+    clear(f.h)
+    f.h[POSITION + axis] = 1.0
+    f.h[GNSS_BIAS + axis] = 1.0
+    then_m = f.nominal[7 + axis] - age_s * f.nominal[4 + axis]
+    fuse(f, GNSS_POSITION + axis, row[1 + axis] - then_m - f.nominal[25 + axis], noise, 0.0)
 
 
 @compiled
@@ -192,82 +182,87 @@ def fuse_range(f: Filter, vertical_m: float, ground_m: float, age_s: float, para
 
 
 @compiled
-def fuse_field(f: Filter, measured: Vector3, params: EstimatorParams) -> None:
-    """Fuse the magnetic field in the body frame, axis by axis."""
+def fuse_field_axis(f: Filter, axis: int, measured: Vector3, params: EstimatorParams) -> None:
+    """Fuse the magnetic field along an axis of the body."""
     largest = params.mag_largest_noise_gauss
     noise = Noise(params.mag_noise_gauss, largest, largest, params.mag_gate, 1.0)
-    holds = 1.0 - params.mag_corrects_tilt
-    for axis in range(3):
-        n = read_nominal(f.nominal)
-        earth, body = n.earth_field_ned_gauss, n.body_field_frd_gauss
-        clear(f.h)
-        if axis == 0:
-            expected = field_x_jacobian(n.attitude, earth, body, f.h)
-            innovation = measured.x - expected
-        elif axis == 1:
-            expected = field_y_jacobian(n.attitude, earth, body, f.h)
-            innovation = measured.y - expected
-        else:
-            expected = field_z_jacobian(n.attitude, earth, body, f.h)
-            innovation = measured.z - expected
-        fuse(f, MAG + axis, innovation, noise, holds)
+    n = read_nominal(f.nominal)
+    earth, body = n.earth_field_ned_gauss, n.body_field_frd_gauss
+    clear(f.h)
+    if axis == 0:
+        expected = field_x_jacobian(n.attitude, earth, body, f.h)
+        innovation = measured.x - expected
+    elif axis == 1:
+        expected = field_y_jacobian(n.attitude, earth, body, f.h)
+        innovation = measured.y - expected
+    else:
+        expected = field_z_jacobian(n.attitude, earth, body, f.h)
+        innovation = measured.z - expected
+    fuse(f, MAG + axis, innovation, noise, 1.0 - params.mag_corrects_tilt)
 
 
 @compiled
-def fuse_drag(f: Filter, force: Vector3, params: EstimatorParams) -> None:
-    """Fuse the specific force along the body's x and y axes, which in flight is the drag of the air.
+def fuse_field(f: Filter, measured: Vector3, params: EstimatorParams) -> None:
+    """Fuse the magnetic field in the body frame, axis by axis."""
+    for axis in range(3):
+        fuse_field_axis(f, axis, measured, params)
+
+
+@compiled
+def fuse_drag(f: Filter, axis: int, force: Vector3, params: EstimatorParams) -> None:
+    """Fuse the specific force along the body's x (0) or y (1) axis, which in flight is the drag of the air.
 
     Drag is −(``momentum_drag_1_s`` + ½ ρ |u| / ballistic coefficient) u for the velocity u relative to the air: that of
     the rotors' momentum and that of the body. Its change with |u| is left out of the Jacobian.
     """
     deviation = math.sqrt(params.drag_variance)
     noise = Noise(deviation, deviation, deviation, _DRAG_GATE, 0.0)
-    for axis in range(2):
-        n = read_nominal(f.nominal)
-        v, bias = n.velocity_ned_m_s, n.accel_bias_m_s2
-        north, east = n.wind_north_m_s, n.wind_east_m_s
-        speed = math.sqrt((v.x - north) * (v.x - north) + (v.y - east) * (v.y - east) + v.z * v.z)
-        ballistic = params.ballistic_x_kg_m2 if axis == 0 else params.ballistic_y_kg_m2
-        rate = params.momentum_drag_1_s + (0.5 * _AIR_KG_M3 * speed / ballistic if ballistic > 0.0 else 0.0)
-        clear(f.h)
-        if axis == 0:
-            expected = drag_x_jacobian(n.attitude, v, bias, north, east, rate, f.h)
-            innovation = force.x - expected
-        else:
-            expected = drag_y_jacobian(n.attitude, v, bias, north, east, rate, f.h)
-            innovation = force.y - expected
-        fuse(f, DRAG + axis, innovation, noise, 0.0)
+    n = read_nominal(f.nominal)
+    v, bias = n.velocity_ned_m_s, n.accel_bias_m_s2
+    north, east = n.wind_north_m_s, n.wind_east_m_s
+    speed = math.sqrt((v.x - north) * (v.x - north) + (v.y - east) * (v.y - east) + v.z * v.z)
+    ballistic = params.ballistic_x_kg_m2 if axis == 0 else params.ballistic_y_kg_m2
+    rate = params.momentum_drag_1_s + (0.5 * _AIR_KG_M3 * speed / ballistic if ballistic > 0.0 else 0.0)
+    clear(f.h)
+    if axis == 0:
+        expected = drag_x_jacobian(n.attitude, v, bias, north, east, rate, f.h)
+        innovation = force.x - expected
+    else:
+        expected = drag_y_jacobian(n.attitude, v, bias, north, east, rate, f.h)
+        innovation = force.y - expected
+    fuse(f, DRAG + axis, innovation, noise, 0.0)
 
 
 @compiled
-def fuse_rest_velocity(f: Filter, params: EstimatorParams) -> None:
-    """Fuse zero velocity of a vehicle that stands."""
+def fuse_rest_velocity(f: Filter, axis: int, params: EstimatorParams) -> None:
+    """Fuse zero velocity along an axis of a vehicle that stands."""
     velocity = params.rest_velocity_noise_m_s
     noise = Noise(velocity, velocity, velocity, 5.0, 0.0)
-    for axis in range(3):
-        clear(f.h)
-        f.h[VELOCITY + axis] = 1.0
-        fuse(f, REST_VELOCITY + axis, -f.nominal[4 + axis], noise, 0.0)
+    clear(f.h)
+    f.h[VELOCITY + axis] = 1.0
+    fuse(f, REST_VELOCITY + axis, -f.nominal[4 + axis], noise, 0.0)
 
 
 @compiled
-def fuse_rest_rate(f: Filter, rate_rad_s: Vector3, variance: float, params: EstimatorParams) -> None:
-    """Fuse zero rate of a vehicle that stands: ``rate_rad_s``, with this variance of noise, is the bias of the gyro."""
+def fuse_rest_rate(
+    f: Filter, axis: int, rate_rad_s: Vector3, variance: float, params: EstimatorParams
+) -> None:
+    """Fuse zero rate about an axis of a vehicle that stands.
+
+    ``rate_rad_s``, with this variance of noise, is the bias of the gyro.
+    """
     deviation = params.rest_rate_noise_rad_s + math.sqrt(variance)
     noise = Noise(deviation, deviation, deviation, 3.0, 0.0)
-    for axis in range(3):
-        clear(f.h)
-        f.h[GYRO_BIAS + axis] = 1.0
-        value = rate_rad_s.x if axis == 0 else rate_rad_s.y if axis == 1 else rate_rad_s.z
-        fuse(f, REST_RATE + axis, value - f.nominal[10 + axis], noise, 0.0)
+    clear(f.h)
+    f.h[GYRO_BIAS + axis] = 1.0
+    value = rate_rad_s.x if axis == 0 else rate_rad_s.y if axis == 1 else rate_rad_s.z
+    fuse(f, REST_RATE + axis, value - f.nominal[10 + axis], noise, 0.0)
 
 
 @compiled
-def fuse_hold(f: Filter, north_m: float, east_m: float, params: EstimatorParams) -> None:
+def fuse_hold(f: Filter, axis: int, held_m: float, params: EstimatorParams) -> None:
     """Fuse a horizontal position that is held without a measurement of it, which bounds velocity and tilt."""
     noise = Noise(params.hold_noise_m, params.hold_noise_m, params.hold_noise_m, 100.0, 0.0)
-    for axis in range(2):
-        clear(f.h)
-        f.h[POSITION + axis] = 1.0
-        held_m = north_m if axis == 0 else east_m
-        fuse(f, HOLD_POSITION + axis, held_m - f.nominal[7 + axis], noise, 0.0)
+    clear(f.h)
+    f.h[POSITION + axis] = 1.0
+    fuse(f, HOLD_POSITION + axis, held_m - f.nominal[7 + axis], noise, 0.0)

@@ -6,7 +6,14 @@ from typing import Annotated, TypeAlias
 
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Quaternion, Vector3
-from flightstack.core.geometry import normalised, quaternion_product, rotate, rotation_over, rotation_vector
+from flightstack.core.geometry import (
+    cross,
+    normalised,
+    quaternion_product,
+    rotate,
+    rotation_over,
+    rotation_vector,
+)
 from flightstack.estimation.error_state import read_vector, scaled, write_vector
 from flightstack.estimation.prediction import DeltaSample
 
@@ -28,9 +35,8 @@ def add_sample(sums: Sums, gyro: Vector3, accel: Vector3, dt_s: float) -> None:
     """Add one raw sample."""
     angle = scaled(gyro, dt_s)
     before = Quaternion(sums[1], sums[2], sums[3], sums[4])
-    middle = normalised(quaternion_product(before, rotation_over(angle, 0.5)))
     after = normalised(quaternion_product(before, rotation_over(angle, 1.0)))
-    dv = rotate(middle, scaled(accel, dt_s))
+    dv = rotate(before, in_start_frame(angle, scaled(accel, dt_s)))
     sums[0] += dt_s
     sums[1], sums[2], sums[3], sums[4] = after.w, after.x, after.y, after.z
     sums[5] += dv.x
@@ -40,6 +46,16 @@ def add_sample(sums: Sums, gyro: Vector3, accel: Vector3, dt_s: float) -> None:
     _smooth(sums, _MEAN, gyro, share)
     _smooth(sums, _MEAN + 3, accel, share)
     sums[_COUNT] += 1.0
+
+
+@compiled
+def in_start_frame(angle: Vector3, velocity: Vector3) -> Vector3:
+    """Return a sample's change of the velocity in the frame at its start, to first order of its rotation vector.
+
+    The mean specific force acts in the attitude in the middle of the sample.
+    """
+    turn = cross(angle, velocity)
+    return Vector3(velocity.x + 0.5 * turn.x, velocity.y + 0.5 * turn.y, velocity.z + 0.5 * turn.z)
 
 
 @compiled

@@ -49,6 +49,8 @@ _LARGEST_CORRELATION = 0.95
 
 HOLDS_HORIZONTAL = 2.0
 
+BEHIND_SIZE = 7
+
 Observations: TypeAlias = Annotated[FloatArray, OBSERVATIONS, OBSERVATION_COLUMNS]
 
 
@@ -65,6 +67,8 @@ class Filter(NamedTuple):
     gain: ErrorVector
     clock: Annotated[FloatArray, 2]
     """Time of the state, at the delayed horizon; share of the measured IMU noise that innovations of GNSS confirm."""
+    behind: Annotated[FloatArray, BEHIND_SIZE]
+    """What the covariance has not followed yet: time, rotation vector of the body, velocity change NED by forces."""
 
 
 class Noise(NamedTuple):

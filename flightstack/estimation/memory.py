@@ -23,6 +23,11 @@ from flightstack.estimation.yaw_estimator import Models
 ALIGNED, LANDED, HAS_BARO, HAS_GNSS, HAS_RANGE, HAS_MAG, HAS_YAW, MAG_FAULT, FLAGS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 """``HAS_YAW``: the yaw is known, from the magnetometer or from GNSS velocity. ``MAG_FAULT``: GNSS velocity has
 disproved the yaw of the magnetometer, which is not used any more."""
+SOURCE, AXIS, FUSED_ANY, AGENDA_SIZE = 0, 1, 2, 3
+"""The open step: the source that is at work, 0 if no step is open; its next axis; 1 if a measurement was fused."""
+NOTHING = -1
+"""Returned by a source without a measurement that is due; else it returns its next axis, 0 after the last one."""
+Agenda: TypeAlias = "Annotated[np.ndarray[tuple[int], np.dtype[np.int64]], AGENDA_SIZE]"
 Flags: TypeAlias = "Annotated[np.ndarray[tuple[int], np.dtype[np.int64]], FLAGS]"
 POSITION_RESET, VELOCITY_RESET, YAW_RESET, RESETS = 0, 8, 16, 19
 RESET_CHANGE, RESET_SUM, RESET_S, YAW_RESET_SUM = 1, 4, 7, 18
@@ -73,6 +78,11 @@ class EstimatorMemory(NamedTuple):
     followed: Annotated[FloatArray, 1]
     """Number of resets that the output has followed."""
     checks: Checks
+    agenda: Agenda
+    pending: Annotated[FloatArray, 10]
+    """The measurement that is being fused, a row of its ring."""
+    before_gnss: Annotated[FloatArray, 6]
+    """Before the measurement of GNSS that is being fused: time since the last one, outage; position and velocity NE."""
 
 
 MEMORY = dtype_of(EstimatorMemory)
@@ -95,7 +105,9 @@ def start_memory(memory: MemoryArray) -> None:
 @compiled
 def filter_of(m: MemoryRecord) -> Filter:
     """Return the filter's arrays of a record of ``MEMORY``."""
-    return Filter(m["nominal"], m["covariance"], m["observations"], m["h"], m["ph"], m["gain"], m["clock"])
+    return Filter(
+        m["nominal"], m["covariance"], m["observations"], m["h"], m["ph"], m["gain"], m["clock"], m["behind"]
+    )
 
 
 @compiled

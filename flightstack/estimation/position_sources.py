@@ -6,10 +6,12 @@ import math
 
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
-from flightstack.estimation.error_state import BARO_BIAS, GNSS_BIAS, POSITION, VELOCITY, read_vector
+from flightstack.estimation.error_state import BARO_BIAS, GNSS_BIAS, POSITION, VELOCITY
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.fusion import (
-    fuse_gnss,
+    drift_gnss_bias,
+    fuse_gnss_position,
+    fuse_gnss_velocity,
     fuse_hold,
     gnss_bias_share,
     horizontal_accuracy,
@@ -24,7 +26,7 @@ from flightstack.estimation.kalman import (
     deviation,
     reset_variance,
 )
-from flightstack.estimation.memory import HAS_BARO, HAS_GNSS, HAS_YAW, LANDED, MemoryRecord
+from flightstack.estimation.memory import HAS_BARO, HAS_GNSS, HAS_YAW, LANDED, NOTHING, MemoryRecord
 from flightstack.estimation.resets import count_correction, reset_position, reset_velocity
 from flightstack.estimation.source_checks import (
     GNSS_FAULT,
@@ -42,28 +44,61 @@ _LONGEST_INTERVAL_S = 2.5
 """Most time that one refused measurement counts."""
 _SPEED_SMOOTHING_S = 2.0
 _MOVES_M_S = 0.15
+YAW_STAGE = 6
+"""Stage of a measurement after its velocities (0 to 2) and positions (3 to 5)."""
+_ELAPSED_S, _OUTAGE_S, _BEFORE = 0, 1, 2
+"""Columns of ``before_gnss``."""
 
 
 @compiled
-def take_gnss(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
-    """Fuse a GNSS measurement; without a known yaw only its vertical parts. Reset what was refused too long."""
+def take_gnss(m: MemoryRecord, f: Filter, row: FloatArray, stage: int, params: EstimatorParams) -> int:
+    """Fuse a scalar of a GNSS measurement: three velocities, three positions; return the next stage.
+
+    Without a known yaw only the vertical parts count. The last one resets what was refused too long.
+    """
+    first = 0 if m["flags"][HAS_YAW] == 1 else 2
+    at: int = stage
+    if stage == 0:
+        _begin_gnss(m, f, row, params)
+        at = first
+    axis: int = at if at < 3 else at - 3
+    fault = m["checks"][GNSS_FAULT + axis]
+    if at < 3:
+        fuse_gnss_velocity(f, row, axis, fault, params)
+    else:
+        fuse_gnss_position(f, row, f.clock[0] - row[0], axis, fault, params)
+    if at == YAW_STAGE - 1:
+        _end_gnss(m, f, row, first, params)
+    return at + 1 if at != 2 else 3 + first
+
+
+@compiled
+def _begin_gnss(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
+    """Propagate what belongs to GNSS to the time of the measurement, and note the state before it."""
     if m["flags"][HAS_GNSS] == 0:
         _start_gnss(m, f, row, params)
-    elapsed_s = max(0.0, row[0] - m["last_gnss_s"][0])
+    before = m["before_gnss"]
+    before[_ELAPSED_S] = max(0.0, row[0] - m["last_gnss_s"][0])
+    before[_OUTAGE_S] = f.clock[0] - f.observations[GNSS_POSITION, FUSED_S]
+    for axis in range(2):
+        before[_BEFORE + axis], before[_BEFORE + 2 + axis] = f.nominal[7 + axis], f.nominal[4 + axis]
     m["last_gnss_s"][0] = row[0]
-    first = 0 if m["flags"][HAS_YAW] == 1 else 2
-    outage_s = f.clock[0] - f.observations[GNSS_POSITION, FUSED_S]
-    position, velocity = read_vector(f.nominal, 7), read_vector(f.nominal, 4)
-    c = m["checks"]
-    follow_drift(c, f, row, horizontal_accuracy(row))
-    fuse_gnss(f, row, f.clock[0] - row[0], elapsed_s, first, read_vector(c, GNSS_FAULT), params)
+    follow_drift(m["checks"], f, row, horizontal_accuracy(row))
+    drift_gnss_bias(f, row, before[_ELAPSED_S], params)
+
+
+@compiled
+def _end_gnss(m: MemoryRecord, f: Filter, row: FloatArray, first: int, params: EstimatorParams) -> None:
+    """Judge the measurement by its innovations, and reset what was refused too long."""
+    before, c = m["before_gnss"], m["checks"]
+    elapsed_s = before[_ELAPSED_S]
     if m["flags"][LANDED] == 0:
         take_gnss_innovations(c, f, elapsed_s, m["flags"][HAS_BARO] == 1)
         if first == 0:
             take_horizontal_innovations(c, f, elapsed_s)
-    dx, dy = f.nominal[7] - position.x, f.nominal[8] - position.y
-    if outage_s > _GNSS_LOST_S and dx * dx + dy * dy > _COUNTED_M * _COUNTED_M:
-        count_correction(m, f, position, velocity)
+    dx, dy = f.nominal[7] - before[_BEFORE], f.nominal[8] - before[_BEFORE + 1]
+    if before[_OUTAGE_S] > _GNSS_LOST_S and dx * dx + dy * dy > _COUNTED_M * _COUNTED_M:
+        count_correction(m, f, dx, dy, f.nominal[4] - before[_BEFORE + 2], f.nominal[5] - before[_BEFORE + 3])
     _count_refused(m, f, first, min(elapsed_s, _LONGEST_INTERVAL_S))
     share = min(elapsed_s / _SPEED_SMOOTHING_S, 1.0)
     for axis in range(2):
@@ -135,17 +170,18 @@ def is_platform_at_rest(m: MemoryRecord, f: Filter) -> bool:
 
 
 @compiled
-def hold_position(m: MemoryRecord, f: Filter, params: EstimatorParams) -> bool:
-    """Hold the horizontal position while the velocity is not measured; return True if it was fused."""
+def hold_position(m: MemoryRecord, f: Filter, axis: int, params: EstimatorParams) -> int:
+    """Hold the horizontal position while the velocity is not measured, north before east; return the next axis."""
     hold, now_s = m["hold"], f.clock[0]
-    is_used = m["flags"][HAS_GNSS] == 1 and m["flags"][HAS_YAW] == 1
-    if is_velocity_measured(f) or (is_used and deviation(f, VELOCITY, 2) < params.hold_velocity_m_s):
-        hold[2] = 0.0
-        return False
-    if hold[2] == 0.0:
-        hold[0], hold[1] = f.nominal[7], f.nominal[8]
-    if now_s - hold[2] < _HOLD_PERIOD_S:
-        return False
-    fuse_hold(f, hold[0], hold[1], params)
-    hold[2] = now_s
-    return True
+    if axis == 0:
+        is_used = m["flags"][HAS_GNSS] == 1 and m["flags"][HAS_YAW] == 1
+        if is_velocity_measured(f) or (is_used and deviation(f, VELOCITY, 2) < params.hold_velocity_m_s):
+            hold[2] = 0.0
+            return NOTHING
+        if hold[2] == 0.0:
+            hold[0], hold[1] = f.nominal[7], f.nominal[8]
+        if now_s - hold[2] < _HOLD_PERIOD_S:
+            return NOTHING
+        hold[2] = now_s
+    fuse_hold(f, axis, hold[axis], params)
+    return 1 - axis

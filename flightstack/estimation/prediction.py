@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import Quaternion, Vector3
-from flightstack.core.geometry import cross, normalised, quaternion_product, rotate, rotation_over
+from flightstack.core.geometry import conjugate, cross, normalised, quaternion_product, rotate, rotation_over
 from flightstack.estimation.derived_generated import predict_covariance
 from flightstack.estimation.error_state import (
     ACCEL_BIAS,
@@ -21,10 +21,13 @@ from flightstack.estimation.error_state import (
     Covariance,
     Nominal,
     read_nominal,
+    read_vector,
+    sum_of,
     write_nominal,
+    write_vector,
 )
 from flightstack.estimation.estimator_params import EstimatorParams
-from flightstack.estimation.kalman import Filter
+from flightstack.estimation.kalman import BEHIND_SIZE, Filter
 
 _TURN_S = 1.0
 
@@ -125,10 +128,10 @@ def _turn_variance(angle: Vector3, dt_s: float, params: EstimatorParams) -> floa
 
 @compiled
 def _add_process_noise(
-    f: Filter, q: Quaternion, angle: Vector3, sample: DeltaSample, params: EstimatorParams
+    f: Filter, q: Quaternion, angle: Vector3, dt_s: float, sample: DeltaSample, params: EstimatorParams
 ) -> None:
     p, share = f.covariance, f.clock[1]
-    dt_s, gyro, accel = sample.dt_s, params.gyro_noise, params.accel_noise
+    gyro, accel = params.gyro_noise, params.accel_noise
     x = rotate(q, Vector3(1.0, 0.0, 0.0))
     y = rotate(q, Vector3(0.0, 1.0, 0.0))
     z = cross(x, y)
@@ -150,13 +153,30 @@ def _add_process_noise(
 
 @compiled
 def predict(f: Filter, sample: DeltaSample, params: EstimatorParams) -> None:
-    """Propagate state and covariance over the sample."""
-    n = read_nominal(f.nominal)
+    """Propagate the state over the sample. The covariance is behind it until ``predict_errors``."""
+    n, behind = read_nominal(f.nominal), f.behind
     angle = less_bias(sample.angle_rad, n.gyro_bias_rad_s, sample.dt_s)
     delta_velocity = less_bias(sample.velocity_m_s, n.accel_bias_m_s2, sample.dt_s)
     middle = quaternion_product(n.attitude, rotation_over(angle, 0.5))
+    change = rotate(middle, delta_velocity)
+    behind[0] += sample.dt_s
+    write_vector(behind, 1, sum_of(read_vector(behind, 1), angle))
+    write_vector(behind, 4, sum_of(read_vector(behind, 4), change))
     after = moved(motion_of(n), angle, delta_velocity, sample.dt_s, params.gravity_m_s2)
-    predict_covariance(f.covariance, middle, delta_velocity, sample.dt_s)
-    _add_process_noise(f, middle, angle, sample, params)
     write_nominal(f.nominal, with_motion(n, after))
     f.clock[0] = sample.time_s
+
+
+@compiled
+def predict_errors(f: Filter, newest: DeltaSample, params: EstimatorParams) -> None:
+    """Propagate the covariance to the time of the state, over all samples since it was last, ``newest`` among them.
+
+    The errors then move with the attitude in the middle of that time.
+    """
+    dt_s, angle, change = f.behind[0], read_vector(f.behind, 1), read_vector(f.behind, 4)
+    attitude = Quaternion(f.nominal[0], f.nominal[1], f.nominal[2], f.nominal[3])
+    middle = quaternion_product(attitude, rotation_over(angle, -0.5))
+    predict_covariance(f.covariance, middle, rotate(conjugate(middle), change), dt_s)
+    _add_process_noise(f, middle, angle, dt_s, newest, params)
+    for i in range(BEHIND_SIZE):
+        f.behind[i] = 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray, Vector3
+from flightstack.core.contract import FloatArray
 from flightstack.estimation.error_state import GNSS_BIAS, POSITION, VELOCITY
 from flightstack.estimation.fusion import horizontal_accuracy, speed_accuracy, vertical_accuracy
 from flightstack.estimation.kalman import Filter, reset_variance
@@ -48,15 +48,16 @@ def reset_position(m: MemoryRecord, f: Filter, row: FloatArray, first: int, coun
 
 
 @compiled
-def count_correction(m: MemoryRecord, f: Filter, position_m: Vector3, velocity_m_s: Vector3) -> None:
-    """Count the horizontal change from an earlier position and velocity as resets of both."""
-    x = f.nominal
+def count_correction(
+    m: MemoryRecord, f: Filter, north_m: float, east_m: float, north_m_s: float, east_m_s: float
+) -> None:
+    """Count a horizontal change of position and velocity as resets of both."""
     _count(m, f, POSITION_RESET)
     _count(m, f, VELOCITY_RESET)
-    _add_change(m, POSITION_RESET, 0, x[7] - position_m.x)
-    _add_change(m, POSITION_RESET, 1, x[8] - position_m.y)
-    _add_change(m, VELOCITY_RESET, 0, x[4] - velocity_m_s.x)
-    _add_change(m, VELOCITY_RESET, 1, x[5] - velocity_m_s.y)
+    _add_change(m, POSITION_RESET, 0, north_m)
+    _add_change(m, POSITION_RESET, 1, east_m)
+    _add_change(m, VELOCITY_RESET, 0, north_m_s)
+    _add_change(m, VELOCITY_RESET, 1, east_m_s)
 
 
 @compiled

@@ -15,6 +15,8 @@ GNSS_RING, MAG_RING, BARO_RING, RANGE_RING, IMU_RING, RINGS = 0, 1, 2, 3, 4, 5
 IMU_COLUMNS, TRACK_COLUMNS = 14, 11
 _COUNT, _PUSHED_S, _LAST_S, MEAN_SIZE = 4, 5, 6, 7
 """Columns of a mean of samples: sums of a row (4), their number, times of the last row and of the last sample."""
+_ROUNDING_S = 2.5e-4
+"""Means of samples end at the time of a step: the rounding of a float32 must not decide in which step they count."""
 
 Cursors: TypeAlias = "Annotated[np.ndarray[tuple[int, int], np.dtype[np.int64]], RINGS, 2]"
 """For each ring the slot of its oldest row, and the number of its rows."""
@@ -53,7 +55,7 @@ def count_of_measurements(rings: Rings) -> int:
 def is_due(rings: Rings, ring: int, row_s: float, now_s: float) -> bool:
     """Return True if the ring has rows and its oldest one, measured at ``row_s``, is not in the future."""
     count: int = rings.cursors[ring, 1]
-    return count > 0 and row_s <= now_s
+    return count > 0 and row_s <= now_s + _ROUNDING_S
 
 
 @compiled
@@ -101,6 +103,13 @@ def newest_fix_time(rings: Rings) -> float:
         return -math.inf
     newest_s: float = rings.gnss[slot_of(rings, GNSS_RING, GNSS_ROWS, count - 1), 0]
     return newest_s
+
+
+@compiled
+def read_row(row: FloatArray, values: FloatArray) -> None:
+    """Copy a row to the first of ``values``."""
+    for column in range(row.size):
+        values[column] = row[column]
 
 
 @compiled

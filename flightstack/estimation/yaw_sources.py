@@ -16,7 +16,7 @@ from flightstack.estimation.error_state import (
     turned,
 )
 from flightstack.estimation.estimator_params import EstimatorParams
-from flightstack.estimation.fusion import fuse_field, speed_accuracy
+from flightstack.estimation.fusion import fuse_field_axis, speed_accuracy
 from flightstack.estimation.kalman import DECLINATION, KNOWN_FIELD, Filter, Noise, clear, fuse, reset_variance
 from flightstack.estimation.memory import (
     HAS_GNSS,
@@ -57,11 +57,24 @@ _REFUSED_S = 1.0
 
 
 @compiled
-def take_field(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
-    """Fuse a magnetic field; the first one after the alignment gives the yaw if that is unknown."""
-    field, earth = read_vector(row, 1), m["earth"]
+def take_field(m: MemoryRecord, f: Filter, row: FloatArray, axis: int, params: EstimatorParams) -> int:
+    """Fuse an axis of a magnetic field, and return the next one, 0 after the last.
+
+    The first field after the alignment gives the yaw if that is unknown.
+    """
+    field = read_vector(row, 1)
     if m["flags"][MAG_FAULT] == 1:
-        return
+        return 0
+    if axis == 0:
+        _start_field(m, f, field, params)
+    fuse_field_axis(f, axis, field, params)
+    return axis + 1 if axis < 2 else 0
+
+
+@compiled
+def _start_field(m: MemoryRecord, f: Filter, field: Vector3, params: EstimatorParams) -> None:
+    """Note the field; set the states of the field, and an unknown yaw, by the first one."""
+    earth = m["earth"]
     m["field"][0], m["field"][1], m["field"][2] = field.x, field.y, field.z
     if m["flags"][HAS_MAG] == 0:
         m["flags"][HAS_MAG] = 1
@@ -72,7 +85,6 @@ def take_field(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorPar
         else:
             level = rotate(read_nominal(f.nominal).attitude, field)
             set_field(f, level, read_vector(earth, 0), earth[3], params)
-    fuse_field(f, field, params)
 
 
 @compiled

@@ -31,7 +31,7 @@ def _param(
 
 
 ESTIMATOR_PARAMS = (
-    _param("EKF2_PREDICT_US", 8000, 1000, 20000, "us",
+    _param("EKF2_PREDICT_US", 10000, 1000, 20000, "us",
            "Least time between two predictions; at least 1/48 of the longest delay", "period_s", _US, integer=True),
     _param("EKF2_TAU_VEL", 0.15, 0.0, 1.0, "s", "Time constant with which the output follows the filter; 0 at once",
            "output_s"),

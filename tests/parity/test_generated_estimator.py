@@ -24,13 +24,16 @@ from tests.support.generated_c import compile_program, in_python
 COUNT = 4
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     "prediction": prediction.predict,
+    "prediction of errors": prediction.predict_errors,
     "covariance": derived_generated.predict_covariance,
     "scalar fusion": kalman.fuse,
     "reset of a variance": kalman.reset_variance,
-    "GNSS": fusion.fuse_gnss,
+    "drift of GNSS": fusion.drift_gnss_bias,
+    "GNSS velocity": fusion.fuse_gnss_velocity,
+    "GNSS position": fusion.fuse_gnss_position,
     "barometer": fusion.fuse_baro,
     "range": fusion.fuse_range,
-    "field": fusion.fuse_field,
+    "field": fusion.fuse_field_axis,
     "drag": fusion.fuse_drag,
     "rest": fusion.fuse_rest_velocity,
     "rate at rest": fusion.fuse_rest_rate,
@@ -41,7 +44,18 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "weights of yaw models": yaw_estimator.update_models,
     "yaw of models": yaw_estimator.mean_turn,
 }
-_BOUNDS = {"reset of a variance": {"at": 3, "count": 4}, "scalar fusion": {"row": 6}, "GNSS": {"first": 2}}
+_AXIS = {"axis": 1}
+_BOUNDS = {
+    "reset of a variance": {"at": 3, "count": 4},
+    "scalar fusion": {"row": 6},
+    "GNSS velocity": _AXIS,
+    "GNSS position": {"axis": 2},
+    "field": _AXIS,
+    "drag": _AXIS,
+    "rest": _AXIS,
+    "rate at rest": _AXIS,
+    "held position": _AXIS,
+}
 """Integers that a caller gives, within the arrays."""
 
 

@@ -301,10 +301,13 @@ STREAMS: dict[str, Callable[[], Events]] = {
     "barometer stuck": lambda: _stuck_barometer(_LONG()),
     "barometer drifts": lambda: _wrong_barometer(_LONG(), 0.0, 1.0),
     "barometer jumps without GNSS": lambda: _with_params(
-        _wrong_barometer(_without(_LONG(), GNSS_RING, _CLIMB_S), 50.0, 0.0), reset_s=1.0
+        _wrong_barometer(_without(_LONG(), GNSS_RING, _CLIMB_S - 0.5), 50.0, 0.0), reset_s=1.0
     ),
     "accelerometer wrong without a barometer": lambda: _wrong_accelerometer(
         _without(_LONG(), BARO_RING), 2.0
+    ),
+    "IMU lost, then the magnetometer": lambda: _without(
+        _without(_LONG(), IMU, _CLIMB_S, _CLIMB_S + 2.5), MAG_RING, _CLIMB_S + 1.9, _LATE_S
     ),
     "other cut-offs of the rates": lambda: _other_cutoffs(flown()),
     "Earth's field changed": lambda: _new_earth_field(flown(), 0.2),

@@ -15,9 +15,9 @@ from flightstack.core.geometry import conjugate, quaternion_product, rotation_ve
 from flightstack.estimation.error_state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams
-from flightstack.estimation.kalman import GNSS_VELOCITY, INNOVATION, INNOVATION_VARIANCE
+from flightstack.estimation.kalman import FUSED, GNSS_VELOCITY, INNOVATION, INNOVATION_VARIANCE, REFUSED
 from flightstack.estimation.memory import POSITION_RESET, VELOCITY_RESET
-from flightstack.estimation.sensor_samples import GnssSample, ImuSample, MagSample
+from flightstack.estimation.sensor_samples import BaroSample, GnssSample, ImuSample, MagSample
 from tests.support import flown_sensors as flown
 from tests.support.flown_sensors import Faults
 
@@ -133,6 +133,31 @@ def test_lasting_jump_of_gnss_resets_the_position_alone() -> None:
 def test_disturbed_magnetometer_does_not_turn_the_yaw() -> None:
     errors = fly(Faults(disturbed_s=(35.0, 50.0), disturbance_gauss=0.3)).between(35.0, 50.0)
     assert math.degrees(np.abs(errors[:, 3]).max()) < 3.0
+
+
+def test_sample_of_the_imu_fuses_one_scalar_at_most_and_keeps_pace() -> None:
+    estimator, frame = Estimator(), LocalFrame(flown.HOME)
+    estimator.set_earth_field(flown.EARTH)
+    still, force = Vector3(0.0, 0.0, 0.0), Vector3(0.0, 0.0, -flown.GRAVITY)
+    observations, most, lag_s = estimator.memory["observations"][0], 0.0, 0.0
+    for tick in range(1, 5001):  # 500 Hz, 10 s
+        time_s = 0.002 * tick
+        if tick % 10 == 0:
+            estimator.mag(MagSample(time_s, flown.EARTH))
+            estimator.baro(BaroSample(time_s, 955.0, 488.0 + 0.01 * (tick % 3), 20.0))
+        if tick % 50 == 0:
+            point = frame.to_geo(Vector3(0.01 * (tick % 7), 0.0, 0.0))
+            estimator.gnss(GnssSample(time_s, *point, Vector3(0.01, 0.0, 0.0), 0.5, 0.8, 0.1, 3, 14))
+        before = observations[:, FUSED].sum() + observations[:, REFUSED].sum()
+        was_aligned = estimator.aligned
+        estimator.imu(ImuSample(time_s, 0.002, still, force))
+        if was_aligned:
+            after = observations[:, FUSED].sum() + observations[:, REFUSED].sum()
+            most = max(most, after - before)
+            lag_s = max(lag_s, time_s - estimator.memory["clock"][0, 0])
+    assert most == 1.0
+    assert lag_s < EstimatorParams().delay_s + 0.045  # within the backlog of 0.03 s, a step and a sample
+    assert observations[GNSS_VELOCITY, FUSED] > 85.0  # of 94 after the alignment and the delay
 
 
 def test_equal_samples_give_equal_bytes() -> None:

@@ -9,7 +9,6 @@
 #include "fs_estimator_params.h"
 #include "fs_kalman.h"
 #include "fs_memory.h"
-#include "fs_prediction.h"
 #include "fs_rings.h"
 #include "fs_types.h"
 
@@ -19,7 +18,7 @@
  * A measurement that is not finite is dropped; only the accuracies of GNSS, behind its velocity, may be missing. row
  * may change.
  *
- * delayed_filter.py:96
+ * delayed_filter.py:68
  */
 void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], int32_t row_size);
 
@@ -29,11 +28,11 @@ void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], in
  * A sample that is not finite, or without a step in time, or not later than the last one, is dropped. Time without
  * samples is bridged by the next sample.
  *
- * delayed_filter.py:131
+ * delayed_filter.py:103
  */
 void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[]);
 
-/* Take the Earth's field in earth. delayed_filter.py:184 */
+/* Take the Earth's field in earth. delayed_filter.py:165 */
 void fs_field_kernel(fs_estimator_memory *memory);
 
 #endif

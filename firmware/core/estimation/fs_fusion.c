@@ -14,6 +14,9 @@
 #define FS_REST_RATE 14
 #define FS_POSITION 6
 #define FS_HOLD_POSITION 17
+#define FS_DRAG_GATE FS_LIT(5.0)
+#define FS_AIR_KG_M3 FS_LIT(1.225)
+#define FS_DRAG 23
 #define FS_GNSS_VELOCITY 0
 #define FS_FUSED_S 3
 #define FS_AIDED_S FS_LIT(1.0)
@@ -21,9 +24,9 @@
 #define FS_BARO 6
 #define FS_HOLDS_HORIZONTAL FS_LIT(2.0)
 #define FS_RANGE 10
+#define FS_UNKNOWN_M_S FS_LIT(0.5)
 #define FS_UNKNOWN_VERTICAL_M FS_LIT(8.0)
 #define FS_UNKNOWN_M FS_LIT(5.0)
-#define FS_UNKNOWN_M_S FS_LIT(0.5)
 #define FS_GNSS_BIAS 24
 #define FS_VELOCITY_IS_WRONG FS_LIT(2.0)
 #define FS_WRONG_VELOCITY_M_S FS_LIT(2.0)
@@ -34,12 +37,9 @@
 #define FS_POSITION_DRIFTS FS_LIT(1.0)
 #define FS_GNSS_POSITION 3
 #define FS_REFUSED 7
-#define FS_DRAG_GATE FS_LIT(5.0)
-#define FS_AIR_KG_M3 FS_LIT(1.225)
-#define FS_DRAG 23
 
-/* fusion.py:195 */
-void fs_fuse_field(fs_filter *f, const fs_vector3 *measured, const fs_estimator_params *params)
+/* fusion.py:185 */
+void fs_fuse_field_axis(fs_filter *f, int32_t axis, const fs_vector3 *measured, const fs_estimator_params *params)
 {
     const fs_real largest = params->mag_largest_noise_gauss;
     const fs_noise noise = {
@@ -49,58 +49,59 @@ void fs_fuse_field(fs_filter *f, const fs_vector3 *measured, const fs_estimator_
         .gate = params->mag_gate,
         .is_slow = FS_LIT(1.0),
     };
-    const fs_real holds = FS_LIT(1.0) - params->mag_corrects_tilt;
-    for (int32_t axis = 0; axis < 3; axis++) {
-        const fs_nominal n = fs_read_nominal(f->nominal);
-        const fs_vector3 *earth = &n.earth_field_ned_gauss;
-        const fs_vector3 *body = &n.body_field_frd_gauss;
-        fs_clear(f->h);
-        fs_real expected;
-        fs_real innovation;
-        if (axis == 0) {
-            expected = fs_field_x_jacobian(&n.attitude, earth, body, f->h);
-            innovation = measured->x - expected;
+    const fs_nominal n = fs_read_nominal(f->nominal);
+    const fs_vector3 *earth = &n.earth_field_ned_gauss;
+    const fs_vector3 *body = &n.body_field_frd_gauss;
+    fs_clear(f->h);
+    fs_real expected;
+    fs_real innovation;
+    if (axis == 0) {
+        expected = fs_field_x_jacobian(&n.attitude, earth, body, f->h);
+        innovation = measured->x - expected;
+    } else {
+        if (axis == 1) {
+            expected = fs_field_y_jacobian(&n.attitude, earth, body, f->h);
+            innovation = measured->y - expected;
         } else {
-            if (axis == 1) {
-                expected = fs_field_y_jacobian(&n.attitude, earth, body, f->h);
-                innovation = measured->y - expected;
-            } else {
-                expected = fs_field_z_jacobian(&n.attitude, earth, body, f->h);
-                innovation = measured->z - expected;
-            }
+            expected = fs_field_z_jacobian(&n.attitude, earth, body, f->h);
+            innovation = measured->z - expected;
         }
-        (void)fs_fuse(f, FS_MAG + axis, innovation, &noise, holds);
+    }
+    (void)fs_fuse(f, FS_MAG + axis, innovation, &noise, FS_LIT(1.0) - params->mag_corrects_tilt);
+}
+
+/* fusion.py:205 */
+void fs_fuse_field(fs_filter *f, const fs_vector3 *measured, const fs_estimator_params *params)
+{
+    for (int32_t axis = 0; axis < 3; axis++) {
+        fs_fuse_field_axis(f, axis, measured, params);
     }
 }
 
-/* fusion.py:243 */
-void fs_fuse_rest_velocity(fs_filter *f, const fs_estimator_params *params)
+/* fusion.py:237 */
+void fs_fuse_rest_velocity(fs_filter *f, int32_t axis, const fs_estimator_params *params)
 {
     const fs_real velocity = params->rest_velocity_noise_m_s;
     const fs_noise noise = {velocity, velocity, velocity, FS_LIT(5.0), FS_LIT(0.0)};
-    for (int32_t axis = 0; axis < 3; axis++) {
-        fs_clear(f->h);
-        f->h[FS_VELOCITY + axis] = FS_LIT(1.0);
-        (void)fs_fuse(f, FS_REST_VELOCITY + axis, -f->nominal[4 + axis], &noise, FS_LIT(0.0));
-    }
+    fs_clear(f->h);
+    f->h[FS_VELOCITY + axis] = FS_LIT(1.0);
+    (void)fs_fuse(f, FS_REST_VELOCITY + axis, -f->nominal[4 + axis], &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:254 */
-void fs_fuse_rest_rate(fs_filter *f, const fs_vector3 *rate_rad_s, fs_real variance,
+/* fusion.py:247 */
+void fs_fuse_rest_rate(fs_filter *f, int32_t axis, const fs_vector3 *rate_rad_s, fs_real variance,
                        const fs_estimator_params *params)
 {
     const fs_real deviation = params->rest_rate_noise_rad_s + fs_sqrt(variance);
     const fs_noise noise = {deviation, deviation, deviation, FS_LIT(3.0), FS_LIT(0.0)};
-    for (int32_t axis = 0; axis < 3; axis++) {
-        fs_clear(f->h);
-        f->h[FS_GYRO_BIAS + axis] = FS_LIT(1.0);
-        const fs_real value = axis == 0 ? rate_rad_s->x : (axis == 1 ? rate_rad_s->y : rate_rad_s->z);
-        (void)fs_fuse(f, FS_REST_RATE + axis, value - f->nominal[10 + axis], &noise, FS_LIT(0.0));
-    }
+    fs_clear(f->h);
+    f->h[FS_GYRO_BIAS + axis] = FS_LIT(1.0);
+    const fs_real value = axis == 0 ? rate_rad_s->x : (axis == 1 ? rate_rad_s->y : rate_rad_s->z);
+    (void)fs_fuse(f, FS_REST_RATE + axis, value - f->nominal[10 + axis], &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:266 */
-void fs_fuse_hold(fs_filter *f, fs_real north_m, fs_real east_m, const fs_estimator_params *params)
+/* fusion.py:263 */
+void fs_fuse_hold(fs_filter *f, int32_t axis, fs_real held_m, const fs_estimator_params *params)
 {
     const fs_noise noise = {
         .least = params->hold_noise_m,
@@ -109,15 +110,39 @@ void fs_fuse_hold(fs_filter *f, fs_real north_m, fs_real east_m, const fs_estima
         .gate = FS_LIT(100.0),
         .is_slow = FS_LIT(0.0),
     };
-    for (int32_t axis = 0; axis < 2; axis++) {
-        fs_clear(f->h);
-        f->h[FS_POSITION + axis] = FS_LIT(1.0);
-        const fs_real held_m = axis == 0 ? north_m : east_m;
-        (void)fs_fuse(f, FS_HOLD_POSITION + axis, held_m - f->nominal[7 + axis], &noise, FS_LIT(0.0));
-    }
+    fs_clear(f->h);
+    f->h[FS_POSITION + axis] = FS_LIT(1.0);
+    (void)fs_fuse(f, FS_HOLD_POSITION + axis, held_m - f->nominal[7 + axis], &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:161 */
+/* fusion.py:212 */
+void fs_fuse_drag(fs_filter *f, int32_t axis, const fs_vector3 *force, const fs_estimator_params *params)
+{
+    const fs_real deviation = fs_sqrt(params->drag_variance);
+    const fs_noise noise = {deviation, deviation, deviation, FS_DRAG_GATE, FS_LIT(0.0)};
+    const fs_nominal n = fs_read_nominal(f->nominal);
+    const fs_vector3 *v = &n.velocity_ned_m_s;
+    const fs_vector3 *bias = &n.accel_bias_m_s2;
+    const fs_real north = n.wind_north_m_s;
+    const fs_real east = n.wind_east_m_s;
+    const fs_real speed = fs_sqrt((v->x - north) * (v->x - north) + (v->y - east) * (v->y - east) + v->z * v->z);
+    const fs_real ballistic = axis == 0 ? params->ballistic_x_kg_m2 : params->ballistic_y_kg_m2;
+    const fs_real rate = params->momentum_drag_1_s +
+                         (ballistic > FS_LIT(0.0) ? FS_LIT(0.5) * FS_AIR_KG_M3 * speed / ballistic : FS_LIT(0.0));
+    fs_clear(f->h);
+    fs_real expected;
+    fs_real innovation;
+    if (axis == 0) {
+        expected = fs_drag_x_jacobian(&n.attitude, v, bias, north, east, rate, f->h);
+        innovation = force->x - expected;
+    } else {
+        expected = fs_drag_y_jacobian(&n.attitude, v, bias, north, east, rate, f->h);
+        innovation = force->y - expected;
+    }
+    (void)fs_fuse(f, FS_DRAG + axis, innovation, &noise, FS_LIT(0.0));
+}
+
+/* fusion.py:151 */
 void fs_fuse_baro(fs_filter *f, fs_real altitude_m, fs_real age_s, const fs_estimator_params *params)
 {
     const bool is_aided = f->clock[0] - f->observations[FS_GNSS_VELOCITY][FS_FUSED_S] < FS_AIDED_S;
@@ -135,7 +160,7 @@ void fs_fuse_baro(fs_filter *f, fs_real altitude_m, fs_real age_s, const fs_esti
     (void)fs_fuse(f, FS_BARO, altitude_m - predicted_m, &noise, is_aided ? FS_LIT(0.0) : FS_HOLDS_HORIZONTAL);
 }
 
-/* fusion.py:177 */
+/* fusion.py:167 */
 fs_real fs_cos_tilt_of(const fs_filter *f)
 {
     const fs_real x = f->nominal[1];
@@ -144,7 +169,7 @@ fs_real fs_cos_tilt_of(const fs_filter *f)
     return cosine;
 }
 
-/* fusion.py:185 */
+/* fusion.py:175 */
 void fs_fuse_range(fs_filter *f, fs_real vertical_m, fs_real ground_m, fs_real age_s,
                    const fs_estimator_params *params)
 {
@@ -167,6 +192,12 @@ static fs_real stated(fs_real accuracy, fs_real unknown)
     return fs_is_finite(accuracy) && accuracy >= FS_LIT(0.0) ? accuracy : unknown;
 }
 
+/* fusion.py:82 */
+fs_real fs_speed_accuracy(const fs_real row[10])
+{
+    return stated(row[9], FS_UNKNOWN_M_S);
+}
+
 /* fusion.py:76 */
 fs_real fs_vertical_accuracy(const fs_real row[10])
 {
@@ -185,16 +216,11 @@ fs_real fs_gnss_bias_share(const fs_estimator_params *params, int32_t axis)
     return params->gnss_bias_share * (axis == 2 ? fs_sqrt(FS_LIT(2.0)) : FS_LIT(1.0));
 }
 
-/* fusion.py:82 */
-fs_real fs_speed_accuracy(const fs_real row[10])
+/* fusion.py:94 */
+void fs_drift_gnss_bias(fs_filter *f, const fs_real row[10], fs_real elapsed_s, const fs_estimator_params *params)
 {
-    return stated(row[9], FS_UNKNOWN_M_S);
-}
-
-/* Propagate the Gauss-Markov process of the GNSS position bias. fusion.py:94 */
-static void drift_gnss_bias(fs_filter *f, fs_real elapsed_s, fs_real eph_m, fs_real epv_m,
-                            const fs_estimator_params *params)
-{
+    const fs_real eph_m = fs_horizontal_accuracy(row);
+    const fs_real epv_m = fs_vertical_accuracy(row);
     const fs_real kept = fs_max(FS_LIT(0.0), FS_LIT(1.0) - elapsed_s / params->gnss_bias_s);
     for (int32_t at = 24; at < 27; at++) {
         const fs_real spread = fs_gnss_bias_share(params, at - FS_GNSS_BIAS) *
@@ -215,7 +241,7 @@ static void drift_gnss_bias(fs_filter *f, fs_real elapsed_s, fs_real eph_m, fs_r
  *
  * Fast motion and vibration look like noise of the IMU, but do not add up to an error of the velocity.
  *
- * fusion.py:110
+ * fusion.py:109
  */
 static void confirm_imu_noise(fs_filter *f, int32_t row)
 {
@@ -225,84 +251,48 @@ static void confirm_imu_noise(fs_filter *f, int32_t row)
                                 FS_LEAST_SHARE), FS_LIT(1.0));
 }
 
-/* fusion.py:121 */
-void fs_fuse_gnss(fs_filter *f, const fs_real row[10], fs_real age_s, fs_real elapsed_s, int32_t first,
-                  const fs_vector3 *faults, const fs_estimator_params *params)
+/* fusion.py:120 */
+void fs_fuse_gnss_velocity(fs_filter *f, const fs_real row[10], int32_t axis, fs_real fault,
+                           const fs_estimator_params *params)
 {
-    const fs_real eph_m = fs_horizontal_accuracy(row);
-    const fs_real epv_m = fs_vertical_accuracy(row);
     const fs_real speed_m_s = fs_speed_accuracy(row);
-    drift_gnss_bias(f, elapsed_s, eph_m, epv_m, params);
-    fs_real fault;
-    fs_real least;
-    fs_noise noise;
-    for (int32_t axis = first; axis < 3; axis++) {
-        fault = axis == 0 ? faults->x : (axis == 1 ? faults->y : faults->z);
-        least = fault == FS_VELOCITY_IS_WRONG ? FS_WRONG_VELOCITY_M_S : params->gnss_velocity_noise_m_s;
-        noise = (fs_noise){
-            .least = least,
-            .start = speed_m_s,
-            .largest = fs_max(FS_LIT(2.0) * speed_m_s, least),
-            .gate = params->gnss_velocity_gate,
-            .is_slow = FS_LIT(0.0),
-        };
-        fs_clear(f->h);
-        f->h[FS_VELOCITY + axis] = FS_LIT(1.0);
-        const bool accepted = fs_fuse(f, FS_GNSS_VELOCITY + axis, row[4 + axis] - f->nominal[4 + axis], &noise,
-                                      FS_LIT(0.0));
-        if (accepted && fault != FS_VELOCITY_IS_WRONG) {
-            confirm_imu_noise(f, FS_GNSS_VELOCITY + axis);
-        }
-    }
-    for (int32_t axis = first; axis < 3; axis++) {
-        fault = axis == 0 ? faults->x : (axis == 1 ? faults->y : faults->z);
-        if (fault == FS_POSITION_DRIFTS) {
-            f->observations[FS_GNSS_POSITION + axis][FS_REFUSED] += FS_LIT(1.0);
-            continue;
-        }
-        const fs_real accuracy_m = axis == 2 ? epv_m : eph_m;
-        least = params->gnss_position_noise_m;
-        noise = (fs_noise){
-            .least = least,
-            .start = accuracy_m,
-            .largest = fs_max(FS_LIT(2.0) * accuracy_m, least),
-            .gate = params->gnss_position_gate,
-            .is_slow = FS_LIT(0.0),
-        };
-        fs_clear(f->h);
-        f->h[FS_POSITION + axis] = FS_LIT(1.0);
-        f->h[FS_GNSS_BIAS + axis] = FS_LIT(1.0);
-        const fs_real then_m = f->nominal[7 + axis] - age_s * f->nominal[4 + axis];
-        (void)fs_fuse(f, FS_GNSS_POSITION + axis, row[1 + axis] - then_m - f->nominal[25 + axis], &noise,
-                      FS_LIT(0.0));
+    const fs_real least = fault == FS_VELOCITY_IS_WRONG ? FS_WRONG_VELOCITY_M_S : params->gnss_velocity_noise_m_s;
+    const fs_noise noise = {
+        .least = least,
+        .start = speed_m_s,
+        .largest = fs_max(FS_LIT(2.0) * speed_m_s, least),
+        .gate = params->gnss_velocity_gate,
+        .is_slow = FS_LIT(0.0),
+    };
+    fs_clear(f->h);
+    f->h[FS_VELOCITY + axis] = FS_LIT(1.0);
+    const bool accepted = fs_fuse(f, FS_GNSS_VELOCITY + axis, row[4 + axis] - f->nominal[4 + axis], &noise,
+                                  FS_LIT(0.0));
+    if (accepted && fault != FS_VELOCITY_IS_WRONG) {
+        confirm_imu_noise(f, FS_GNSS_VELOCITY + axis);
     }
 }
 
-/* fusion.py:217 */
-void fs_fuse_drag(fs_filter *f, const fs_vector3 *force, const fs_estimator_params *params)
+/* fusion.py:133 */
+void fs_fuse_gnss_position(fs_filter *f, const fs_real row[10], fs_real age_s, int32_t axis, fs_real fault,
+                           const fs_estimator_params *params)
 {
-    const fs_real deviation = fs_sqrt(params->drag_variance);
-    const fs_noise noise = {deviation, deviation, deviation, FS_DRAG_GATE, FS_LIT(0.0)};
-    for (int32_t axis = 0; axis < 2; axis++) {
-        const fs_nominal n = fs_read_nominal(f->nominal);
-        const fs_vector3 *v = &n.velocity_ned_m_s;
-        const fs_vector3 *bias = &n.accel_bias_m_s2;
-        const fs_real north = n.wind_north_m_s;
-        const fs_real east = n.wind_east_m_s;
-        const fs_real speed = fs_sqrt((v->x - north) * (v->x - north) + (v->y - east) * (v->y - east) + v->z * v->z);
-        const fs_real ballistic = axis == 0 ? params->ballistic_x_kg_m2 : params->ballistic_y_kg_m2;
-        const fs_real rate = params->momentum_drag_1_s +
-                             (ballistic > FS_LIT(0.0) ? FS_LIT(0.5) * FS_AIR_KG_M3 * speed / ballistic : FS_LIT(0.0));
-        fs_clear(f->h);
-        fs_real expected;
-        fs_real innovation;
-        if (axis == 0) {
-            expected = fs_drag_x_jacobian(&n.attitude, v, bias, north, east, rate, f->h);
-            innovation = force->x - expected;
-        } else {
-            expected = fs_drag_y_jacobian(&n.attitude, v, bias, north, east, rate, f->h);
-            innovation = force->y - expected;
-        }
-        (void)fs_fuse(f, FS_DRAG + axis, innovation, &noise, FS_LIT(0.0));
+    if (fault == FS_POSITION_DRIFTS) {
+        f->observations[FS_GNSS_POSITION + axis][FS_REFUSED] += FS_LIT(1.0);
+        return;
     }
+    const fs_real accuracy_m = axis == 2 ? fs_vertical_accuracy(row) : fs_horizontal_accuracy(row);
+    const fs_real least = params->gnss_position_noise_m;
+    const fs_noise noise = {
+        .least = least,
+        .start = accuracy_m,
+        .largest = fs_max(FS_LIT(2.0) * accuracy_m, least),
+        .gate = params->gnss_position_gate,
+        .is_slow = FS_LIT(0.0),
+    };
+    fs_clear(f->h);
+    f->h[FS_POSITION + axis] = FS_LIT(1.0);
+    f->h[FS_GNSS_BIAS + axis] = FS_LIT(1.0);
+    const fs_real then_m = f->nominal[7 + axis] - age_s * f->nominal[4 + axis];
+    (void)fs_fuse(f, FS_GNSS_POSITION + axis, row[1 + axis] - then_m - f->nominal[25 + axis], &noise, FS_LIT(0.0));
 }

@@ -7,23 +7,39 @@
 #include "fs_kalman.h"
 #include "fs_types.h"
 
-/* Fuse the magnetic field in the body frame, axis by axis. fusion.py:195 */
+/* Fuse the magnetic field along an axis of the body. fusion.py:185 */
+void fs_fuse_field_axis(fs_filter *f, int32_t axis, const fs_vector3 *measured, const fs_estimator_params *params);
+
+/* Fuse the magnetic field in the body frame, axis by axis. fusion.py:205 */
 void fs_fuse_field(fs_filter *f, const fs_vector3 *measured, const fs_estimator_params *params);
 
-/* Fuse zero velocity of a vehicle that stands. fusion.py:243 */
-void fs_fuse_rest_velocity(fs_filter *f, const fs_estimator_params *params);
+/* Fuse zero velocity along an axis of a vehicle that stands. fusion.py:237 */
+void fs_fuse_rest_velocity(fs_filter *f, int32_t axis, const fs_estimator_params *params);
 
 /*
- * Fuse zero rate of a vehicle that stands: rate_rad_s, with this variance of noise, is the bias of the gyro.
- * fusion.py:254
+ * Fuse zero rate about an axis of a vehicle that stands.
+ *
+ * rate_rad_s, with this variance of noise, is the bias of the gyro.
+ *
+ * fusion.py:247
  */
-void fs_fuse_rest_rate(fs_filter *f, const fs_vector3 *rate_rad_s, fs_real variance,
+void fs_fuse_rest_rate(fs_filter *f, int32_t axis, const fs_vector3 *rate_rad_s, fs_real variance,
                        const fs_estimator_params *params);
 
 /*
- * Fuse a horizontal position that is held without a measurement of it, which bounds velocity and tilt. fusion.py:266
+ * Fuse a horizontal position that is held without a measurement of it, which bounds velocity and tilt. fusion.py:263
  */
-void fs_fuse_hold(fs_filter *f, fs_real north_m, fs_real east_m, const fs_estimator_params *params);
+void fs_fuse_hold(fs_filter *f, int32_t axis, fs_real held_m, const fs_estimator_params *params);
+
+/*
+ * Fuse the specific force along the body's x (0) or y (1) axis, which in flight is the drag of the air.
+ *
+ * Drag is -(momentum_drag_1_s + 12 rho |u| / ballistic coefficient) u for the velocity u relative to the air: that of
+ * the rotors' momentum and that of the body. Its change with |u| is left out of the Jacobian.
+ *
+ * fusion.py:212
+ */
+void fs_fuse_drag(fs_filter *f, int32_t axis, const fs_vector3 *force, const fs_estimator_params *params);
 
 /*
  * Fuse a pressure altitude: minus the position down, plus the barometer's bias.
@@ -31,16 +47,19 @@ void fs_fuse_hold(fs_filter *f, fs_real north_m, fs_real east_m, const fs_estima
  * It leaves horizontal position and velocity alone in dead reckoning: their errors are then so much larger than that
  * of the height that pressure in turns and gusts, which is not white noise, moves them by metres.
  *
- * fusion.py:161
+ * fusion.py:151
  */
 void fs_fuse_baro(fs_filter *f, fs_real altitude_m, fs_real age_s, const fs_estimator_params *params);
 
-/* Return the cosine of the angle between the body's down axis and the vertical. fusion.py:177 */
+/* Return the cosine of the angle between the body's down axis and the vertical. fusion.py:167 */
 fs_real fs_cos_tilt_of(const fs_filter *f);
 
-/* Fuse the vertical part of a distance to level ground at ground_m below the origin. fusion.py:185 */
+/* Fuse the vertical part of a distance to level ground at ground_m below the origin. fusion.py:175 */
 void fs_fuse_range(fs_filter *f, fs_real vertical_m, fs_real ground_m, fs_real age_s,
                    const fs_estimator_params *params);
+
+/* Return the accuracy [m/s] of the velocity of a GNSS measurement. fusion.py:82 */
+fs_real fs_speed_accuracy(const fs_real row[10]);
 
 /* Return the accuracy [m] of the altitude of a GNSS measurement. fusion.py:76 */
 fs_real fs_vertical_accuracy(const fs_real row[10]);
@@ -54,27 +73,17 @@ fs_real fs_horizontal_accuracy(const fs_real row[10]);
  */
 fs_real fs_gnss_bias_share(const fs_estimator_params *params, int32_t axis);
 
-/* Return the accuracy [m/s] of the velocity of a GNSS measurement. fusion.py:82 */
-fs_real fs_speed_accuracy(const fs_real row[10]);
+/* Propagate the Gauss-Markov process of the GNSS position bias. fusion.py:94 */
+void fs_drift_gnss_bias(fs_filter *f, const fs_real row[10], fs_real elapsed_s, const fs_estimator_params *params);
+
+/* Fuse the velocity along an axis; with the fault VELOCITY_IS_WRONG it has more noise. fusion.py:120 */
+void fs_fuse_gnss_velocity(fs_filter *f, const fs_real row[10], int32_t axis, fs_real fault,
+                           const fs_estimator_params *params);
 
 /*
- * Fuse position and velocity from axis first, measured age_s before the time of the state.
- *
- * faults has the fault of each axis: a position that drifts is refused, a wrong velocity has more noise.
- *
- * fusion.py:121
+ * Fuse the position along an axis, measured age_s before the time of the state; refuse one that drifts. fusion.py:133
  */
-void fs_fuse_gnss(fs_filter *f, const fs_real row[10], fs_real age_s, fs_real elapsed_s, int32_t first,
-                  const fs_vector3 *faults, const fs_estimator_params *params);
-
-/*
- * Fuse the specific force along the body's x and y axes, which in flight is the drag of the air.
- *
- * Drag is -(momentum_drag_1_s + 12 rho |u| / ballistic coefficient) u for the velocity u relative to the air: that of
- * the rotors' momentum and that of the body. Its change with |u| is left out of the Jacobian.
- *
- * fusion.py:217
- */
-void fs_fuse_drag(fs_filter *f, const fs_vector3 *force, const fs_estimator_params *params);
+void fs_fuse_gnss_position(fs_filter *f, const fs_real row[10], fs_real age_s, int32_t axis, fs_real fault,
+                           const fs_estimator_params *params);
 
 #endif

@@ -21,7 +21,18 @@
 #define FS_DIFFERENCE_VARIANCE FS_LIT(70.0)
 #define FS_NOISE 15
 
-/* imu_input.py:46 */
+/* imu_input.py:52 */
+fs_vector3 fs_in_start_frame(const fs_vector3 *angle, const fs_vector3 *velocity)
+{
+    const fs_vector3 turn = fs_cross(angle, velocity);
+    return (fs_vector3){
+        .x = velocity->x + FS_LIT(0.5) * turn.x,
+        .y = velocity->y + FS_LIT(0.5) * turn.y,
+        .z = velocity->z + FS_LIT(0.5) * turn.z,
+    };
+}
+
+/* imu_input.py:62 */
 static void smooth(fs_real sums[64], int32_t at, const fs_vector3 *value, fs_real share)
 {
     sums[at] += share * (value->x - sums[at]);
@@ -29,19 +40,17 @@ static void smooth(fs_real sums[64], int32_t at, const fs_vector3 *value, fs_rea
     sums[at + 2] += share * (value->z - sums[at + 2]);
 }
 
-/* imu_input.py:27 */
+/* imu_input.py:34 */
 void fs_add_sample(fs_real sums[64], const fs_vector3 *gyro, const fs_vector3 *accel, fs_real dt_s)
 {
     const fs_vector3 angle = fs_scaled(gyro, dt_s);
     const fs_quaternion before = {sums[1], sums[2], sums[3], sums[4]};
-    const fs_quaternion rotation_over = fs_rotation_over(&angle, FS_LIT(0.5));
+    const fs_quaternion rotation_over = fs_rotation_over(&angle, FS_LIT(1.0));
     const fs_quaternion quaternion_product = fs_quaternion_product(&before, &rotation_over);
-    const fs_quaternion middle = fs_normalised(&quaternion_product);
-    const fs_quaternion rotation_over_2 = fs_rotation_over(&angle, FS_LIT(1.0));
-    const fs_quaternion quaternion_product_2 = fs_quaternion_product(&before, &rotation_over_2);
-    const fs_quaternion after = fs_normalised(&quaternion_product_2);
+    const fs_quaternion after = fs_normalised(&quaternion_product);
     const fs_vector3 scaled = fs_scaled(accel, dt_s);
-    const fs_vector3 dv = fs_rotate(&middle, &scaled);
+    const fs_vector3 in_start_frame = fs_in_start_frame(&angle, &scaled);
+    const fs_vector3 dv = fs_rotate(&before, &in_start_frame);
     sums[0] += dt_s;
     sums[1] = after.w;
     sums[2] = after.x;
@@ -61,7 +70,7 @@ void fs_add_sample(fs_real sums[64], const fs_vector3 *gyro, const fs_vector3 *a
  *
  * The vehicle's motion has little power there, and vibration, which averages out within 16 ms, does not count.
  *
- * imu_input.py:53
+ * imu_input.py:69
  */
 static void measure_noise(fs_real sums[64], fs_real sample_dt_s, const fs_vector3 *angle, const fs_vector3 *velocity)
 {
@@ -102,7 +111,7 @@ static void measure_noise(fs_real sums[64], fs_real sample_dt_s, const fs_vector
     sums[FS_PAIRS] += FS_LIT(1.0);
 }
 
-/* imu_input.py:96 */
+/* imu_input.py:112 */
 fs_delta_sample fs_take_step(fs_real sums[64], fs_real time_s)
 {
     const fs_quaternion q = {sums[1], sums[2], sums[3], sums[4]};
@@ -124,7 +133,7 @@ fs_delta_sample fs_take_step(fs_real sums[64], fs_real time_s)
     return sample;
 }
 
-/* imu_input.py:121 */
+/* imu_input.py:137 */
 fs_delta_sample fs_read_step(const fs_real row[])
 {
     return (fs_delta_sample){
@@ -137,19 +146,19 @@ fs_delta_sample fs_read_step(const fs_real row[])
     };
 }
 
-/* imu_input.py:84 */
+/* imu_input.py:100 */
 fs_vector3 fs_mean_rate(const fs_real sums[64])
 {
     return fs_read_vector(sums, FS_MEAN);
 }
 
-/* imu_input.py:90 */
+/* imu_input.py:106 */
 fs_vector3 fs_mean_force(const fs_real sums[64])
 {
     return fs_read_vector(sums, FS_MEAN + 3);
 }
 
-/* imu_input.py:111 */
+/* imu_input.py:127 */
 void fs_write_step(fs_real row[], const fs_delta_sample *sample)
 {
     row[0] = sample->time_s;

@@ -22,7 +22,7 @@
 #define FS_HOLDS_HORIZONTAL FS_LIT(2.0)
 #define FS_FUSED_S 3
 
-/* kalman.py:193 */
+/* kalman.py:197 */
 void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
 {
     for (int32_t i = at; i < at + count; i++) {
@@ -36,7 +36,7 @@ void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real var
     }
 }
 
-/* kalman.py:82 */
+/* kalman.py:86 */
 void fs_clear(fs_real x[27])
 {
     for (int32_t i = 0; i < 27; i++) {
@@ -44,7 +44,7 @@ void fs_clear(fs_real x[27])
     }
 }
 
-/* Write P h' to ph and return h P h'. kalman.py:95 */
+/* Write P h' to ph and return h P h'. kalman.py:99 */
 static fs_real project(fs_filter *f)
 {
     fs_clear(f->ph);
@@ -72,7 +72,7 @@ static fs_real project(fs_filter *f)
  * Half the squared difference of two successive innovations has the variance of white noise, and an error of the
  * model, which both have, does not count. A slow sensor has the whole variance, as its correlation is counted apart.
  *
- * kalman.py:135
+ * kalman.py:139
  */
 static void adapt_noise(fs_real o[25][9], int32_t row, fs_real r, fs_real projected, fs_real last,
                         const fs_noise *noise)
@@ -97,7 +97,7 @@ static void adapt_noise(fs_real o[25][9], int32_t row, fs_real r, fs_real projec
  * Joseph's form with such a gain subtracts P h' h P / variance from the covariance, except between two states that
  * both keep their values: one product for each element instead of two.
  *
- * kalman.py:112
+ * kalman.py:116
  */
 static void correct(fs_filter *f, fs_real innovation)
 {
@@ -126,7 +126,7 @@ static void correct(fs_filter *f, fs_real innovation)
     fs_write_nominal(f->nominal, &corrected);
 }
 
-/* kalman.py:153 */
+/* kalman.py:157 */
 bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *noise, fs_real holds)
 {
     const fs_real least = noise->least * noise->least;
@@ -177,7 +177,7 @@ bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *nois
     return true;
 }
 
-/* kalman.py:204 */
+/* kalman.py:208 */
 fs_real fs_deviation(const fs_filter *f, int32_t at, int32_t count)
 {
     fs_real total = FS_LIT(0.0);

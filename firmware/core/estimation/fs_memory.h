@@ -39,9 +39,12 @@ typedef struct {
     fs_real yaw_fix[4];
     fs_real followed[1];
     fs_real checks[26];
+    int32_t agenda[3];
+    fs_real pending[10];
+    fs_real before_gnss[6];
 } fs_estimator_memory;
 
-/* Set what is not zero at the start in a memory of zeros that has its parameters. memory.py:86 */
+/* Set what is not zero at the start in a memory of zeros that has its parameters. memory.py:96 */
 void fs_start_memory(fs_estimator_memory *memory);
 
 #endif

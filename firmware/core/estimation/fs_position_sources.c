@@ -5,7 +5,6 @@
  */
 #include "fs_position_sources.h"
 
-#include "fs_error_state.h"
 #include "fs_fusion.h"
 #include "fs_height_sources.h"
 #include "fs_kalman.h"
@@ -13,26 +12,38 @@
 #include "fs_resets.h"
 #include "fs_source_checks.h"
 
-#define FS_HAS_GNSS 3
-#define FS_GNSS_LOST_S FS_LIT(1.0)
-#define FS_MOVES_M_S FS_LIT(0.15)
-#define FS_HAS_YAW 6
 #define FS_GNSS_VELOCITY 0
 #define FS_FUSED_S 3
+#define FS_GNSS_LOST_S FS_LIT(1.0)
+#define FS_HAS_GNSS 3
+#define FS_MOVES_M_S FS_LIT(0.15)
+#define FS_HAS_YAW 6
 #define FS_VELOCITY 3
+#define FS_NOTHING -1
 #define FS_HOLD_PERIOD_S FS_LIT(0.2)
 #define FS_POSITION 6
 #define FS_BARO_BIAS 23
 #define FS_GNSS_BIAS 24
+#define FS_ELAPSED_S 0
 #define FS_GNSS_POSITION 3
+#define FS_OUTAGE_S 1
+#define FS_BEFORE 2
 #define FS_GNSS_FAULT 17
+#define FS_YAW_STAGE 6
 #define FS_LANDED 1
 #define FS_HAS_BARO 2
 #define FS_COUNTED_M FS_LIT(0.5)
 #define FS_LONGEST_INTERVAL_S FS_LIT(2.5)
 #define FS_SPEED_SMOOTHING_S FS_LIT(2.0)
 
-/* position_sources.py:130 */
+/* position_sources.py:158 */
+bool fs_is_velocity_measured(const fs_filter *f)
+{
+    const fs_real fused_s = f->observations[FS_GNSS_VELOCITY][FS_FUSED_S];
+    return fused_s > FS_LIT(0.0) && f->clock[0] - fused_s < FS_GNSS_LOST_S;
+}
+
+/* position_sources.py:165 */
 bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f)
 {
     const fs_real north = m->gnss_speed_m_s[0];
@@ -41,32 +52,27 @@ bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f)
     return !is_measured || fs_sqrt(north * north + east * east) < FS_MOVES_M_S;
 }
 
-/* position_sources.py:123 */
-bool fs_is_velocity_measured(const fs_filter *f)
-{
-    const fs_real fused_s = f->observations[FS_GNSS_VELOCITY][FS_FUSED_S];
-    return fused_s > FS_LIT(0.0) && f->clock[0] - fused_s < FS_GNSS_LOST_S;
-}
-
-/* position_sources.py:138 */
-bool fs_hold_position(fs_estimator_memory *m, fs_filter *f, const fs_estimator_params *params)
+/* position_sources.py:173 */
+int32_t fs_hold_position(fs_estimator_memory *m, fs_filter *f, int32_t axis, const fs_estimator_params *params)
 {
     const fs_real now_s = f->clock[0];
-    const bool is_used = m->flags[FS_HAS_GNSS] == 1 && m->flags[FS_HAS_YAW] == 1;
-    if (fs_is_velocity_measured(f) || (is_used && fs_deviation(f, FS_VELOCITY, 2) < params->hold_velocity_m_s)) {
-        m->hold[2] = FS_LIT(0.0);
-        return false;
+    if (axis == 0) {
+        const bool is_used = m->flags[FS_HAS_GNSS] == 1 && m->flags[FS_HAS_YAW] == 1;
+        if (fs_is_velocity_measured(f) || (is_used && fs_deviation(f, FS_VELOCITY, 2) < params->hold_velocity_m_s)) {
+            m->hold[2] = FS_LIT(0.0);
+            return FS_NOTHING;
+        }
+        if (m->hold[2] == FS_LIT(0.0)) {
+            m->hold[0] = f->nominal[7];
+            m->hold[1] = f->nominal[8];
+        }
+        if (now_s - m->hold[2] < FS_HOLD_PERIOD_S) {
+            return FS_NOTHING;
+        }
+        m->hold[2] = now_s;
     }
-    if (m->hold[2] == FS_LIT(0.0)) {
-        m->hold[0] = f->nominal[7];
-        m->hold[1] = f->nominal[8];
-    }
-    if (now_s - m->hold[2] < FS_HOLD_PERIOD_S) {
-        return false;
-    }
-    fs_fuse_hold(f, m->hold[0], m->hold[1], params);
-    m->hold[2] = now_s;
-    return true;
+    fs_fuse_hold(f, axis, m->hold[axis], params);
+    return 1 - axis;
 }
 
 /*
@@ -74,7 +80,7 @@ bool fs_hold_position(fs_estimator_memory *m, fs_filter *f, const fs_estimator_p
  *
  * The slow part of that error is the bias of the next ones too: position and bias have opposite errors.
  *
- * position_sources.py:98
+ * position_sources.py:133
  */
 static void start_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params)
 {
@@ -100,8 +106,29 @@ static void start_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[]
 }
 
 /*
+ * Propagate what belongs to GNSS to the time of the measurement, and note the state before it. position_sources.py:76
+ */
+static void begin_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params)
+{
+    if (m->flags[FS_HAS_GNSS] == 0) {
+        start_gnss(m, f, row, params);
+    }
+    m->before_gnss[FS_ELAPSED_S] = fs_max(FS_LIT(0.0), row[0] - m->last_gnss_s[0]);
+    m->before_gnss[FS_OUTAGE_S] = f->clock[0] - f->observations[FS_GNSS_POSITION][FS_FUSED_S];
+    for (int32_t axis = 0; axis < 2; axis++) {
+        const fs_real value = f->nominal[7 + axis];
+        const fs_real value_2 = f->nominal[4 + axis];
+        m->before_gnss[FS_BEFORE + axis] = value;
+        m->before_gnss[FS_BEFORE + 2 + axis] = value_2;
+    }
+    m->last_gnss_s[0] = row[0];
+    fs_follow_drift(m->checks, f, row, fs_horizontal_accuracy(row));
+    fs_drift_gnss_bias(f, row, m->before_gnss[FS_ELAPSED_S], params);
+}
+
+/*
  * Add up the time between refused measurements; an accepted one ends it. Time without any does not count.
- * position_sources.py:84
+ * position_sources.py:119
  */
 static void count_refused(fs_estimator_memory *m, const fs_filter *f, int32_t first, fs_real elapsed_s)
 {
@@ -119,31 +146,22 @@ static void count_refused(fs_estimator_memory *m, const fs_filter *f, int32_t fi
     }
 }
 
-/* position_sources.py:48 */
-void fs_take_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params)
+/* Judge the measurement by its innovations, and reset what was refused too long. position_sources.py:91 */
+static void end_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t first,
+                     const fs_estimator_params *params)
 {
-    if (m->flags[FS_HAS_GNSS] == 0) {
-        start_gnss(m, f, row, params);
-    }
-    const fs_real elapsed_s = fs_max(FS_LIT(0.0), row[0] - m->last_gnss_s[0]);
-    m->last_gnss_s[0] = row[0];
-    const int32_t first = m->flags[FS_HAS_YAW] == 1 ? 0 : 2;
-    const fs_real outage_s = f->clock[0] - f->observations[FS_GNSS_POSITION][FS_FUSED_S];
-    const fs_vector3 position = fs_read_vector(f->nominal, 7);
-    const fs_vector3 velocity = fs_read_vector(f->nominal, 4);
-    fs_follow_drift(m->checks, f, row, fs_horizontal_accuracy(row));
-    const fs_vector3 read_vector = fs_read_vector(m->checks, FS_GNSS_FAULT);
-    fs_fuse_gnss(f, row, f->clock[0] - row[0], elapsed_s, first, &read_vector, params);
+    const fs_real elapsed_s = m->before_gnss[FS_ELAPSED_S];
     if (m->flags[FS_LANDED] == 0) {
         fs_take_gnss_innovations(m->checks, f, elapsed_s, m->flags[FS_HAS_BARO] == 1);
         if (first == 0) {
             fs_take_horizontal_innovations(m->checks, f, elapsed_s);
         }
     }
-    const fs_real dx = f->nominal[7] - position.x;
-    const fs_real dy = f->nominal[8] - position.y;
-    if (outage_s > FS_GNSS_LOST_S && dx * dx + dy * dy > FS_COUNTED_M * FS_COUNTED_M) {
-        fs_count_correction(m, f, &position, &velocity);
+    const fs_real dx = f->nominal[7] - m->before_gnss[FS_BEFORE];
+    const fs_real dy = f->nominal[8] - m->before_gnss[FS_BEFORE + 1];
+    if (m->before_gnss[FS_OUTAGE_S] > FS_GNSS_LOST_S && dx * dx + dy * dy > FS_COUNTED_M * FS_COUNTED_M) {
+        fs_count_correction(m, f, dx, dy, f->nominal[4] - m->before_gnss[FS_BEFORE + 2],
+                            f->nominal[5] - m->before_gnss[FS_BEFORE + 3]);
     }
     count_refused(m, f, first, fs_min(elapsed_s, FS_LONGEST_INTERVAL_S));
     const fs_real share = fs_min(elapsed_s / FS_SPEED_SMOOTHING_S, FS_LIT(1.0));
@@ -165,4 +183,27 @@ void fs_take_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], con
     if (m->refused_s[5] > limit_s) {
         fs_reset_height(m, f, row);
     }
+}
+
+/* position_sources.py:54 */
+int32_t fs_take_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t stage,
+                     const fs_estimator_params *params)
+{
+    const int32_t first = m->flags[FS_HAS_YAW] == 1 ? 0 : 2;
+    int32_t at = stage;
+    if (stage == 0) {
+        begin_gnss(m, f, row, params);
+        at = first;
+    }
+    const int32_t axis = at < 3 ? at : at - 3;
+    const fs_real fault = m->checks[FS_GNSS_FAULT + axis];
+    if (at < 3) {
+        fs_fuse_gnss_velocity(f, row, axis, fault, params);
+    } else {
+        fs_fuse_gnss_position(f, row, f->clock[0] - row[0], axis, fault, params);
+    }
+    if (at == FS_YAW_STAGE - 1) {
+        end_gnss(m, f, row, first, params);
+    }
+    return at != 2 ? at + 1 : 3 + first;
 }

@@ -12,22 +12,26 @@
 #include "fs_rings.h"
 #include "fs_types.h"
 
-/* Return False if GNSS measures that what the vehicle stands on moves, as a boat does. position_sources.py:130 */
-bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f);
-
-/* Return True if a GNSS velocity was accepted within the last second. position_sources.py:123 */
+/* Return True if a GNSS velocity was accepted within the last second. position_sources.py:158 */
 bool fs_is_velocity_measured(const fs_filter *f);
 
-/*
- * Hold the horizontal position while the velocity is not measured; return True if it was fused.
- * position_sources.py:138
- */
-bool fs_hold_position(fs_estimator_memory *m, fs_filter *f, const fs_estimator_params *params);
+/* Return False if GNSS measures that what the vehicle stands on moves, as a boat does. position_sources.py:165 */
+bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f);
 
 /*
- * Fuse a GNSS measurement; without a known yaw only its vertical parts. Reset what was refused too long.
- * position_sources.py:48
+ * Hold the horizontal position while the velocity is not measured, north before east; return the next axis.
+ * position_sources.py:173
  */
-void fs_take_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params);
+int32_t fs_hold_position(fs_estimator_memory *m, fs_filter *f, int32_t axis, const fs_estimator_params *params);
+
+/*
+ * Fuse a scalar of a GNSS measurement: three velocities, three positions; return the next stage.
+ *
+ * Without a known yaw only the vertical parts count. The last one resets what was refused too long.
+ *
+ * position_sources.py:54
+ */
+int32_t fs_take_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t stage,
+                     const fs_estimator_params *params);
 
 #endif

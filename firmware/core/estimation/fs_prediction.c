@@ -21,19 +21,19 @@
 #define FS_WIND 21
 #define FS_BARO_BIAS 23
 
-/* prediction.py:75 */
+/* prediction.py:78 */
 fs_motion fs_motion_of(const fs_nominal *n)
 {
     return (fs_motion){n->attitude, n->velocity_ned_m_s, n->position_ned_m};
 }
 
-/* prediction.py:55 */
+/* prediction.py:58 */
 fs_vector3 fs_less_bias(const fs_vector3 *v, const fs_vector3 *bias, fs_real dt_s)
 {
     return (fs_vector3){v->x - bias->x * dt_s, v->y - bias->y * dt_s, v->z - bias->z * dt_s};
 }
 
-/* prediction.py:61 */
+/* prediction.py:64 */
 fs_motion fs_moved(const fs_motion *start, const fs_vector3 *angle, const fs_vector3 *delta_velocity, fs_real dt_s,
                    fs_real gravity)
 {
@@ -55,7 +55,48 @@ fs_motion fs_moved(const fs_motion *start, const fs_vector3 *angle, const fs_vec
     };
 }
 
-/* prediction.py:99 */
+/* prediction.py:84 */
+fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion)
+{
+    return (fs_nominal){
+        .attitude = motion->attitude,
+        .velocity_ned_m_s = motion->velocity_ned_m_s,
+        .position_ned_m = motion->position_ned_m,
+        .gyro_bias_rad_s = n->gyro_bias_rad_s,
+        .accel_bias_m_s2 = n->accel_bias_m_s2,
+        .earth_field_ned_gauss = n->earth_field_ned_gauss,
+        .body_field_frd_gauss = n->body_field_frd_gauss,
+        .wind_north_m_s = n->wind_north_m_s,
+        .wind_east_m_s = n->wind_east_m_s,
+        .baro_bias_m = n->baro_bias_m,
+        .gnss_bias_ned_m = n->gnss_bias_ned_m,
+    };
+}
+
+/* prediction.py:155 */
+void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_params *params)
+{
+    const fs_nominal n = fs_read_nominal(f->nominal);
+    const fs_vector3 angle = fs_less_bias(&sample->angle_rad, &n.gyro_bias_rad_s, sample->dt_s);
+    const fs_vector3 delta_velocity = fs_less_bias(&sample->velocity_m_s, &n.accel_bias_m_s2, sample->dt_s);
+    const fs_quaternion rotation_over = fs_rotation_over(&angle, FS_LIT(0.5));
+    const fs_quaternion middle = fs_quaternion_product(&n.attitude, &rotation_over);
+    const fs_vector3 change = fs_rotate(&middle, &delta_velocity);
+    f->behind[0] += sample->dt_s;
+    const fs_vector3 read_vector = fs_read_vector(f->behind, 1);
+    const fs_vector3 sum_of = fs_sum_of(&read_vector, &angle);
+    fs_write_vector(f->behind, 1, &sum_of);
+    const fs_vector3 read_vector_2 = fs_read_vector(f->behind, 4);
+    const fs_vector3 sum_of_2 = fs_sum_of(&read_vector_2, &change);
+    fs_write_vector(f->behind, 4, &sum_of_2);
+    const fs_motion motion_of = fs_motion_of(&n);
+    const fs_motion after = fs_moved(&motion_of, &angle, &delta_velocity, sample->dt_s, params->gravity_m_s2);
+    const fs_nominal with_motion = fs_with_motion(&n, &after);
+    fs_write_nominal(f->nominal, &with_motion);
+    f->clock[0] = sample->time_s;
+}
+
+/* prediction.py:102 */
 static void add(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
 {
     for (int32_t i = at; i < at + count; i++) {
@@ -69,7 +110,7 @@ static void add(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
  * An error e gives e omega T after a turn of duration T. As white noise that is a density of (e omega)^2 T, with T =
  * 1 s.
  *
- * prediction.py:116
+ * prediction.py:119
  */
 static fs_real turn_variance(const fs_vector3 *angle, fs_real dt_s, const fs_estimator_params *params)
 {
@@ -78,7 +119,7 @@ static fs_real turn_variance(const fs_vector3 *angle, fs_real dt_s, const fs_est
     return error * error * square * (FS_TURN_S / dt_s);
 }
 
-/* Add the noise of one axis of the body, a unit vector in the world frame. prediction.py:105 */
+/* Add the noise of one axis of the body, a unit vector in the world frame. prediction.py:108 */
 static void add_body_noise(fs_real p[27][27], int32_t at, const fs_vector3 *axis, fs_real variance)
 {
     p[at][at] += variance * axis->x * axis->x;
@@ -89,12 +130,11 @@ static void add_body_noise(fs_real p[27][27], int32_t at, const fs_vector3 *axis
     p[at + 2][at + 2] += variance * axis->z * axis->z;
 }
 
-/* prediction.py:127 */
-static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vector3 *angle,
+/* prediction.py:130 */
+static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vector3 *angle, fs_real dt_s,
                               const fs_delta_sample *sample, const fs_estimator_params *params)
 {
     const fs_real share = f->clock[1];
-    const fs_real dt_s = sample->dt_s;
     const fs_real gyro = params->gyro_noise;
     const fs_real accel = params->accel_noise;
     const fs_vector3 v = {FS_LIT(1.0), FS_LIT(0.0), FS_LIT(0.0)};
@@ -118,37 +158,25 @@ static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vec
     add(f->covariance, FS_BARO_BIAS, 1, params->baro_walk * params->baro_walk * dt_s);
 }
 
-/* prediction.py:81 */
-fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion)
+/* prediction.py:171 */
+void fs_predict_errors(fs_filter *f, const fs_delta_sample *newest, const fs_estimator_params *params)
 {
-    return (fs_nominal){
-        .attitude = motion->attitude,
-        .velocity_ned_m_s = motion->velocity_ned_m_s,
-        .position_ned_m = motion->position_ned_m,
-        .gyro_bias_rad_s = n->gyro_bias_rad_s,
-        .accel_bias_m_s2 = n->accel_bias_m_s2,
-        .earth_field_ned_gauss = n->earth_field_ned_gauss,
-        .body_field_frd_gauss = n->body_field_frd_gauss,
-        .wind_north_m_s = n->wind_north_m_s,
-        .wind_east_m_s = n->wind_east_m_s,
-        .baro_bias_m = n->baro_bias_m,
-        .gnss_bias_ned_m = n->gnss_bias_ned_m,
+    const fs_real dt_s = f->behind[0];
+    const fs_vector3 angle = fs_read_vector(f->behind, 1);
+    const fs_vector3 change = fs_read_vector(f->behind, 4);
+    const fs_quaternion attitude = {
+        .w = f->nominal[0],
+        .x = f->nominal[1],
+        .y = f->nominal[2],
+        .z = f->nominal[3],
     };
-}
-
-/* prediction.py:152 */
-void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_params *params)
-{
-    const fs_nominal n = fs_read_nominal(f->nominal);
-    const fs_vector3 angle = fs_less_bias(&sample->angle_rad, &n.gyro_bias_rad_s, sample->dt_s);
-    const fs_vector3 delta_velocity = fs_less_bias(&sample->velocity_m_s, &n.accel_bias_m_s2, sample->dt_s);
-    const fs_quaternion rotation_over = fs_rotation_over(&angle, FS_LIT(0.5));
-    const fs_quaternion middle = fs_quaternion_product(&n.attitude, &rotation_over);
-    const fs_motion motion_of = fs_motion_of(&n);
-    const fs_motion after = fs_moved(&motion_of, &angle, &delta_velocity, sample->dt_s, params->gravity_m_s2);
-    fs_predict_covariance(f->covariance, &middle, &delta_velocity, sample->dt_s);
-    add_process_noise(f, &middle, &angle, sample, params);
-    const fs_nominal with_motion = fs_with_motion(&n, &after);
-    fs_write_nominal(f->nominal, &with_motion);
-    f->clock[0] = sample->time_s;
+    const fs_quaternion rotation_over = fs_rotation_over(&angle, FS_LIT(-0.5));
+    const fs_quaternion middle = fs_quaternion_product(&attitude, &rotation_over);
+    const fs_quaternion conjugate = fs_conjugate(&middle);
+    const fs_vector3 rotate = fs_rotate(&conjugate, &change);
+    fs_predict_covariance(f->covariance, &middle, &rotate, dt_s);
+    add_process_noise(f, &middle, &angle, dt_s, newest, params);
+    for (int32_t i = 0; i < 7; i++) {
+        f->behind[i] = FS_LIT(0.0);
+    }
 }

@@ -28,23 +28,32 @@ typedef struct {
     fs_vector3 position_ned_m;
 } fs_motion;
 
-/* Return the part of the nominal state that moves. prediction.py:75 */
+/* Return the part of the nominal state that moves. prediction.py:78 */
 fs_motion fs_motion_of(const fs_nominal *n);
 
-/* Return a delta angle or velocity without the bias of its rate. prediction.py:55 */
+/* Return a delta angle or velocity without the bias of its rate. prediction.py:58 */
 fs_vector3 fs_less_bias(const fs_vector3 *v, const fs_vector3 *bias, fs_real dt_s);
 
 /*
  * Integrate one step: angle and delta_velocity in the body frame at the start, velocity by trapezoids.
- * prediction.py:61
+ * prediction.py:64
  */
 fs_motion fs_moved(const fs_motion *start, const fs_vector3 *angle, const fs_vector3 *delta_velocity, fs_real dt_s,
                    fs_real gravity);
 
-/* Return the nominal state with another motion. prediction.py:81 */
+/* Return the nominal state with another motion. prediction.py:84 */
 fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion);
 
-/* Propagate state and covariance over the sample. prediction.py:152 */
+/* Propagate the state over the sample. The covariance is behind it until predict_errors. prediction.py:155 */
 void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_params *params);
+
+/*
+ * Propagate the covariance to the time of the state, over all samples since it was last, newest among them.
+ *
+ * The errors then move with the attitude in the middle of that time.
+ *
+ * prediction.py:171
+ */
+void fs_predict_errors(fs_filter *f, const fs_delta_sample *newest, const fs_estimator_params *params);
 
 #endif

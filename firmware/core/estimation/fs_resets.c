@@ -12,17 +12,17 @@
 #define FS_YAW_RESET 16
 #define FS_RESET_CHANGE 1
 #define FS_YAW_RESET_SUM 18
+#define FS_LEAST_SPEED_M_S FS_LIT(0.3)
 #define FS_RESET_S 7
-#define FS_POSITION_RESET 0
 #define FS_VELOCITY_RESET 8
 #define FS_RESET_SUM 4
-#define FS_LEAST_SPEED_M_S FS_LIT(0.3)
 #define FS_VELOCITY 3
 #define FS_LEAST_POSITION_M FS_LIT(0.5)
+#define FS_POSITION_RESET 0
 #define FS_POSITION 6
 #define FS_GNSS_BIAS 24
 
-/* resets.py:80 */
+/* resets.py:81 */
 void fs_count_yaw_reset(fs_estimator_memory *m, fs_real turn_rad)
 {
     m->resets[FS_YAW_RESET] += FS_LIT(1.0);
@@ -30,7 +30,7 @@ void fs_count_yaw_reset(fs_estimator_memory *m, fs_real turn_rad)
     m->resets[FS_YAW_RESET_SUM] += turn_rad;
 }
 
-/* Count a reset of position or velocity; the changes of one step of the filter are added up. resets.py:63 */
+/* Count a reset of position or velocity; the changes of one step of the filter are added up. resets.py:64 */
 static void count_(fs_estimator_memory *m, const fs_filter *f, int32_t kind)
 {
     m->resets[kind] += FS_LIT(1.0);
@@ -42,23 +42,11 @@ static void count_(fs_estimator_memory *m, const fs_filter *f, int32_t kind)
     }
 }
 
-/* resets.py:74 */
+/* resets.py:75 */
 static void add_change(fs_estimator_memory *m, int32_t kind, int32_t axis, fs_real change)
 {
     m->resets[kind + FS_RESET_CHANGE + axis] += change;
     m->resets[kind + FS_RESET_SUM + axis] += change;
-}
-
-/* resets.py:51 */
-void fs_count_correction(fs_estimator_memory *m, const fs_filter *f, const fs_vector3 *position_m,
-                         const fs_vector3 *velocity_m_s)
-{
-    count_(m, f, FS_POSITION_RESET);
-    count_(m, f, FS_VELOCITY_RESET);
-    add_change(m, FS_POSITION_RESET, 0, f->nominal[7] - position_m->x);
-    add_change(m, FS_POSITION_RESET, 1, f->nominal[8] - position_m->y);
-    add_change(m, FS_VELOCITY_RESET, 0, f->nominal[4] - velocity_m_s->x);
-    add_change(m, FS_VELOCITY_RESET, 1, f->nominal[5] - velocity_m_s->y);
 }
 
 /* resets.py:25 */
@@ -92,7 +80,19 @@ void fs_reset_position(fs_estimator_memory *m, fs_filter *f, const fs_real row[]
     fs_reset_variance(f->covariance, FS_GNSS_BIAS + first, count, FS_LIT(0.0001));
 }
 
-/* resets.py:88 */
+/* resets.py:51 */
+void fs_count_correction(fs_estimator_memory *m, const fs_filter *f, fs_real north_m, fs_real east_m,
+                         fs_real north_m_s, fs_real east_m_s)
+{
+    count_(m, f, FS_POSITION_RESET);
+    count_(m, f, FS_VELOCITY_RESET);
+    add_change(m, FS_POSITION_RESET, 0, north_m);
+    add_change(m, FS_POSITION_RESET, 1, east_m);
+    add_change(m, FS_VELOCITY_RESET, 0, north_m_s);
+    add_change(m, FS_VELOCITY_RESET, 1, east_m_s);
+}
+
+/* resets.py:89 */
 fs_real fs_count_of_resets(const fs_estimator_memory *m)
 {
     const fs_real total = m->resets[FS_POSITION_RESET] + m->resets[FS_VELOCITY_RESET] + m->resets[FS_YAW_RESET];

@@ -12,12 +12,8 @@
 #include "fs_rings.h"
 #include "fs_types.h"
 
-/* Count a change of the yaw. resets.py:80 */
+/* Count a change of the yaw. resets.py:81 */
 void fs_count_yaw_reset(fs_estimator_memory *m, fs_real turn_rad);
-
-/* Count the horizontal change from an earlier position and velocity as resets of both. resets.py:51 */
-void fs_count_correction(fs_estimator_memory *m, const fs_filter *f, const fs_vector3 *position_m,
-                         const fs_vector3 *velocity_m_s);
 
 /* Set count axes of the velocity from first to a GNSS measurement. resets.py:25 */
 void fs_reset_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t first, int32_t count);
@@ -25,7 +21,11 @@ void fs_reset_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[]
 /* Set count axes of the position from first to a GNSS measurement. resets.py:36 */
 void fs_reset_position(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t first, int32_t count);
 
-/* Return the number of resets of any kind. resets.py:88 */
+/* Count a horizontal change of position and velocity as resets of both. resets.py:51 */
+void fs_count_correction(fs_estimator_memory *m, const fs_filter *f, fs_real north_m, fs_real east_m,
+                         fs_real north_m_s, fs_real east_m_s);
+
+/* Return the number of resets of any kind. resets.py:89 */
 fs_real fs_count_of_resets(const fs_estimator_memory *m);
 
 #endif

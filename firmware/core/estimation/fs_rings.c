@@ -13,15 +13,16 @@
 #define FS_LAST_S 6
 #define FS_COUNT 4
 #define FS_PUSHED_S 5
+#define FS_ROUNDING_S FS_LIT(0.00025)
 
-/* rings.py:37 */
+/* rings.py:39 */
 int32_t fs_slot_of(const fs_rings *rings, int32_t ring, int32_t size, int32_t number)
 {
     const int32_t slot = rings->cursors[ring][0] + number;
     return slot >= size ? slot - size : slot;
 }
 
-/* rings.py:97 */
+/* rings.py:99 */
 fs_real fs_newest_fix_time(const fs_rings *rings)
 {
     const int32_t count = rings->cursors[FS_GNSS_RING][1];
@@ -32,14 +33,14 @@ fs_real fs_newest_fix_time(const fs_rings *rings)
     return newest_s;
 }
 
-/* rings.py:70 */
+/* rings.py:72 */
 void fs_pop(fs_rings *rings, int32_t ring, int32_t size)
 {
     rings->cursors[ring][0] = fs_slot_of(rings, ring, size, 1);
     rings->cursors[ring][1] -= 1;
 }
 
-/* rings.py:60 */
+/* rings.py:62 */
 int32_t fs_push(fs_rings *rings, int32_t ring, int32_t size)
 {
     if (rings->cursors[ring][1] >= size) {
@@ -50,7 +51,7 @@ int32_t fs_push(fs_rings *rings, int32_t ring, int32_t size)
     return slot;
 }
 
-/* rings.py:107 */
+/* rings.py:116 */
 void fs_write_row(fs_real row[], int32_t row_size, const fs_real values[])
 {
     for (int32_t column = 0; column < row_size; column++) {
@@ -58,7 +59,7 @@ void fs_write_row(fs_real row[], int32_t row_size, const fs_real values[])
     }
 }
 
-/* rings.py:77 */
+/* rings.py:79 */
 bool fs_take_mean(fs_real mean[], fs_real row[], int32_t row_size, fs_real period_s)
 {
     if (row[0] - mean[FS_LAST_S] > period_s) { /* a gap: the older samples are outdated */
@@ -84,19 +85,17 @@ bool fs_take_mean(fs_real mean[], fs_real row[], int32_t row_size, fs_real perio
     return true;
 }
 
-/* rings.py:44 */
-int32_t fs_count_of_measurements(const fs_rings *rings)
-{
-    int32_t total = 0;
-    for (int32_t ring = 0; ring < 4; ring++) {
-        total += rings->cursors[ring][1];
-    }
-    return total;
-}
-
-/* rings.py:53 */
+/* rings.py:55 */
 bool fs_is_due(const fs_rings *rings, int32_t ring, fs_real row_s, fs_real now_s)
 {
     const int32_t count = rings->cursors[ring][1];
-    return count > 0 && row_s <= now_s;
+    return count > 0 && row_s <= now_s + FS_ROUNDING_S;
+}
+
+/* rings.py:109 */
+void fs_read_row(const fs_real row[], int32_t row_size, fs_real values[])
+{
+    for (int32_t column = 0; column < row_size; column++) {
+        values[column] = row[column];
+    }
 }

@@ -19,28 +19,28 @@ typedef struct {
     int32_t cursors[5][2];
 } fs_rings;
 
-/* Return the slot of row number, counted from the oldest. rings.py:37 */
+/* Return the slot of row number, counted from the oldest. rings.py:39 */
 int32_t fs_slot_of(const fs_rings *rings, int32_t ring, int32_t size, int32_t number);
 
-/* Return the time of the newest row of GNSS, or minus infinity. rings.py:97 */
+/* Return the time of the newest row of GNSS, or minus infinity. rings.py:99 */
 fs_real fs_newest_fix_time(const fs_rings *rings);
 
-/* Remove the oldest row. rings.py:70 */
+/* Remove the oldest row. rings.py:72 */
 void fs_pop(fs_rings *rings, int32_t ring, int32_t size);
 
-/* Return the slot for a new row; the oldest row of a full ring is dropped. rings.py:60 */
+/* Return the slot for a new row; the oldest row of a full ring is dropped. rings.py:62 */
 int32_t fs_push(fs_rings *rings, int32_t ring, int32_t size);
 
-/* Copy the first values to a row. rings.py:107 */
+/* Copy the first values to a row. rings.py:116 */
 void fs_write_row(fs_real row[], int32_t row_size, const fs_real values[]);
 
-/* Add a sample to a mean; return True, with the mean in row, if period_s passed since the last one. rings.py:77 */
+/* Add a sample to a mean; return True, with the mean in row, if period_s passed since the last one. rings.py:79 */
 bool fs_take_mean(fs_real mean[], fs_real row[], int32_t row_size, fs_real period_s);
 
-/* Return the number of rows that wait in all rings but that of the IMU. rings.py:44 */
-int32_t fs_count_of_measurements(const fs_rings *rings);
-
-/* Return True if the ring has rows and its oldest one, measured at row_s, is not in the future. rings.py:53 */
+/* Return True if the ring has rows and its oldest one, measured at row_s, is not in the future. rings.py:55 */
 bool fs_is_due(const fs_rings *rings, int32_t ring, fs_real row_s, fs_real now_s);
+
+/* Copy a row to the first of values. rings.py:109 */
+void fs_read_row(const fs_real row[], int32_t row_size, fs_real values[]);
 
 #endif

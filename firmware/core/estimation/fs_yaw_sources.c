@@ -38,7 +38,7 @@
 #define FS_KNOWN_FIELD 19
 #define FS_COUNTED_TURN_RAD FS_LIT(0.01)
 
-/* yaw_sources.py:126 */
+/* yaw_sources.py:138 */
 void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_sample *step)
 {
     if (m->yaw_fix[FS_YAW_UPDATES] > FS_LIT(0.0)) {
@@ -50,34 +50,45 @@ void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_s
     }
 }
 
-/* yaw_sources.py:60 */
-void fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params)
+/* Note the field; set the states of the field, and an unknown yaw, by the first one. yaw_sources.py:75 */
+static void start_field(fs_estimator_memory *m, fs_filter *f, const fs_vector3 *field,
+                        const fs_estimator_params *params)
 {
-    const fs_vector3 field = fs_read_vector(row, 1);
-    if (m->flags[FS_MAG_FAULT] == 1) {
-        return;
-    }
-    m->field[0] = field.x;
-    m->field[1] = field.y;
-    m->field[2] = field.z;
+    m->field[0] = field->x;
+    m->field[1] = field->y;
+    m->field[2] = field->z;
     if (m->flags[FS_HAS_MAG] == 0) {
         m->flags[FS_HAS_MAG] = 1;
         if (m->flags[FS_HAS_YAW] == 0) {
             const fs_vector3 read_vector = fs_read_vector(m->earth, 0);
-            const fs_real turn_rad = fs_align_yaw(f, &field, &read_vector, m->earth[3], params);
+            const fs_real turn_rad = fs_align_yaw(f, field, &read_vector, m->earth[3], params);
             fs_count_yaw_reset(m, turn_rad);
             m->flags[FS_HAS_YAW] = 1;
         } else {
             const fs_nominal read_nominal = fs_read_nominal(f->nominal);
-            const fs_vector3 level = fs_rotate(&read_nominal.attitude, &field);
+            const fs_vector3 level = fs_rotate(&read_nominal.attitude, field);
             const fs_vector3 read_vector_2 = fs_read_vector(m->earth, 0);
             fs_set_field(f, &level, &read_vector_2, m->earth[3], params);
         }
     }
-    fs_fuse_field(f, &field, params);
 }
 
-/* Take tilt and yaw from the models, velocity and position from GNSS. yaw_sources.py:173 */
+/* yaw_sources.py:60 */
+int32_t fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t axis,
+                      const fs_estimator_params *params)
+{
+    const fs_vector3 field = fs_read_vector(row, 1);
+    if (m->flags[FS_MAG_FAULT] == 1) {
+        return 0;
+    }
+    if (axis == 0) {
+        start_field(m, f, &field, params);
+    }
+    fs_fuse_field_axis(f, axis, &field, params);
+    return axis < 2 ? axis + 1 : 0;
+}
+
+/* Take tilt and yaw from the models, velocity and position from GNSS. yaw_sources.py:185 */
 static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 {
     m->yaw_fix[FS_YAW_WRONG_S] = FS_LIT(0.0);
@@ -108,7 +119,7 @@ static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real 
 
 /*
  * Return True if the models have contradicted the yaw for a second, or do while GNSS velocities are refused.
- * yaw_sources.py:159
+ * yaw_sources.py:171
  */
 static bool is_wrong(fs_estimator_memory *m, fs_real time_s)
 {
@@ -126,7 +137,7 @@ static bool is_wrong(fs_estimator_memory *m, fs_real time_s)
     return lasts || (differs && is_refused);
 }
 
-/* yaw_sources.py:135 */
+/* yaw_sources.py:147 */
 void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 {
     if (m->flags[FS_LANDED] == 1 || m->flags[FS_HAS_GNSS] == 0) {
@@ -160,7 +171,7 @@ void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 
 /*
  * Turn the Earth's field by a change of the declination; the yaw follows as far as it depends on it.
- * yaw_sources.py:108
+ * yaw_sources.py:120
  */
 static void fuse_declination(fs_filter *f, fs_real was_rad, fs_real change_rad)
 {
@@ -188,7 +199,7 @@ static void fuse_declination(fs_filter *f, fs_real was_rad, fs_real change_rad)
     f->nominal[17] = along * sine + across * cosine;
 }
 
-/* yaw_sources.py:79 */
+/* yaw_sources.py:91 */
 void fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, const fs_estimator_params *params)
 {
     if (m->flags[FS_HAS_MAG] == 0 || m->flags[FS_MAG_FAULT] == 1) {

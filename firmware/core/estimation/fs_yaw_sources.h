@@ -13,13 +13,20 @@
 #include "fs_rings.h"
 #include "fs_types.h"
 
-/* Move the models over a step of the flight. yaw_sources.py:126 */
+/* Move the models over a step of the flight. yaw_sources.py:138 */
 void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_sample *step);
 
-/* Fuse a magnetic field; the first one after the alignment gives the yaw if that is unknown. yaw_sources.py:60 */
-void fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params);
+/*
+ * Fuse an axis of a magnetic field, and return the next one, 0 after the last.
+ *
+ * The first field after the alignment gives the yaw if that is unknown.
+ *
+ * yaw_sources.py:60
+ */
+int32_t fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t axis,
+                      const fs_estimator_params *params);
 
-/* Weigh the models with a GNSS velocity; reset the yaw if it is unknown, or wrong. yaw_sources.py:135 */
+/* Weigh the models with a GNSS velocity; reset the yaw if it is unknown, or wrong. yaw_sources.py:147 */
 void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[]);
 
 /*
@@ -28,7 +35,7 @@ void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
  * On the ground, or if it is far off, the yaw is aligned again. In flight it changes as far as it depends on the
  * field.
  *
- * yaw_sources.py:79
+ * yaw_sources.py:91
  */
 void fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, const fs_estimator_params *params);
 

@@ -44,17 +44,19 @@ static void take(filter_steps *s)
     fs_estimator_memory *const m = &s->memory;
     uint32_t before, cost;
     uint16_t i;
+    int32_t aligned;
     fs_real numbers[3];
 
     switch (s->kind) {
     case FILTER_IMU:
+        aligned = m->flags[FS_ALIGNED];
         before = s->clock != 0 ? s->clock() : 0U;
         fs_imu_kernel(m, s->row);
         cost = s->clock != 0 ? s->clock() - before : 0U;
         s->samples++;
         s->sum += cost;
-        s->most = cost > s->most ? cost : s->most;
-        s->least = (m->flags[FS_ALIGNED] == 1 && cost < s->least) ? cost : s->least;
+        s->most = (aligned == 1 && cost > s->most) ? cost : s->most; /* the alignment itself is done once, at rest */
+        s->least = (aligned == 1 && cost < s->least) ? cost : s->least;
         break;
     case FILTER_FIELD:
         fs_field_kernel(m);
@@ -139,7 +141,6 @@ void filter_steps_costs(filter_steps *s, uint32_t costs[FILTER_PARTS])
     const fs_estimator_params *const p = &m->params;
     fs_filter *const f = &m->filter;
     static const fs_vector3 still = {FS_LIT(0.001), FS_LIT(0.002), FS_LIT(0.003)};
-    static const fs_vector3 none = {FS_LIT(0.0), FS_LIT(0.0), FS_LIT(0.0)};
     static const fs_vector3 force = {FS_LIT(0.1), FS_LIT(0.2), FS_LIT(-0.4)};
     static fs_real gnss[10];
     static fs_delta_sample step;
@@ -160,21 +161,24 @@ void filter_steps_costs(filter_steps *s, uint32_t costs[FILTER_PARTS])
     step.angle_rad = still;
     step.velocity_m_s = force;
     COST(0, fs_predict(f, &step, p));
+    COST(14, fs_predict_errors(f, &step, p));
     COST(1, fs_predict_models(m->yaw_models, &still, &force, FS_LIT(0.01)));
-    COST(2, fs_fuse_gnss(f, gnss, FS_LIT(0.0), FS_LIT(0.2), 0, &none, p));
+    COST(2, fs_drift_gnss_bias(f, gnss, FS_LIT(0.2), p));
+    COST(3, fs_fuse_gnss_velocity(f, gnss, 0, FS_LIT(0.0), p));
+    COST(4, fs_fuse_gnss_position(f, gnss, FS_LIT(0.0), 0, FS_LIT(0.0), p));
     {
         const fs_vector3 field = {m->field[0], m->field[1], m->field[2]};
 
-        COST(3, fs_fuse_field(f, &field, p));
+        COST(5, fs_fuse_field_axis(f, 0, &field, p));
     }
-    COST(4, fs_fuse_baro(f, f->nominal[24] - f->nominal[9], FS_LIT(0.0), p));
-    COST(5, fs_fuse_range(f, FS_LIT(1.0), f->nominal[9] + FS_LIT(1.0), FS_LIT(0.0), p));
-    COST(6, fs_fuse_drag(f, &force, p));
-    COST(7, fs_fuse_rest_velocity(f, p));
-    COST(8, fs_fuse_rest_rate(f, &still, FS_LIT(1e-6), p));
-    COST(9, fs_fuse_hold(f, f->nominal[7], f->nominal[8], p));
-    COST(10, fs_update_models(m->yaw_models, FS_LIT(0.1), FS_LIT(0.2), FS_LIT(0.1)));
+    COST(6, fs_fuse_baro(f, f->nominal[24] - f->nominal[9], FS_LIT(0.0), p));
+    COST(7, fs_fuse_range(f, FS_LIT(1.0), f->nominal[9] + FS_LIT(1.0), FS_LIT(0.0), p));
+    COST(8, fs_fuse_drag(f, 0, &force, p));
+    COST(9, fs_fuse_rest_velocity(f, 0, p));
+    COST(10, fs_fuse_rest_rate(f, 0, &still, FS_LIT(1e-6), p));
+    COST(11, fs_fuse_hold(f, 0, f->nominal[7], p));
+    COST(12, fs_update_models(m->yaw_models, FS_LIT(0.1), FS_LIT(0.2), FS_LIT(0.1)));
     nominal = fs_read_nominal(f->nominal);
     motion = fs_motion_of(&nominal);
-    COST(11, fs_follow(&m->rings, m->output, &motion, FS_LIT(0.1), p->gravity_m_s2));
+    COST(13, fs_follow(&m->rings, m->output, &motion, FS_LIT(0.1), p->gravity_m_s2));
 }

@@ -1,0 +1,310 @@
+/* Generated from Python by flightstack.firmware.generator: do not edit. */
+/*
+ * The filter's work in parts: a prediction, then one scalar measurement at a time, so that no sample waits for all.
+ * flightstack/estimation/agenda.py
+ */
+#include "fs_agenda.h"
+
+#include "fs_error_state.h"
+#include "fs_fusion.h"
+#include "fs_height_sources.h"
+#include "fs_imu_input.h"
+#include "fs_math.h"
+#include "fs_output_predictor.h"
+#include "fs_position_sources.h"
+#include "fs_prediction.h"
+#include "fs_resets.h"
+#include "fs_rings.h"
+#include "fs_source_checks.h"
+#include "fs_yaw_sources.h"
+
+#define FS_SOURCE 0
+#define FS_IDLE 0
+#define FS_IMU_RING 4
+#define FS_IMU_ROWS 64
+#define FS_LANDED 1
+#define FS_REST_PERIOD_S FS_LIT(0.1)
+#define FS_BEHIND_S FS_LIT(0.035)
+#define FS_MAG_RING 1
+#define FS_MAG_ROWS 32
+#define FS_BARO_RING 2
+#define FS_BARO_ROWS 32
+#define FS_RANGE_RING 3
+#define FS_RANGE_ROWS 32
+#define FS_GNSS_RING 0
+#define FS_GNSS_ROWS 8
+#define FS_GAP_PENDING_S 0
+#define FS_GAP_RATE_RAD_S FS_LIT(0.3)
+#define FS_GAP_FORCE_M_S2 FS_LIT(3.0)
+#define FS_ATTITUDE 0
+#define FS_VELOCITY 3
+#define FS_REST_SOURCE 1
+#define FS_AXIS 1
+#define FS_FUSED_ANY 2
+#define FS_SOURCES 8
+#define FS_STILL_FORCE_M_S2 FS_LIT(1.0)
+#define FS_STILL_RATE_RAD_S FS_LIT(0.08)
+#define FS_NOTHING -1
+#define FS_REST_MEAN_S FS_LIT(0.1)
+#define FS_HOLD_SOURCE 2
+#define FS_DRAG_SOURCE 7
+#define FS_DRAG_PERIOD_S FS_LIT(0.05)
+#define FS_MAG_SOURCE 3
+#define FS_BARO_SOURCE 4
+#define FS_RANGE_SOURCE 5
+#define FS_LATE_S FS_LIT(0.3)
+#define FS_YAW_STAGE 6
+
+/*
+ * Return True if a measurement may be fused in the step at hand, or the covariance is behind by the most.
+ * agenda.py:125
+ */
+static bool is_covariance_due(const fs_estimator_memory *m, const fs_filter *f, const fs_rings *r,
+                              const fs_estimator_params *params)
+{
+    const fs_real now_s = f->clock[0];
+    const bool rests = m->flags[FS_LANDED] == 1 && now_s - m->rest_s[0] >= FS_REST_PERIOD_S;
+    if (f->behind[0] > FS_BEHIND_S || rests || params->drag_is_fused > FS_LIT(0.0) || !fs_is_velocity_measured(f)) {
+        return true;
+    }
+    return fs_is_due(r, FS_MAG_RING, r->mag[fs_slot_of(r, FS_MAG_RING, FS_MAG_ROWS, 0)][0], now_s) ||
+           fs_is_due(r, FS_BARO_RING, r->baro[fs_slot_of(r, FS_BARO_RING, FS_BARO_ROWS, 0)][0], now_s) ||
+           fs_is_due(r, FS_RANGE_RING, r->range[fs_slot_of(r, FS_RANGE_RING, FS_RANGE_ROWS, 0)][0], now_s) ||
+           fs_is_due(r, FS_GNSS_RING, r->gnss[fs_slot_of(r, FS_GNSS_RING, FS_GNSS_ROWS, 0)][0], now_s);
+}
+
+/* Add the uncertainty of time without samples. agenda.py:224 */
+static void account_for_gap(fs_estimator_memory *m, fs_filter *f)
+{
+    const fs_real gap_s = m->imu_gap[FS_GAP_PENDING_S];
+    if (gap_s > FS_LIT(0.0)) {
+        const fs_real angle_rad = FS_GAP_RATE_RAD_S * gap_s;
+        const fs_real speed_m_s = FS_GAP_FORCE_M_S2 * gap_s;
+        for (int32_t axis = 0; axis < 3; axis++) {
+            f->covariance[FS_ATTITUDE + axis][FS_ATTITUDE + axis] += angle_rad * angle_rad;
+            f->covariance[FS_VELOCITY + axis][FS_VELOCITY + axis] += speed_m_s * speed_m_s;
+        }
+        m->imu_gap[FS_GAP_PENDING_S] = FS_LIT(0.0);
+    }
+}
+
+/* Predict a step that is not later than the horizon; return False if there is none. agenda.py:105 */
+static bool begin(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, fs_real horizon_s,
+                  const fs_estimator_params *params)
+{
+    if (r->cursors[FS_IMU_RING][1] == 0) {
+        return false;
+    }
+    const int32_t slot = fs_slot_of(r, FS_IMU_RING, FS_IMU_ROWS, 0);
+    if (r->imu[slot][0] > horizon_s) {
+        return false;
+    }
+    const fs_delta_sample step = fs_read_step(r->imu[slot]);
+    fs_predict_yaw(m, f, &step);
+    fs_predict(f, &step, params);
+    if (is_covariance_due(m, f, r, params)) {
+        fs_predict_errors(f, &step, params);
+    }
+    account_for_gap(m, f);
+    fs_add_fault_noise(m->checks, f, step.dt_s);
+    m->agenda[FS_SOURCE] = FS_REST_SOURCE;
+    m->agenda[FS_AXIS] = 0;
+    m->agenda[FS_FUSED_ANY] = 0;
+    return true;
+}
+
+/* Return True if the vehicle is on the ground and nothing moves it. agenda.py:236 */
+static bool stands(const fs_estimator_memory *m, const fs_estimator_params *params)
+{
+    if (m->flags[FS_LANDED] == 0) {
+        return false;
+    }
+    const fs_vector3 rate = fs_mean_rate(m->sums);
+    const fs_vector3 force = fs_mean_force(m->sums);
+    const fs_vector3 bias = fs_read_vector(m->filter.nominal, 10);
+    const fs_real off = fs_sqrt(force.x * force.x + force.y * force.y + force.z * force.z) - params->gravity_m_s2;
+    const fs_real largest = fs_max(fs_max(fs_abs(rate.x - bias.x), fs_abs(rate.y - bias.y)), fs_abs(rate.z - bias.z));
+    return fs_abs(off) < FS_STILL_FORCE_M_S2 && largest < FS_STILL_RATE_RAD_S;
+}
+
+/* Fuse rest ten times a second: three axes of the velocity, three of the rate. agenda.py:248 */
+static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t stage,
+                    const fs_estimator_params *params)
+{
+    int32_t axis = stage;
+    if (stage == 0) {
+        if (f->clock[0] - m->rest_s[0] < FS_REST_PERIOD_S || !stands(m, params)) {
+            return FS_NOTHING;
+        }
+        m->rest_s[0] = f->clock[0];
+        if (!fs_is_platform_at_rest(m, f)) {
+            axis = 3;
+        }
+    }
+    if (axis < 3) {
+        fs_fuse_rest_velocity(f, axis, params);
+    } else {
+        const fs_delta_sample step = fs_read_step(r->imu[fs_slot_of(r, FS_IMU_RING, FS_IMU_ROWS, 0)]);
+        const fs_real density = fs_max(fs_max(step.gyro_density.x, step.gyro_density.y), step.gyro_density.z);
+        const fs_vector3 mean_rate = fs_mean_rate(m->sums);
+        fs_fuse_rest_rate(f, axis - 3, &mean_rate, density / FS_REST_MEAN_S, params);
+    }
+    return axis < 5 ? axis + 1 : 0;
+}
+
+/* Fuse drag in flight while the velocity over ground is measured, twenty times a second. agenda.py:267 */
+static int32_t drag(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t axis,
+                    const fs_estimator_params *params)
+{
+    if (axis == 0) {
+        const bool waits = f->clock[0] - m->drag_s[0] < FS_DRAG_PERIOD_S;
+        if (params->drag_is_fused == FS_LIT(0.0) || m->flags[FS_LANDED] == 1 || waits ||
+            !fs_is_velocity_measured(f)) {
+            return FS_NOTHING;
+        }
+        m->drag_s[0] = f->clock[0];
+    }
+    const fs_delta_sample step = fs_read_step(r->imu[fs_slot_of(r, FS_IMU_RING, FS_IMU_ROWS, 0)]);
+    const fs_vector3 scaled = fs_scaled(&step.velocity_m_s, FS_LIT(1.0) / step.dt_s);
+    fs_fuse_drag(f, axis, &scaled, params);
+    return 1 - axis;
+}
+
+/* Move the oldest row of a ring to row; return False if none is due. agenda.py:214 */
+static bool next_row(fs_rings *r, int32_t ring, int32_t size, const fs_real oldest[], int32_t oldest_size,
+                     fs_real now_s, fs_real row[])
+{
+    if (!fs_is_due(r, ring, oldest[0], now_s)) {
+        return false;
+    }
+    fs_read_row(oldest, oldest_size, row);
+    fs_pop(r, ring, size);
+    return true;
+}
+
+/* Move the oldest row of a source that is due to pending; drop those that are too late. agenda.py:188 */
+static bool take_row(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, int32_t source)
+{
+    const fs_real now_s = f->clock[0];
+    for (int32_t count = 0; count < 32; count++) {
+        bool found;
+        if (source == FS_MAG_SOURCE) {
+            found = next_row(r, FS_MAG_RING, FS_MAG_ROWS, r->mag[fs_slot_of(r, FS_MAG_RING, FS_MAG_ROWS, 0)], 4,
+                             now_s, m->pending);
+        } else {
+            if (source == FS_BARO_SOURCE) {
+                found = next_row(r, FS_BARO_RING, FS_BARO_ROWS, r->baro[fs_slot_of(r, FS_BARO_RING, FS_BARO_ROWS, 0)],
+                                 2, now_s, m->pending);
+            } else {
+                if (source == FS_RANGE_SOURCE) {
+                    found = next_row(r, FS_RANGE_RING, FS_RANGE_ROWS,
+                                     r->range[fs_slot_of(r, FS_RANGE_RING, FS_RANGE_ROWS, 0)], 2, now_s, m->pending);
+                } else {
+                    found = next_row(r, FS_GNSS_RING, FS_GNSS_ROWS,
+                                     r->gnss[fs_slot_of(r, FS_GNSS_RING, FS_GNSS_ROWS, 0)], 10, now_s, m->pending);
+                }
+            }
+        }
+        if (!found) {
+            return false;
+        }
+        if (m->pending[0] > now_s - FS_LATE_S) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Fuse the next scalar of the source at hand. agenda.py:159 */
+static int32_t part(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_estimator_params *params)
+{
+    const int32_t source = m->agenda[FS_SOURCE];
+    const int32_t axis = m->agenda[FS_AXIS];
+    if (source == FS_REST_SOURCE) {
+        return rest(m, f, r, axis, params);
+    }
+    if (source == FS_HOLD_SOURCE) {
+        if (axis == 0 && stands(m, params)) {
+            return FS_NOTHING;
+        }
+        return fs_hold_position(m, f, axis, params);
+    }
+    if (source == FS_DRAG_SOURCE) {
+        return drag(m, f, r, axis, params);
+    }
+    if (axis == 0) {
+        if (!take_row(m, f, r, source)) {
+            return FS_NOTHING;
+        }
+    }
+    int32_t following = 0;
+    if (source == FS_MAG_SOURCE) {
+        following = fs_take_field(m, f, m->pending, axis, params);
+    } else {
+        if (source == FS_BARO_SOURCE) {
+            fs_take_baro(m, f, m->pending, params);
+        } else {
+            if (source == FS_RANGE_SOURCE) {
+                fs_take_range(m, f, m->pending, params);
+            } else {
+                if (axis == FS_YAW_STAGE) {
+                    fs_take_velocity(m, f, m->pending);
+                } else {
+                    following = fs_take_gnss(m, f, m->pending, axis, params);
+                }
+            }
+        }
+    }
+    return following;
+}
+
+/* Move the output by a share of its difference to the filter. agenda.py:152 */
+static void move_output(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, fs_real share,
+                        const fs_estimator_params *params)
+{
+    m->followed[0] = fs_count_of_resets(m);
+    const fs_nominal read_nominal = fs_read_nominal(f->nominal);
+    const fs_motion motion_of = fs_motion_of(&read_nominal);
+    fs_follow(r, m->output, &motion_of, share, params->gravity_m_s2);
+}
+
+/* Move the output as the filter has moved, and close the step. agenda.py:140 */
+static void finish(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, const fs_estimator_params *params)
+{
+    const fs_real dt_s = r->imu[fs_slot_of(r, FS_IMU_RING, FS_IMU_ROWS, 0)][1];
+    const bool is_reset = fs_count_of_resets(m) != m->followed[0]; /* between two steps, by the Earth's field */
+    const fs_real share = is_reset || params->output_s <= dt_s ? FS_LIT(1.0) : dt_s / params->output_s;
+    /* else the output has moved as the filter has */
+    if (is_reset || m->agenda[FS_FUSED_ANY] == 1 || share < FS_LIT(1.0)) {
+        move_output(m, f, r, share, params);
+    }
+    fs_pop(r, FS_IMU_RING, FS_IMU_ROWS);
+    m->agenda[FS_SOURCE] = FS_IDLE;
+}
+
+/* agenda.py:81 */
+bool fs_work(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_s, const fs_estimator_params *params)
+{
+    if (m->agenda[FS_SOURCE] == FS_IDLE) {
+        if (!begin(m, f, r, horizon_s, params)) {
+            return false;
+        }
+    }
+    for (int32_t count = 0; count < 8; count++) {
+        if (m->agenda[FS_SOURCE] >= FS_SOURCES) {
+            break;
+        }
+        const int32_t following = part(m, f, r, params);
+        if (following != FS_NOTHING) {
+            m->agenda[FS_AXIS] = following;
+            m->agenda[FS_FUSED_ANY] = 1;
+            if (fs_count_of_resets(m) != m->followed[0]) { /* users of the output follow the count at once */
+                move_output(m, f, r, FS_LIT(1.0), params);
+            }
+            return true;
+        }
+        m->agenda[FS_SOURCE] += 1;
+    }
+    finish(m, f, r, params);
+    return true;
+}

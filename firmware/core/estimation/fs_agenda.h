@@ -1,0 +1,24 @@
+/* Generated from Python by flightstack.firmware.generator: do not edit. */
+/*
+ * The filter's work in parts: a prediction, then one scalar measurement at a time, so that no sample waits for all.
+ * flightstack/estimation/agenda.py
+ */
+#ifndef FS_AGENDA_H
+#define FS_AGENDA_H
+
+#include "fs_estimator_params.h"
+#include "fs_kalman.h"
+#include "fs_memory.h"
+#include "fs_rings.h"
+#include "fs_types.h"
+
+/*
+ * Do the next part of the work; return False if no step older than the horizon is open or waits.
+ *
+ * A part is one scalar, with the prediction if that is due, or the end of a step.
+ *
+ * agenda.py:81
+ */
+bool fs_work(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_s, const fs_estimator_params *params);
+
+#endif
