@@ -18,6 +18,7 @@ from flightstack.estimation.imu_input import (
     write_step,
 )
 from flightstack.estimation.imu_track import IMU_SIZE
+from flightstack.estimation.kalman import Filter
 from flightstack.estimation.memory import (
     ALIGNED,
     GAP_PENDING_S,
@@ -100,6 +101,15 @@ def push_kernel(memory: MemoryArray, ring: int, row: FloatArray) -> None:
 
 
 @compiled
+def _work_up_to(m: MemoryRecord, f: Filter, r: Rings, horizon_s: float, params: EstimatorParams) -> None:
+    """Do a part of the filter's work, and all of it while it is behind ``horizon_s``."""
+    for _ in range(_MOST_PARTS):
+        has_worked = work(m, f, r, horizon_s, params)
+        if not (has_worked and _is_behind(r, horizon_s)):
+            break
+
+
+@compiled
 def imu_kernel(memory: MemoryArray, sample: FloatArray) -> None:
     """Take an IMU sample, shape (8,): move the output, and the filter when a step is complete.
 
@@ -134,11 +144,8 @@ def imu_kernel(memory: MemoryArray, sample: FloatArray) -> None:
         slot = push(r, IMU_RING, IMU_ROWS)
         write_step(r.imu[slot], step)
         write_row(r.track[slot], output)
-    horizon_s = time_s - params.delay_s + 0.25 * dt_s  # between two samples, so that rounding does not matter
-    for _ in range(_MOST_PARTS):
-        has_worked = work(m, f, r, horizon_s, params)
-        if not (has_worked and _is_behind(r, horizon_s)):
-            break
+    # between two samples, so that rounding does not matter
+    _work_up_to(m, f, r, time_s - params.delay_s + 0.25 * dt_s, params)
     rates = filtered_rates(m["rate_filter"], gyro, dt_s, params.gyro_cutoff_hz)
     _write_state(m, less_bias(rates, gyro_bias, 1.0))
 

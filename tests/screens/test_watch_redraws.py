@@ -13,6 +13,7 @@ from textual.widget import Widget
 from gcs_cli.tui.app import COVERED_EVERY, REDRAWS_HZ, WatchApp
 from gcs_cli.tui.fly.screen import FlyScreen
 from gcs_cli.tui.key_bar import KeyBar
+from gcs_cli.tui.plot import field_picker
 from gcs_cli.tui.plot.field_picker import FieldPicker
 from gcs_cli.tui.screens import SCREENS, ScreenEntry
 from gcs_cli.tui.widgets.drawing import KeepsLines, LinesWidget
@@ -166,16 +167,16 @@ def test_a_covered_screen_is_drawn_less_often(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_a_dialog_with_live_values_follows_at_its_own_rate(monkeypatch: pytest.MonkeyPatch) -> None:
-    followed = []
-    monkeypatch.setattr(FieldPicker, "_load", lambda _: followed.append(0))
+    searched = []
+    monkeypatch.setattr(field_picker, "search", lambda *_: searched.append(0) or [])
 
     async def story(app: WatchApp, pilot: Pilot) -> None:
         await pilot.press("4", "enter")
         await pilot.pause()
         assert isinstance(app.screen, FieldPicker)
-        followed.clear()
+        searched.clear()
         for _ in range(10):
             app.redraw()
-        assert len(followed) == 5
+        assert len(searched) == 5
 
     play(story)

@@ -41,7 +41,7 @@
 #define FS_IMU_ROWS 64
 #define FS_BACKLOG_S FS_LIT(0.03)
 
-/* delayed_filter.py:68 */
+/* delayed_filter.py:69 */
 void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], int32_t row_size)
 {
     for (int32_t i = 0; i < row_size; i++) {
@@ -87,7 +87,7 @@ void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], in
 
 /*
  * Return the time that a sample has to cover: its own, or longer after a gap; zero for one that came too late.
- * delayed_filter.py:173
+ * delayed_filter.py:180
  */
 static fs_real real_step(fs_estimator_memory *m, fs_real time_s, fs_real dt_s)
 {
@@ -107,7 +107,7 @@ static fs_real real_step(fs_estimator_memory *m, fs_real time_s, fs_real dt_s)
     return covered_s;
 }
 
-/* Add a sample to the alignment; align when it is long enough. delayed_filter.py:190 */
+/* Add a sample to the alignment; align when it is long enough. delayed_filter.py:197 */
 static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real time_s, fs_real dt_s,
                     const fs_estimator_params *params)
 {
@@ -142,7 +142,7 @@ static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real tim
 
 /*
  * Return True if the filter is so far behind the horizon that a sample does more than a part of its work.
- * delayed_filter.py:147
+ * delayed_filter.py:154
  */
 static bool is_behind(const fs_rings *r, fs_real horizon_s)
 {
@@ -150,7 +150,19 @@ static bool is_behind(const fs_rings *r, fs_real horizon_s)
     return r->cursors[FS_IMU_RING][1] > 0 && oldest_s < horizon_s - FS_BACKLOG_S;
 }
 
-/* Write the output in the order of VehicleState. delayed_filter.py:154 */
+/* Do a part of the filter's work, and all of it while it is behind horizon_s. delayed_filter.py:104 */
+static void work_up_to(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_s,
+                       const fs_estimator_params *params)
+{
+    for (int32_t count = 0; count < 256; count++) {
+        const bool has_worked = fs_work(m, f, r, horizon_s, params);
+        if (!(has_worked && is_behind(r, horizon_s))) {
+            break;
+        }
+    }
+}
+
+/* Write the output in the order of VehicleState. delayed_filter.py:161 */
 static void write_state(fs_estimator_memory *m, const fs_vector3 *rates)
 {
     for (int32_t i = 0; i < 3; i++) {
@@ -165,7 +177,7 @@ static void write_state(fs_estimator_memory *m, const fs_vector3 *rates)
     fs_write_vector(m->state, 10, rates);
 }
 
-/* delayed_filter.py:103 */
+/* delayed_filter.py:113 */
 void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
 {
     for (int32_t i = 0; i < 8; i++) {
@@ -212,19 +224,13 @@ void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
         fs_write_row(r->track[slot], 11, m->output);
     }
     /* between two samples, so that rounding does not matter */
-    const fs_real horizon_s = time_s - params->delay_s + FS_LIT(0.25) * dt_s;
-    for (int32_t count_2 = 0; count_2 < 256; count_2++) {
-        const bool has_worked = fs_work(m, f, r, horizon_s, params);
-        if (!(has_worked && is_behind(r, horizon_s))) {
-            break;
-        }
-    }
+    work_up_to(m, f, r, time_s - params->delay_s + FS_LIT(0.25) * dt_s, params);
     const fs_vector3 rates = fs_filtered_rates(m->rate_filter, &gyro, dt_s, params->gyro_cutoff_hz);
     const fs_vector3 less_bias = fs_less_bias(&rates, &gyro_bias, FS_LIT(1.0));
     write_state(m, &less_bias);
 }
 
-/* delayed_filter.py:165 */
+/* delayed_filter.py:172 */
 void fs_field_kernel(fs_estimator_memory *memory)
 {
     fs_estimator_memory *m = memory;
