@@ -21,7 +21,7 @@ class VehicleCommand(NamedTuple):
 
 Storage: TypeAlias = Callable[[float], float]
 """Returns what a vehicle keeps of a value."""
-Packing: TypeAlias = Mapping[int, tuple[Storage, Storage, Storage, Storage]]
+Packing: TypeAlias = Mapping[int, Sequence[Storage]]
 """For a MAV_CMD, the storage of its first four parameters; without an entry they are kept as they are."""
 
 

@@ -104,7 +104,9 @@ def _is_all_kept(packing: Packing, command: int, number: int, wanted: float, fou
     """Return True if ``found`` is all that the vehicle can keep of ``wanted``, parameter ``number`` from 1."""
     row = packing.get(command)
     sent = 0.0 if math.isnan(wanted) else wanted
-    return row is not None and math.isfinite(sent) and row[number - 1](sent) == found
+    return (
+        row is not None and math.isfinite(sent) and math.isclose(row[number - 1](sent), found, rel_tol=1e-6)
+    )
 
 
 def _has_autocontinue(item: MissionItem, tolerance: Tolerance) -> bool:

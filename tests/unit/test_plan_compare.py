@@ -31,6 +31,8 @@ LOITER = replace(PLACE, command=mavlink.MAV_CMD_NAV_LOITER_TIME, param1=10.0, pa
 
 TURNS = replace(PLACE, command=mavlink.MAV_CMD_NAV_LOITER_TURNS, param1=0.2519, param2=0.0, param3=1234.0)
 SPEED = replace(PLACE, command=mavlink.MAV_CMD_DO_CHANGE_SPEED, param1=0.0, param2=5.5)
+TRIGGER = replace(PLACE, command=mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST, param1=12.5, param2=40.0, param3=1.0)
+PLACING = replace(PLACE, command=mavlink.MAV_CMD_NAV_PAYLOAD_PLACE, param1=2.345, param2=0.0)
 CIRCLE = replace(PLACE, command=mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, param1=50.9, param2=0.0)
 LAND = replace(PLACE, command=mavlink.MAV_CMD_NAV_LAND, param1=0.0, param2=0.0, param4=math.nan)
 
@@ -56,6 +58,9 @@ def with_params(item: MissionItem, *params: float) -> MissionItem:
         (TURNS, (0.0, 0.0, 1234.0, 0.0), [False]),
         (SPEED, (0.0, 5.0, 0.0, 0.0), [False]),
         (CIRCLE, (50.0, 0.0, 0.0, 0.0), [False]),
+        (TRIGGER, (12.5, 0.0, 1.0, 0.0), [True]),
+        (TRIGGER, (12.0, 0.0, 1.0, 0.0), [False, True]),
+        (PLACING, (2.34, 0.0, 0.0, 0.0), [True]),
     ],
 )
 def test_what_ardupilot_keeps_of_parameters_is_told_from_damage(
