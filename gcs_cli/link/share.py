@@ -67,8 +67,25 @@ def _connected(path: Path) -> socket.socket | None:
     return made
 
 
+def is_served(endpoint: VehicleEndpoint) -> bool:
+    """Return True if a process has the lock of those that serve ``endpoint``."""
+    try:
+        lock = os.open(share_path(endpoint).with_suffix(".lock"), os.O_RDWR | os.O_CLOEXEC)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    finally:
+        os.close(lock)
+    return False
+
+
 def _locked(path: Path) -> int | None:
-    """Return the descriptor of the file at ``path``, locked until it is closed; None if another process has it."""
+    """Return the descriptor of the file at ``path``, locked until it is closed; None if that is not possible."""
     try:
         lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
     except OSError:
@@ -139,14 +156,15 @@ class SharedLine:
             self._line = self._shared = StreamLine(socket.AF_UNIX, None, _SHARED, connected)
             return
         server = ShareServer.open(self._endpoint)
-        if server is None:  # another process begins to serve
+        if server is None and is_served(self._endpoint):  # another process begins to
             return
         try:
             self._line, self._shared = open_line(self._endpoint), None
         except CliError:
-            server.close()
+            if server is not None:
+                server.close()
             return
-        self.server = server
+        self.server = server  # None: nothing can be shared here
         self._closed.append(_SHARED)
 
     def send(self, data: bytes, peer: Address) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import subprocess
 import sys
@@ -193,6 +194,35 @@ def test_process_that_takes_the_link_over_serves_the_others(kind: str) -> None:
 
         with second, third, running(lambda: second.step(second.now_s + 0.05)):
             assert third.wait_for(both_hear, LONG_S)
+
+
+@pytest.mark.parametrize("fault", ["folder", "lock"])
+def test_process_that_cannot_serve_takes_the_link_over_alone(
+    fault: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    port, vehicle = free_port(), FakeVehicle()
+    endpoint = parse_endpoint(f"udp:{port}")
+    with udp_vehicles(vehicle, to_port=port):
+        with Connection(endpoint) as first:
+            first.share()
+            first.wait_for_vehicle(LONG_S)
+            line = open_shared(endpoint)
+            assert line is not None
+            second = Connection(endpoint, line=line)
+            with running(lambda: first.step(first.now_s + 0.05)):
+                second.wait_for_vehicle(LONG_S)
+        if fault == "folder":
+            share_path(endpoint).parent.chmod(0o750)
+        else:
+            monkeypatch.setattr("fcntl.flock", no_locks)
+        received = second.session.view.link.received
+        with second:
+            assert second.wait_for(lambda: second.session.view.link.received > received + 20, LONG_S)
+            assert open_shared(endpoint) is None
+
+
+def no_locks(_descriptor: int, _operation: int) -> None:
+    raise OSError(errno.ENOLCK, "No locks available")
 
 
 def test_process_without_the_link_does_not_serve_it(monkeypatch: pytest.MonkeyPatch) -> None:
