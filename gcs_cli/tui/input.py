@@ -103,6 +103,8 @@ class LastingFile:
     def _try(self, call: Callable[[], object]) -> None:
         try:
             call()
+        except BlockingIOError:  # a terminal that another program made non-blocking, and is slow
+            pass
         except OSError:
             self._on_lost()
 
