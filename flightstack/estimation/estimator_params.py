@@ -77,7 +77,9 @@ class EstimatorParams(NamedTuple):
     rest_velocity_noise_m_s: float = 0.02
     rest_rate_noise_rad_s: float = 0.006
     # timing
-    delay_s: float = horizon_s(gnss_delay_s, baro_delay_s, range_delay_s, mag_delay_s)
+    delay_s: float = horizon_s(
+        estimator_default("period_s"), gnss_delay_s, baro_delay_s, range_delay_s, mag_delay_s
+    )
     """Age of the state of the filter; measurements older than this are fused late."""
     sensor_period_s: float = 0.05
     """Least time between two measurements of magnetometer, barometer or range finder; samples between are averaged.
@@ -117,6 +119,7 @@ def tuning_of(values: Mapping[str, float]) -> tuple[EstimatorParams, GnssLimits]
     params = EstimatorParams()._replace(
         **{name: value for name, value in given.items() if name in EstimatorParams._fields}
     )
-    delay_s = horizon_s(params.gnss_delay_s, params.baro_delay_s, params.range_delay_s, params.mag_delay_s)
+    averaged_s = params.baro_delay_s, params.range_delay_s, params.mag_delay_s
+    delay_s = horizon_s(params.period_s, params.gnss_delay_s, *averaged_s)
     period_s = max(params.period_s, delay_s / (IMU_ROWS - _IMU_SPARE_ROWS))
     return params._replace(delay_s=delay_s, period_s=period_s), limits

@@ -34,7 +34,7 @@ NOISY = 40
 """Changes of the pressure in turn, 2 s at the interval of the health, that show the noise of a barometer; the rotors
 of a vehicle that has landed stop sooner."""
 IDEAL = 3
-"""Equal pressures in turn that show a barometer without noise: two are equal by chance once in a hundred."""
+"""Repeats in turn that show a barometer without noise: a pressure equals the last one by chance once in a hundred."""
 ACCURATE_SHARE, ACCURATE_S = 0.8, 1.0
 """Share of the limit below which an inaccurate position is accurate again, after this time there."""
 
@@ -136,7 +136,7 @@ class PressureTrack(NamedTuple):
     is_ideal: bool = False
     """True if the pressure has repeated itself on the ground: a simulator's ideal barometer does at rest."""
     repeats: int = 0
-    """Equal pressures in turn on the ground."""
+    """Pressures on the ground that equal the last one, in turn."""
 
     def is_stuck(self, landed: bool, height_m: float, time_s: float) -> bool:
         """Return True if the pressure should have changed: by its noise, or in a climb or descent."""

@@ -67,9 +67,9 @@ def _smooth(sums: Sums, at: int, value: Vector3, share: float) -> None:
 
 @compiled
 def _measure_noise(sums: Sums, sample_dt_s: float, angle: Vector3, velocity: Vector3) -> None:
-    """Update the noise densities from the fourth difference of means over 16 ms.
+    """Update the noise densities from the fourth difference of means over two steps, 20 ms.
 
-    The vehicle's motion has little power there, and vibration, which averages out within 16 ms, does not count.
+    The vehicle's motion has little power there, and vibration, which averages out within that time, does not count.
     """
     sums[_PAIR_S] += sample_dt_s
     sums[_PAIR] += angle.x

@@ -43,7 +43,7 @@ _LEAST_VARIANCE = 1e-12
 _MEAN_S, _LARGEST = 1.0, 3.0
 """Time constant of a mean, and the largest normalised innovation that counts."""
 _LIMIT, _AGREES = 1.0, 0.3
-"""Mean of white innovations: 0.22 (GNSS, 10 Hz) or 0.1 (barometer, 50 Hz)."""
+"""Mean of white innovations: 0.22 (GNSS, 10 Hz) or 0.17 (means of the barometer, 17 Hz)."""
 _ALONE_S, _ACCEL_HOLD_S, _BARO_HOLD_S = 2.0, 1.0, 10.0
 _ACCEL_DENSITY, _ACCEL_BIAS_DENSITY, _BARO_DENSITY = 1.0, 0.25, 0.25
 """Variance per second that a wrong sensor adds to vertical velocity, accelerometer bias and barometer bias."""

@@ -102,8 +102,10 @@ ESTIMATOR_SPECS: Mapping[str, ParamSpec] = {
 """Declarations by name."""
 
 _DEFAULTS = {param.field: param.spec.default * param.factor for param in ESTIMATOR_PARAMS}
-_HORIZON_MARGIN_S = 0.012
-"""Time by which the filter runs behind the latest measurement, more than one of its steps."""
+_HORIZON_STEPS, _HORIZON_MARGIN_S = 1.2, 0.012
+"""Time by which the filter runs behind the latest measurement: its steps, and at least."""
+_MEAN_AGE_S = 0.0225
+"""Largest age of a mean of fast samples, over 45 ms, when the last of them arrives."""
 
 
 def estimator_default(field: str) -> float:
@@ -120,6 +122,6 @@ def fields_of(values: Mapping[str, float]) -> dict[str, float]:
     }
 
 
-def horizon_s(*delays_s: float) -> float:
-    """Return the delay of the filter for the delays of its sensors."""
-    return max(delays_s) + _HORIZON_MARGIN_S
+def horizon_s(period_s: float, gnss_s: float, *averaged_s: float) -> float:
+    """Return the delay of the filter with steps of ``period_s``, for the delays of GNSS and of averaged sensors."""
+    return max(gnss_s, max(averaged_s) + _MEAN_AGE_S) + max(_HORIZON_STEPS * period_s, _HORIZON_MARGIN_S)

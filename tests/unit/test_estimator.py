@@ -15,7 +15,14 @@ from flightstack.core.geometry import conjugate, quaternion_product, rotation_ve
 from flightstack.estimation.error_state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams
-from flightstack.estimation.kalman import FUSED, GNSS_VELOCITY, INNOVATION, INNOVATION_VARIANCE, REFUSED
+from flightstack.estimation.kalman import (
+    BARO,
+    FUSED,
+    GNSS_VELOCITY,
+    INNOVATION,
+    INNOVATION_VARIANCE,
+    REFUSED,
+)
 from flightstack.estimation.memory import POSITION_RESET, VELOCITY_RESET
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, ImuSample, MagSample
 from tests.support import flown_sensors as flown
@@ -144,7 +151,7 @@ def test_sample_of_the_imu_fuses_one_scalar_at_most_and_keeps_pace() -> None:
         time_s = 0.002 * tick
         if tick % 10 == 0:
             estimator.mag(MagSample(time_s, flown.EARTH))
-            estimator.baro(BaroSample(time_s, 955.0, 488.0 + 0.01 * (tick % 3), 20.0))
+            estimator.baro(BaroSample(time_s, 955.0, 488.0 + 0.01 * (tick % 7), 20.0))
         if tick % 50 == 0:
             point = frame.to_geo(Vector3(0.01 * (tick % 7), 0.0, 0.0))
             estimator.gnss(GnssSample(time_s, *point, Vector3(0.01, 0.0, 0.0), 0.5, 0.8, 0.1, 3, 14))
@@ -158,6 +165,7 @@ def test_sample_of_the_imu_fuses_one_scalar_at_most_and_keeps_pace() -> None:
     assert most == 1.0
     assert lag_s < EstimatorParams().delay_s + 0.045  # within the backlog of 0.03 s, a step and a sample
     assert observations[GNSS_VELOCITY, FUSED] > 85.0  # of 94 after the alignment and the delay
+    assert observations[BARO, FUSED] > 150.0  # of 158: it is not stuck
 
 
 def test_equal_samples_give_equal_bytes() -> None:

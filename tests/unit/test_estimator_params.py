@@ -26,9 +26,13 @@ def test_each_parameter_sets_one_field_and_fits_its_range() -> None:
 
 
 def test_delay_of_the_filter_follows_the_slowest_sensor() -> None:
-    params, _ = tuning_of({"EKF2_GPS_DELAY": 200.0, "EKF2_BARO_DELAY": 250.0})
+    params, _ = tuning_of({"EKF2_GPS_DELAY": 200.0, "EKF2_BARO_DELAY": 100.0})
     assert params.gnss_delay_s == pytest.approx(0.2)
-    assert params.delay_s == pytest.approx(0.262)
+    assert params.delay_s == pytest.approx(0.212)
+    params, _ = tuning_of({"EKF2_GPS_DELAY": 200.0, "EKF2_BARO_DELAY": 250.0})
+    assert params.delay_s == pytest.approx(0.2845)  # the barometer's mean is up to 22.5 ms older
+    params, _ = tuning_of({"EKF2_GPS_DELAY": 200.0, "EKF2_PREDICT_US": 20_000.0})
+    assert params.delay_s == pytest.approx(0.224)
 
 
 def test_period_of_the_filter_covers_the_delay_of_its_sensors() -> None:

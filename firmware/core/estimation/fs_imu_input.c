@@ -66,9 +66,9 @@ void fs_add_sample(fs_real sums[64], const fs_vector3 *gyro, const fs_vector3 *a
 }
 
 /*
- * Update the noise densities from the fourth difference of means over 16 ms.
+ * Update the noise densities from the fourth difference of means over two steps, 20 ms.
  *
- * The vehicle's motion has little power there, and vibration, which averages out within 16 ms, does not count.
+ * The vehicle's motion has little power there, and vibration, which averages out within that time, does not count.
  *
  * imu_input.py:69
  */
