@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from flightstack.plan import MissionItem, MissionType, Plan
+from flightstack.process.console import complain
 from gcs_cli.errors import FAILED, CliError, VehicleLostError
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
@@ -44,9 +45,9 @@ def compare_with_vehicle(
     return [(part, list(differences(part.items, held[part.kind], tolerance))) for part in parts]
 
 
-def say_restoring(output: Output) -> None:
-    """Print that the vehicle gets its former plans again, which takes a while."""
-    output.say("restoring", "restoring the vehicle's former plans")
+def say_restoring() -> None:
+    """Print to stderr that the vehicle gets its former plans again, which takes a while."""
+    complain("gcs: restoring the vehicle's former plans")
 
 
 def say_uploaded(output: Output, parts: Sequence[PlanPart], uploads: Uploads) -> None:

@@ -164,6 +164,9 @@ def test_a_refused_part_leaves_the_plans_of_before(tmp_path: Path, refused: int,
     vehicle.refused_type = refused
     result = told(vehicle, "mission", "upload", changed)
     assert (result.returncode, result.stdout) == (1, "")
+    assert ("gcs: restoring the vehicle's former plans\n" in result.stderr) is (
+        name != "geofence"
+    )  # the first part
     assert f"gcs: upload of the {name} of {changed} refused: " in result.stderr
     assert result.stderr.endswith("; the vehicle holds its former plans\n")
     assert contents(vehicle) == before

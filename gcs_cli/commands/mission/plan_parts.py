@@ -60,7 +60,6 @@ def add_upload(app: typer.Typer, kind: MissionType | None, text: str) -> None:
     ) -> None:
         plan = _plan_of(file, kind)
         parts = parts_to_send(plan, kind)
-        output = output_of(context, link)
         with connect_vehicle(context, link) as connection:
             names = " and ".join(part.name for part in parts)
             confirm_if_armed(connection, f"its {names} will be replaced", yes)
@@ -71,10 +70,10 @@ def add_upload(app: typer.Typer, kind: MissionType | None, text: str) -> None:
                     restores=True,
                     interrupted=lambda: interruption.reason,
                     only=kind,
-                    on_restore=lambda: say_restoring(output),
+                    on_restore=say_restoring,
                 )
                 complete_upload(connection, uploads, file)
-        say_uploaded(output, parts, uploads)
+        say_uploaded(output_of(context, link), parts, uploads)
 
 
 def add_download(app: typer.Typer, kinds: tuple[MissionType, ...], text: str) -> None:
