@@ -121,7 +121,7 @@ def say_verified(output: Output, compared: Sequence[tuple[PlanPart, list[Differe
 
 
 def equality(found: Sequence[Difference]) -> str:
-    """Return in words that a part is equal, except for ``found``, values that the vehicle cannot hold."""
+    """Return that a part is equal, or equal but for ``found``: the values that the vehicle cannot hold."""
     if not found:
         return "equal"
     values = "1 value" if len(found) == 1 else f"{len(found)} values"
