@@ -6,7 +6,7 @@ import math
 
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
-from flightstack.estimation.error_state import BARO_BIAS, GNSS_BIAS, POSITION, VELOCITY
+from flightstack.estimation.error_state import GNSS_BIAS, POSITION, VELOCITY
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.fusion import (
     drift_gnss_bias,
@@ -140,16 +140,16 @@ def _start_gnss(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorPa
         accuracy_m = vertical_accuracy(row) if axis == 2 else horizontal_accuracy(row)
         variance = accuracy_m * accuracy_m
         at = POSITION + axis
-        p[at, at] += variance
-        if axis == 2:
-            p[at, BARO_BIAS] += variance
-            p[BARO_BIAS, BARO_BIAS] += variance
         share = gnss_bias_share(params, axis)
         slow = min(share * share, 1.0) * variance
-        reset_variance(p, GNSS_BIAS + axis, 1, slow)
-        p[at, GNSS_BIAS + axis] = -slow
-        if axis == 2:
-            p[BARO_BIAS, GNSS_BIAS + axis] = -slow
+        if (
+            axis == 2
+        ):  # the height is that above the ground, the altitude of the origin has the error of the fix
+            reset_variance(p, GNSS_BIAS + axis, 1, variance - slow)
+        else:
+            p[at, at] += variance
+            reset_variance(p, GNSS_BIAS + axis, 1, slow)
+            p[at, GNSS_BIAS + axis] = -slow
     m["last_gnss_s"][0] = row[0]
     m["flags"][HAS_GNSS] = 1
 

@@ -125,6 +125,9 @@ def _nees(
     x, begin_s, end_s = estimate.nominal, *(span_s or (-np.inf, np.inf))
     state = Track(estimate.state_s, x[:, :4], estimate.state_s, x[:, 4:7], x[:, 7:10], estimate.track.origin)
     errors = errors_at(state, truth)
+    known = np.flatnonzero(np.isfinite(errors).all(axis=1))
+    if known.size:  # the filter's height is that above the start: the error of the first fix is none of it
+        errors[:, POSITION + 2] -= errors[known[0], POSITION + 2]
     inside = (estimate.state_s >= begin_s) & (estimate.state_s <= end_s)
     for name, at in _PARTS:
         e, p = errors[:, at : at + 3], estimate.covariance[:, at : at + 3, at : at + 3]
