@@ -10,7 +10,7 @@ import math
 
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
-from flightstack.estimation.error_state import ATTITUDE, VELOCITY, read_nominal, read_vector, scaled
+from flightstack.estimation.error_state import read_nominal, read_vector, scaled
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.fusion import fuse_drag, fuse_rest_rate, fuse_rest_velocity
 from flightstack.estimation.height_sources import take_baro, take_range
@@ -18,8 +18,8 @@ from flightstack.estimation.imu_input import mean_force, mean_rate, read_step
 from flightstack.estimation.kalman import Filter
 from flightstack.estimation.memory import (
     AXIS,
+    FIELD_IS_NEW,
     FUSED_ANY,
-    GAP_PENDING_S,
     LANDED,
     NOTHING,
     SOURCE,
@@ -33,7 +33,7 @@ from flightstack.estimation.position_sources import (
     is_velocity_measured,
     take_gnss,
 )
-from flightstack.estimation.prediction import motion_of, predict, predict_errors
+from flightstack.estimation.prediction import add_unknown, motion_of, predict, predict_errors
 from flightstack.estimation.resets import count_of_resets
 from flightstack.estimation.rings import (
     BARO_RING,
@@ -53,9 +53,19 @@ from flightstack.estimation.rings import (
     slot_of,
 )
 from flightstack.estimation.source_checks import add_fault_noise
-from flightstack.estimation.yaw_sources import predict_yaw, take_field, take_velocity
+from flightstack.estimation.yaw_sources import predict_yaw, take_earth_field, take_field, take_velocity
 
-IDLE, REST_SOURCE, HOLD_SOURCE, MAG_SOURCE, BARO_SOURCE, RANGE_SOURCE, GNSS_SOURCE, DRAG_SOURCE, SOURCES = (
+(
+    IDLE,
+    EARTH_SOURCE,
+    REST_SOURCE,
+    HOLD_SOURCE,
+    MAG_SOURCE,
+    BARO_SOURCE,
+    RANGE_SOURCE,
+    GNSS_SOURCE,
+    DRAG_SOURCE,
+) = (
     0,
     1,
     2,
@@ -66,15 +76,17 @@ IDLE, REST_SOURCE, HOLD_SOURCE, MAG_SOURCE, BARO_SOURCE, RANGE_SOURCE, GNSS_SOUR
     7,
     8,
 )
+SOURCES = 9
 """What the agenda is at; the sources of measurements in the order in which they are fused."""
 _LATE_S = 0.3
 """Measurements that are older than the horizon by this much are dropped."""
+_GAP_S, _GAP_LATE_S = 0.06, 0.02
+"""Step that bridges a gap, and what counts as late in it: the motion within the gap is unknown, so that measurements
+taken then say little about its end."""
 _BEHIND_S = 0.035
 """Time by which the covariance may be behind the state, plus a step: measurements come more often."""
 _REST_PERIOD_S, _REST_MEAN_S, _DRAG_PERIOD_S = 0.1, 0.1, 0.05
 _STILL_RATE_RAD_S, _STILL_FORCE_M_S2 = 0.08, 1.0
-_GAP_RATE_RAD_S, _GAP_FORCE_M_S2 = 0.3, 3.0
-"""Deviation of the mean rate and specific force of a gap from those of the sample that bridges it."""
 
 
 @compiled
@@ -115,9 +127,9 @@ def _begin(m: MemoryRecord, f: Filter, r: Rings, horizon_s: float, params: Estim
     predict(f, step, params)
     if _is_covariance_due(m, f, r, params):
         predict_errors(f, step, params)
-    _account_for_gap(m, f)
+    add_unknown(f, step)
     add_fault_noise(m["checks"], f, step.dt_s)
-    agenda[SOURCE], agenda[AXIS], agenda[FUSED_ANY] = REST_SOURCE, 0, 0
+    agenda[SOURCE], agenda[AXIS], agenda[FUSED_ANY] = EARTH_SOURCE, 0, 0
     return True
 
 
@@ -126,7 +138,8 @@ def _is_covariance_due(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorPa
     """Return True if a measurement may be fused in the step at hand, or the covariance is behind by the most."""
     now_s = f.clock[0]
     rests = m["flags"][LANDED] == 1 and now_s - m["rest_s"][0] >= _REST_PERIOD_S
-    if f.behind[0] > _BEHIND_S or rests or params.drag_is_fused > 0.0 or not is_velocity_measured(f):
+    is_asked = rests or m["flags"][FIELD_IS_NEW] == 1
+    if f.behind[0] > _BEHIND_S or is_asked or params.drag_is_fused > 0.0 or not is_velocity_measured(f):
         return True
     return (
         is_due(r, MAG_RING, r.mag[slot_of(r, MAG_RING, MAG_ROWS, 0), 0], now_s)
@@ -140,9 +153,8 @@ def _is_covariance_due(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorPa
 def _finish(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorParams) -> None:
     """Move the output as the filter has moved, and close the step."""
     agenda, dt_s = m["agenda"], r.imu[slot_of(r, IMU_RING, IMU_ROWS, 0), 1]
-    is_reset = count_of_resets(m) != m["followed"][0]  # between two steps, by the Earth's field
-    share = 1.0 if is_reset or params.output_s <= dt_s else dt_s / params.output_s
-    if is_reset or agenda[FUSED_ANY] == 1 or share < 1.0:  # else the output has moved as the filter has
+    share = 1.0 if params.output_s <= dt_s else dt_s / params.output_s
+    if agenda[FUSED_ANY] == 1 or share < 1.0:  # else the output has moved as the filter has
         _move_output(m, f, r, share, params)
     pop(r, IMU_RING, IMU_ROWS)
     agenda[SOURCE] = IDLE
@@ -158,7 +170,9 @@ def _move_output(m: MemoryRecord, f: Filter, r: Rings, share: float, params: Est
 @compiled
 def _part(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorParams) -> int:
     """Fuse the next scalar of the source at hand."""
-    source, axis, row = m["agenda"][SOURCE], m["agenda"][AXIS], m["pending"]
+    source, axis = m["agenda"][SOURCE], m["agenda"][AXIS]
+    if source == EARTH_SOURCE:
+        return take_earth_field(m, f, axis, params)
     if source == REST_SOURCE:
         return _rest(m, f, r, axis, params)
     if source == HOLD_SOURCE:
@@ -167,6 +181,13 @@ def _part(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorParams) -> int:
         return hold_position(m, f, axis, params)
     if source == DRAG_SOURCE:
         return _drag(m, f, r, axis, params)
+    return _measured(m, f, r, source, axis, params)
+
+
+@compiled
+def _measured(m: MemoryRecord, f: Filter, r: Rings, source: int, axis: int, params: EstimatorParams) -> int:
+    """Fuse the next scalar of a sensor whose rows wait."""
+    row = m["pending"]
     if axis == 0:  # noqa: SIM102
         if not _take_row(m, f, r, source):
             return NOTHING
@@ -188,6 +209,7 @@ def _part(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorParams) -> int:
 def _take_row(m: MemoryRecord, f: Filter, r: Rings, source: int) -> bool:
     """Move the oldest row of a source that is due to ``pending``; drop those that are too late."""
     now_s, row = f.clock[0], m["pending"]
+    late_s = _LATE_S if r.imu[slot_of(r, IMU_RING, IMU_ROWS, 0), 1] < _GAP_S else _GAP_LATE_S
     for _ in range(MAG_ROWS):
         if source == MAG_SOURCE:
             found = _next_row(r, MAG_RING, MAG_ROWS, r.mag[slot_of(r, MAG_RING, MAG_ROWS, 0)], now_s, row)
@@ -205,7 +227,7 @@ def _take_row(m: MemoryRecord, f: Filter, r: Rings, source: int) -> bool:
             )
         if not found:
             return False
-        if row[0] > now_s - _LATE_S:
+        if row[0] > now_s - late_s:
             return True
     return False
 
@@ -218,18 +240,6 @@ def _next_row(r: Rings, ring: int, size: int, oldest: FloatArray, now_s: float, 
     read_row(oldest, row)
     pop(r, ring, size)
     return True
-
-
-@compiled
-def _account_for_gap(m: MemoryRecord, f: Filter) -> None:
-    """Add the uncertainty of time without samples."""
-    gap_s = m["imu_gap"][GAP_PENDING_S]
-    if gap_s > 0.0:
-        angle_rad, speed_m_s = _GAP_RATE_RAD_S * gap_s, _GAP_FORCE_M_S2 * gap_s
-        for axis in range(3):
-            f.covariance[ATTITUDE + axis, ATTITUDE + axis] += angle_rad * angle_rad
-            f.covariance[VELOCITY + axis, VELOCITY + axis] += speed_m_s * speed_m_s
-        m["imu_gap"][GAP_PENDING_S] = 0.0
 
 
 @compiled

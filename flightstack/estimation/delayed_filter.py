@@ -14,6 +14,8 @@ from flightstack.estimation.estimator_params import PARAMS_SIZE, EstimatorParams
 from flightstack.estimation.imu_input import (
     add_sample,
     in_start_frame,
+    note_clipping,
+    note_gap,
     take_step,
     write_step,
 )
@@ -21,7 +23,7 @@ from flightstack.estimation.imu_track import IMU_SIZE
 from flightstack.estimation.kalman import Filter
 from flightstack.estimation.memory import (
     ALIGNED,
-    GAP_PENDING_S,
+    FIELD_IS_NEW,
     GAP_S,
     GAPS,
     HAS_MAG,
@@ -52,7 +54,6 @@ from flightstack.estimation.rings import (
     take_mean,
     write_row,
 )
-from flightstack.estimation.yaw_sources import take_earth_field
 
 _MOST_PARTS = 256
 """Bound of the parts of work in one sample: more than a step has."""
@@ -127,6 +128,7 @@ def imu_kernel(memory: MemoryArray, sample: FloatArray) -> None:
     f, r, sums, output = filter_of(m), rings_of(m), m["sums"], m["output"]
     gyro, accel = read_vector(sample, 2), read_vector(sample, 5)
     add_sample(sums, gyro, accel, dt_s)
+    note_clipping(sums, gyro, accel, params)
     if m["flags"][ALIGNED] == 0:
         _collect(m, accel, time_s, dt_s, params)
         return
@@ -170,10 +172,9 @@ def _write_state(m: MemoryRecord, rates: Vector3) -> None:
 
 @compiled
 def field_kernel(memory: MemoryArray) -> None:
-    """Take the Earth's field in ``earth``."""
+    """Let the next step of the filter correct it with the Earth's field in ``earth``."""
     m = memory[0]
-    if m["flags"][ALIGNED] == 1:
-        take_earth_field(m, filter_of(m), EstimatorParams(*as_tuple(m["params"], PARAMS_SIZE)))
+    m["flags"][FIELD_IS_NEW] = m["flags"][ALIGNED]  # the alignment uses the field as it is
 
 
 @compiled
@@ -188,8 +189,8 @@ def _real_step(m: MemoryRecord, time_s: float, dt_s: float) -> float:
         return dt_s
     m["imu_gap"][GAPS] += 1.0
     m["imu_gap"][GAP_S] += elapsed_s - dt_s
-    m["imu_gap"][GAP_PENDING_S] += min(elapsed_s, _LONGEST_GAP_S) - dt_s
     covered_s: float = min(elapsed_s, _LONGEST_GAP_S)
+    note_gap(m["sums"], covered_s - dt_s)
     return covered_s
 
 

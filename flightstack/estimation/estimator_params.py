@@ -28,6 +28,8 @@ class EstimatorParams(NamedTuple):
     body_field_walk: float = estimator_default("body_field_walk")  # gauss/√s
     wind_walk: float = estimator_default("wind_walk")  # m/s/√s
     baro_walk: float = 0.03  # m/√s
+    gyro_range_rad_s: float = estimator_default("gyro_range_rad_s")
+    accel_range_m_s2: float = estimator_default("accel_range_m_s2")
     # initial uncertainty
     tilt_rad: float = estimator_default("tilt_rad")
     gyro_bias_rad_s: float = estimator_default("gyro_bias_rad_s")

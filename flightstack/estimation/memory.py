@@ -20,9 +20,21 @@ from flightstack.estimation.rings import MEAN_SIZE, RINGS, TRACK_COLUMNS, Rings
 from flightstack.estimation.source_checks import Checks
 from flightstack.estimation.yaw_estimator import Models
 
-ALIGNED, LANDED, HAS_BARO, HAS_GNSS, HAS_RANGE, HAS_MAG, HAS_YAW, MAG_FAULT, FLAGS = 0, 1, 2, 3, 4, 5, 6, 7, 8
+ALIGNED, LANDED, HAS_BARO, HAS_GNSS, HAS_RANGE, HAS_MAG, HAS_YAW, MAG_FAULT, FIELD_IS_NEW, FLAGS = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+    7,
+    8,
+    9,
+)
 """``HAS_YAW``: the yaw is known, from the magnetometer or from GNSS velocity. ``MAG_FAULT``: GNSS velocity has
-disproved the yaw of the magnetometer, which is not used any more."""
+disproved the yaw of the magnetometer, which is not used any more. ``FIELD_IS_NEW``: the filter has not yet been
+corrected with the Earth's field."""
 SOURCE, AXIS, FUSED_ANY, AGENDA_SIZE = 0, 1, 2, 3
 """The open step: the source that is at work, 0 if no step is open; its next axis; 1 if a measurement was fused."""
 NOTHING = -1
@@ -33,8 +45,8 @@ POSITION_RESET, VELOCITY_RESET, YAW_RESET, RESETS = 0, 8, 16, 19
 RESET_CHANGE, RESET_SUM, RESET_S, YAW_RESET_SUM = 1, 4, 7, 18
 """Of each kind: the number of its resets, their change in the last step with one, the sum of all changes, and the time
 of that step; yaw has no time."""
-GAP_PENDING_S, GAP_S, GAPS = 0, 1, 2
-"""Columns of ``imu_gap``: time without samples in the step at hand, in all, and the number of such gaps."""
+GAP_S, GAPS = 0, 1
+"""Columns of ``imu_gap``: time without samples in all, and the number of such gaps."""
 YAW_TURN, YAW_VARIANCE, YAW_UPDATES, YAW_WRONG_S = 0, 1, 2, 3
 """Columns of ``yaw_fix``: turn from the filter's yaw to that of GNSS velocity [rad], its variance, updates, and the
 time since which they contradict each other, 0 if they do not."""
@@ -58,7 +70,7 @@ class EstimatorMemory(NamedTuple):
     """Of the body [gauss], the last one at the horizon."""
     rate_filter: RateFilter
     last_imu_s: Annotated[FloatArray, 1]
-    imu_gap: Annotated[FloatArray, 3]
+    imu_gap: Annotated[FloatArray, 2]
     last_gnss_s: Annotated[FloatArray, 1]
     gnss_speed_m_s: Annotated[FloatArray, 2]
     """North, east, smoothed."""

@@ -30,12 +30,16 @@ from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import BEHIND_SIZE, Filter
 
 _TURN_S = 1.0
+_MOST_ANGLE, _MOST_VELOCITY = 0.3**2, 5.0**2
+"""Variances [rad²], [m²/s²] beyond which unknown motion adds nothing: other sensors are believed by then."""
 
 
 class DeltaSample(NamedTuple):
     """Rotation vector and velocity change over ``dt_s``, in the body frame at its start, biases included.
 
-    The densities are those measured of the white noise of each axis, [rad²/s] and [m²/s³].
+    The densities are those measured of the white noise of each axis, [rad²/s] and [m²/s³]. The unknown parts are the
+    variances, [rad²] and [m²/s²] for each axis, of what the sensor could not measure: time without samples, and values
+    beyond its range.
     """
 
     time_s: float
@@ -44,6 +48,8 @@ class DeltaSample(NamedTuple):
     velocity_m_s: Vector3
     gyro_density: Vector3
     accel_density: Vector3
+    unknown_angle: float
+    unknown_velocity: float
 
 
 class Motion(NamedTuple):
@@ -180,3 +186,16 @@ def predict_errors(f: Filter, newest: DeltaSample, params: EstimatorParams) -> N
     _add_process_noise(f, middle, angle, dt_s, newest, params)
     for i in range(BEHIND_SIZE):
         f.behind[i] = 0.0
+
+
+@compiled
+def add_unknown(f: Filter, step: DeltaSample) -> None:
+    """Add the uncertainty of what the sensor could not measure in a step; the position has half of the velocity's."""
+    p, half_s = f.covariance, 0.5 * step.dt_s
+    for axis in range(3):
+        turn, speed, place = ATTITUDE + axis, VELOCITY + axis, POSITION + axis
+        p[turn, turn] += min(step.unknown_angle, max(_MOST_ANGLE - p[turn, turn], 0.0))
+        variance = min(step.unknown_velocity, max(_MOST_VELOCITY - p[speed, speed], 0.0))
+        p[speed, speed] += variance
+        p[speed, place] += half_s * variance
+        p[place, place] += half_s * half_s * variance

@@ -12,9 +12,10 @@ from flightstack.core.contract import FloatArray
 
 GNSS_ROWS, MAG_ROWS, BARO_ROWS, RANGE_ROWS, IMU_ROWS = 8, 32, 32, 32, 64
 GNSS_RING, MAG_RING, BARO_RING, RANGE_RING, IMU_RING, RINGS = 0, 1, 2, 3, 4, 5
-IMU_COLUMNS, TRACK_COLUMNS = 14, 11
-_COUNT, _PUSHED_S, _LAST_S, MEAN_SIZE = 4, 5, 6, 7
-"""Columns of a mean of samples: sums of a row (4), their number, times of the last row and of the last sample."""
+IMU_COLUMNS, TRACK_COLUMNS = 16, 11
+_COUNT, _PUSHED_S, _LAST_S, _FIRST, MEAN_SIZE = 4, 5, 6, 7, 11
+"""Columns of a mean of samples: sums of their differences to the first (4), their number, times of the last row and of
+the last sample, the first sample (4). Equal samples so have exactly their value as mean."""
 _ROUNDING_S = 2.5e-4
 """Means of samples end at the time of a step: the rounding of a float32 must not decide in which step they count."""
 
@@ -83,13 +84,15 @@ def take_mean(mean: FloatArray, row: FloatArray, period_s: float) -> bool:
             mean[i] = 0.0
     mean[_LAST_S] = row[0]
     for i in range(row.size):
-        mean[i] += row[i]
+        if mean[_COUNT] == 0.0:
+            mean[_FIRST + i] = row[i]
+        mean[i] += row[i] - mean[_FIRST + i]
     mean[_COUNT] += 1.0
     if row[0] - mean[_PUSHED_S] < 0.9 * period_s:
         return False
     mean[_PUSHED_S] = row[0]
     for i in range(row.size):
-        row[i] = mean[i] / mean[_COUNT]
+        row[i] = mean[_FIRST + i] + mean[i] / mean[_COUNT]
     for i in range(_PUSHED_S):
         mean[i] = 0.0
     return True

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray, Vector3
+from flightstack.core.contract import FloatArray, Quaternion, Vector3
 from flightstack.core.geometry import rotate, wrap_pi
 from flightstack.core.portable_math import atan2, sin_cos
 from flightstack.estimation.alignment import align_yaw, set_field
@@ -19,11 +19,13 @@ from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.fusion import fuse_field_axis, speed_accuracy
 from flightstack.estimation.kalman import DECLINATION, KNOWN_FIELD, Filter, Noise, clear, fuse, reset_variance
 from flightstack.estimation.memory import (
+    FIELD_IS_NEW,
     HAS_GNSS,
     HAS_MAG,
     HAS_YAW,
     LANDED,
     MAG_FAULT,
+    NOTHING,
     YAW_TURN,
     YAW_UPDATES,
     YAW_VARIANCE,
@@ -88,30 +90,57 @@ def _start_field(m: MemoryRecord, f: Filter, field: Vector3, params: EstimatorPa
 
 
 @compiled
-def take_earth_field(m: MemoryRecord, f: Filter, params: EstimatorParams) -> None:
-    """Correct yaw and field with the Earth's field, now known.
+def take_earth_field(m: MemoryRecord, f: Filter, stage: int, params: EstimatorParams) -> int:
+    """Correct yaw and field with the Earth's field when it has become known; return the next stage.
 
     On the ground, or if it is far off, the yaw is aligned again. In flight it changes as far as it depends on the
-    field.
+    field: by its declination first, then by its three components.
     """
-    if m["flags"][HAS_MAG] == 0 or m["flags"][MAG_FAULT] == 1:
-        return
+    flags = m["flags"]
+    if stage == 0:
+        if flags[FIELD_IS_NEW] == 0:
+            return NOTHING
+        if flags[HAS_MAG] == 0 or flags[MAG_FAULT] == 1:
+            flags[FIELD_IS_NEW] = 0
+            return NOTHING
+        return _begin_earth_field(m, f, params)
+    value = m["earth"][stage - 1]
+    noise = params.earth_field_gauss + params.field_scale * abs(value)
+    clear(f.h)
+    f.h[EARTH_FIELD + stage - 1] = 1.0
+    of_model = Noise(noise, noise, noise, 1e3, 0.0)
+    fuse(f, KNOWN_FIELD + stage - 1, value - f.nominal[15 + stage], of_model, 0.0)
+    if stage < 3:
+        return stage + 1
+    _count_turn(m, f)
+    return 0
+
+
+@compiled
+def _begin_earth_field(m: MemoryRecord, f: Filter, params: EstimatorParams) -> int:
+    """Align the yaw again, or fuse the declination; return the next stage."""
     known, before = read_vector(m["earth"], 0), read_nominal(f.nominal)
-    held = before.earth_field_ned_gauss
+    q, held = before.attitude, before.earth_field_ned_gauss
+    pending = m["pending"]
+    pending[0], pending[1], pending[2], pending[3] = q.w, q.x, q.y, q.z
     was_rad = atan2(held.y, held.x)
     change_rad = wrap_pi(atan2(known.y, known.x) - was_rad)
     if m["flags"][LANDED] == 1 or abs(change_rad) > _LARGEST_TURN_RAD:
         align_yaw(f, read_vector(m["field"], 0), known, m["earth"][3], params)
-    else:
-        _fuse_declination(f, was_rad, change_rad)
-        for axis in range(3):
-            value = known.x if axis == 0 else known.y if axis == 1 else known.z
-            noise = params.earth_field_gauss + params.field_scale * abs(value)
-            clear(f.h)
-            f.h[EARTH_FIELD + axis] = 1.0
-            of_model = Noise(noise, noise, noise, 1e3, 0.0)
-            fuse(f, KNOWN_FIELD + axis, value - f.nominal[16 + axis], of_model, 0.0)
-    turn_rad = turn_between(before.attitude, read_nominal(f.nominal).attitude)
+        _count_turn(m, f)
+        return 0
+    _fuse_declination(f, was_rad, change_rad)
+    return 1
+
+
+@compiled
+def _count_turn(m: MemoryRecord, f: Filter) -> None:
+    """Count the turn since the attitude in ``pending`` as a reset of the yaw; the field is not new any more."""
+    m["flags"][FIELD_IS_NEW] = 0
+    before = m["pending"]
+    turn_rad = turn_between(
+        Quaternion(before[0], before[1], before[2], before[3]), read_nominal(f.nominal).attitude
+    )
     if abs(turn_rad) > _COUNTED_TURN_RAD:
         count_yaw_reset(m, turn_rad)
 

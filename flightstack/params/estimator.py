@@ -38,6 +38,10 @@ ESTIMATOR_PARAMS = (
     # control
     _param("IMU_GYRO_CUTOFF", 40.0, 0.0, 1000.0, "Hz", "Cutoff of the low-pass filter of the rates that the loops use;"
            " 0 for none", "gyro_cutoff_hz", 1.0, 1, group="Sensors"),
+    _param("IMU_GYRO_RANGE", 2000.0, 100.0, 1e5, "deg/s", "Full scale of the gyro: a rate beyond it is not measured",
+           "gyro_range_rad_s", math.radians(1.0), 1, group="Sensors"),
+    _param("IMU_ACCEL_RANGE", 156.9, 10.0, 1e5, "m/s^2", "Full scale of the accelerometer: a specific force beyond it,"
+           " as in an impact, is not measured", "accel_range_m_s2", 1.0, 1, group="Sensors"),
     # process
     _param("EKF2_GYR_NOISE", 0.009, 1e-4, 0.1, "rad/s", "Gyro noise for the prediction", "gyro_noise", _STEP, 4),
     _param("EKF2_ACC_NOISE", 0.135, 0.01, 1.0, "m/s^2", "Accelerometer noise for the prediction", "accel_noise", _STEP),

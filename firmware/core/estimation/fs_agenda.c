@@ -24,6 +24,7 @@
 #define FS_IMU_ROWS 64
 #define FS_LANDED 1
 #define FS_REST_PERIOD_S FS_LIT(0.1)
+#define FS_FIELD_IS_NEW 8
 #define FS_BEHIND_S FS_LIT(0.035)
 #define FS_MAG_RING 1
 #define FS_MAG_ROWS 32
@@ -33,38 +34,38 @@
 #define FS_RANGE_ROWS 32
 #define FS_GNSS_RING 0
 #define FS_GNSS_ROWS 8
-#define FS_GAP_PENDING_S 0
-#define FS_GAP_RATE_RAD_S FS_LIT(0.3)
-#define FS_GAP_FORCE_M_S2 FS_LIT(3.0)
-#define FS_ATTITUDE 0
-#define FS_VELOCITY 3
-#define FS_REST_SOURCE 1
+#define FS_EARTH_SOURCE 1
 #define FS_AXIS 1
 #define FS_FUSED_ANY 2
-#define FS_SOURCES 8
+#define FS_SOURCES 9
+#define FS_REST_SOURCE 2
 #define FS_STILL_FORCE_M_S2 FS_LIT(1.0)
 #define FS_STILL_RATE_RAD_S FS_LIT(0.08)
 #define FS_NOTHING -1
 #define FS_REST_MEAN_S FS_LIT(0.1)
-#define FS_HOLD_SOURCE 2
-#define FS_DRAG_SOURCE 7
+#define FS_HOLD_SOURCE 3
+#define FS_DRAG_SOURCE 8
 #define FS_DRAG_PERIOD_S FS_LIT(0.05)
-#define FS_MAG_SOURCE 3
-#define FS_BARO_SOURCE 4
-#define FS_RANGE_SOURCE 5
+#define FS_GAP_S FS_LIT(0.06)
 #define FS_LATE_S FS_LIT(0.3)
+#define FS_GAP_LATE_S FS_LIT(0.02)
+#define FS_MAG_SOURCE 4
+#define FS_BARO_SOURCE 5
+#define FS_RANGE_SOURCE 6
 #define FS_YAW_STAGE 6
 
 /*
  * Return True if a measurement may be fused in the step at hand, or the covariance is behind by the most.
- * agenda.py:125
+ * agenda.py:137
  */
 static bool is_covariance_due(const fs_estimator_memory *m, const fs_filter *f, const fs_rings *r,
                               const fs_estimator_params *params)
 {
     const fs_real now_s = f->clock[0];
     const bool rests = m->flags[FS_LANDED] == 1 && now_s - m->rest_s[0] >= FS_REST_PERIOD_S;
-    if (f->behind[0] > FS_BEHIND_S || rests || params->drag_is_fused > FS_LIT(0.0) || !fs_is_velocity_measured(f)) {
+    const bool is_asked = rests || m->flags[FS_FIELD_IS_NEW] == 1;
+    if (f->behind[0] > FS_BEHIND_S || is_asked || params->drag_is_fused > FS_LIT(0.0) ||
+        !fs_is_velocity_measured(f)) {
         return true;
     }
     return fs_is_due(r, FS_MAG_RING, r->mag[fs_slot_of(r, FS_MAG_RING, FS_MAG_ROWS, 0)][0], now_s) ||
@@ -73,22 +74,7 @@ static bool is_covariance_due(const fs_estimator_memory *m, const fs_filter *f, 
            fs_is_due(r, FS_GNSS_RING, r->gnss[fs_slot_of(r, FS_GNSS_RING, FS_GNSS_ROWS, 0)][0], now_s);
 }
 
-/* Add the uncertainty of time without samples. agenda.py:224 */
-static void account_for_gap(fs_estimator_memory *m, fs_filter *f)
-{
-    const fs_real gap_s = m->imu_gap[FS_GAP_PENDING_S];
-    if (gap_s > FS_LIT(0.0)) {
-        const fs_real angle_rad = FS_GAP_RATE_RAD_S * gap_s;
-        const fs_real speed_m_s = FS_GAP_FORCE_M_S2 * gap_s;
-        for (int32_t axis = 0; axis < 3; axis++) {
-            f->covariance[FS_ATTITUDE + axis][FS_ATTITUDE + axis] += angle_rad * angle_rad;
-            f->covariance[FS_VELOCITY + axis][FS_VELOCITY + axis] += speed_m_s * speed_m_s;
-        }
-        m->imu_gap[FS_GAP_PENDING_S] = FS_LIT(0.0);
-    }
-}
-
-/* Predict a step that is not later than the horizon; return False if there is none. agenda.py:105 */
+/* Predict a step that is not later than the horizon; return False if there is none. agenda.py:117 */
 static bool begin(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, fs_real horizon_s,
                   const fs_estimator_params *params)
 {
@@ -105,15 +91,15 @@ static bool begin(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, fs_re
     if (is_covariance_due(m, f, r, params)) {
         fs_predict_errors(f, &step, params);
     }
-    account_for_gap(m, f);
+    fs_add_unknown(f, &step);
     fs_add_fault_noise(m->checks, f, step.dt_s);
-    m->agenda[FS_SOURCE] = FS_REST_SOURCE;
+    m->agenda[FS_SOURCE] = FS_EARTH_SOURCE;
     m->agenda[FS_AXIS] = 0;
     m->agenda[FS_FUSED_ANY] = 0;
     return true;
 }
 
-/* Return True if the vehicle is on the ground and nothing moves it. agenda.py:236 */
+/* Return True if the vehicle is on the ground and nothing moves it. agenda.py:246 */
 static bool stands(const fs_estimator_memory *m, const fs_estimator_params *params)
 {
     if (m->flags[FS_LANDED] == 0) {
@@ -127,7 +113,7 @@ static bool stands(const fs_estimator_memory *m, const fs_estimator_params *para
     return fs_abs(off) < FS_STILL_FORCE_M_S2 && largest < FS_STILL_RATE_RAD_S;
 }
 
-/* Fuse rest ten times a second: three axes of the velocity, three of the rate. agenda.py:248 */
+/* Fuse rest ten times a second: three axes of the velocity, three of the rate. agenda.py:258 */
 static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t stage,
                     const fs_estimator_params *params)
 {
@@ -152,7 +138,7 @@ static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int
     return axis < 5 ? axis + 1 : 0;
 }
 
-/* Fuse drag in flight while the velocity over ground is measured, twenty times a second. agenda.py:267 */
+/* Fuse drag in flight while the velocity over ground is measured, twenty times a second. agenda.py:277 */
 static int32_t drag(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t axis,
                     const fs_estimator_params *params)
 {
@@ -170,7 +156,7 @@ static int32_t drag(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int
     return 1 - axis;
 }
 
-/* Move the oldest row of a ring to row; return False if none is due. agenda.py:214 */
+/* Move the oldest row of a ring to row; return False if none is due. agenda.py:236 */
 static bool next_row(fs_rings *r, int32_t ring, int32_t size, const fs_real oldest[], int32_t oldest_size,
                      fs_real now_s, fs_real row[])
 {
@@ -182,10 +168,12 @@ static bool next_row(fs_rings *r, int32_t ring, int32_t size, const fs_real olde
     return true;
 }
 
-/* Move the oldest row of a source that is due to pending; drop those that are too late. agenda.py:188 */
+/* Move the oldest row of a source that is due to pending; drop those that are too late. agenda.py:209 */
 static bool take_row(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, int32_t source)
 {
     const fs_real now_s = f->clock[0];
+    const fs_real late_s = r->imu[fs_slot_of(r, FS_IMU_RING, FS_IMU_ROWS, 0)][1] < FS_GAP_S ? FS_LATE_S :
+                           FS_GAP_LATE_S;
     for (int32_t count = 0; count < 32; count++) {
         bool found;
         if (source == FS_MAG_SOURCE) {
@@ -208,30 +196,17 @@ static bool take_row(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, in
         if (!found) {
             return false;
         }
-        if (m->pending[0] > now_s - FS_LATE_S) {
+        if (m->pending[0] > now_s - late_s) {
             return true;
         }
     }
     return false;
 }
 
-/* Fuse the next scalar of the source at hand. agenda.py:159 */
-static int32_t part(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_estimator_params *params)
+/* Fuse the next scalar of a sensor whose rows wait. agenda.py:188 */
+static int32_t measured(fs_estimator_memory *m, fs_filter *f, fs_rings *r, int32_t source, int32_t axis,
+                        const fs_estimator_params *params)
 {
-    const int32_t source = m->agenda[FS_SOURCE];
-    const int32_t axis = m->agenda[FS_AXIS];
-    if (source == FS_REST_SOURCE) {
-        return rest(m, f, r, axis, params);
-    }
-    if (source == FS_HOLD_SOURCE) {
-        if (axis == 0 && stands(m, params)) {
-            return FS_NOTHING;
-        }
-        return fs_hold_position(m, f, axis, params);
-    }
-    if (source == FS_DRAG_SOURCE) {
-        return drag(m, f, r, axis, params);
-    }
     if (axis == 0) {
         if (!take_row(m, f, r, source)) {
             return FS_NOTHING;
@@ -258,7 +233,30 @@ static int32_t part(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_
     return following;
 }
 
-/* Move the output by a share of its difference to the filter. agenda.py:152 */
+/* Fuse the next scalar of the source at hand. agenda.py:171 */
+static int32_t part(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_estimator_params *params)
+{
+    const int32_t source = m->agenda[FS_SOURCE];
+    const int32_t axis = m->agenda[FS_AXIS];
+    if (source == FS_EARTH_SOURCE) {
+        return fs_take_earth_field(m, f, axis, params);
+    }
+    if (source == FS_REST_SOURCE) {
+        return rest(m, f, r, axis, params);
+    }
+    if (source == FS_HOLD_SOURCE) {
+        if (axis == 0 && stands(m, params)) {
+            return FS_NOTHING;
+        }
+        return fs_hold_position(m, f, axis, params);
+    }
+    if (source == FS_DRAG_SOURCE) {
+        return drag(m, f, r, axis, params);
+    }
+    return measured(m, f, r, source, axis, params);
+}
+
+/* Move the output by a share of its difference to the filter. agenda.py:164 */
 static void move_output(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, fs_real share,
                         const fs_estimator_params *params)
 {
@@ -268,21 +266,19 @@ static void move_output(fs_estimator_memory *m, const fs_filter *f, fs_rings *r,
     fs_follow(r, m->output, &motion_of, share, params->gravity_m_s2);
 }
 
-/* Move the output as the filter has moved, and close the step. agenda.py:140 */
+/* Move the output as the filter has moved, and close the step. agenda.py:153 */
 static void finish(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, const fs_estimator_params *params)
 {
     const fs_real dt_s = r->imu[fs_slot_of(r, FS_IMU_RING, FS_IMU_ROWS, 0)][1];
-    const bool is_reset = fs_count_of_resets(m) != m->followed[0]; /* between two steps, by the Earth's field */
-    const fs_real share = is_reset || params->output_s <= dt_s ? FS_LIT(1.0) : dt_s / params->output_s;
-    /* else the output has moved as the filter has */
-    if (is_reset || m->agenda[FS_FUSED_ANY] == 1 || share < FS_LIT(1.0)) {
+    const fs_real share = params->output_s <= dt_s ? FS_LIT(1.0) : dt_s / params->output_s;
+    if (m->agenda[FS_FUSED_ANY] == 1 || share < FS_LIT(1.0)) { /* else the output has moved as the filter has */
         move_output(m, f, r, share, params);
     }
     fs_pop(r, FS_IMU_RING, FS_IMU_ROWS);
     m->agenda[FS_SOURCE] = FS_IDLE;
 }
 
-/* agenda.py:81 */
+/* agenda.py:93 */
 bool fs_work(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_s, const fs_estimator_params *params)
 {
     if (m->agenda[FS_SOURCE] == FS_IDLE) {
@@ -290,7 +286,7 @@ bool fs_work(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_
             return false;
         }
     }
-    for (int32_t count = 0; count < 8; count++) {
+    for (int32_t count = 0; count < 9; count++) {
         if (m->agenda[FS_SOURCE] >= FS_SOURCES) {
             break;
         }

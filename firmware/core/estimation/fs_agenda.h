@@ -17,7 +17,7 @@
  *
  * A part is one scalar, with the prediction if that is due, or the end of a step.
  *
- * agenda.py:81
+ * agenda.py:93
  */
 bool fs_work(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_s, const fs_estimator_params *params);
 

@@ -15,7 +15,6 @@
 #include "fs_prediction.h"
 #include "fs_rate_filter.h"
 #include "fs_rings.h"
-#include "fs_yaw_sources.h"
 
 #define FS_MEASURED 7
 #define FS_WAIT_S FS_LIT(0.05)
@@ -29,10 +28,9 @@
 #define FS_BARO_ROWS 32
 #define FS_RANGE_RING 3
 #define FS_RANGE_ROWS 32
-#define FS_GAPS 2
-#define FS_GAP_S 1
+#define FS_GAPS 1
+#define FS_GAP_S 0
 #define FS_LONGEST_GAP_S FS_LIT(1.0)
-#define FS_GAP_PENDING_S 0
 #define FS_ALIGNMENT_S FS_LIT(0.4)
 #define FS_WAIT_FOR_MAG_S FS_LIT(2.0)
 #define FS_HAS_MAG 5
@@ -40,8 +38,9 @@
 #define FS_IMU_RING 4
 #define FS_IMU_ROWS 64
 #define FS_BACKLOG_S FS_LIT(0.03)
+#define FS_FIELD_IS_NEW 8
 
-/* delayed_filter.py:69 */
+/* delayed_filter.py:70 */
 void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], int32_t row_size)
 {
     for (int32_t i = 0; i < row_size; i++) {
@@ -87,7 +86,7 @@ void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], in
 
 /*
  * Return the time that a sample has to cover: its own, or longer after a gap; zero for one that came too late.
- * delayed_filter.py:180
+ * delayed_filter.py:181
  */
 static fs_real real_step(fs_estimator_memory *m, fs_real time_s, fs_real dt_s)
 {
@@ -102,12 +101,12 @@ static fs_real real_step(fs_estimator_memory *m, fs_real time_s, fs_real dt_s)
     }
     m->imu_gap[FS_GAPS] += FS_LIT(1.0);
     m->imu_gap[FS_GAP_S] += elapsed_s - dt_s;
-    m->imu_gap[FS_GAP_PENDING_S] += fs_min(elapsed_s, FS_LONGEST_GAP_S) - dt_s;
     const fs_real covered_s = fs_min(elapsed_s, FS_LONGEST_GAP_S);
+    fs_note_gap(m->sums, covered_s - dt_s);
     return covered_s;
 }
 
-/* Add a sample to the alignment; align when it is long enough. delayed_filter.py:197 */
+/* Add a sample to the alignment; align when it is long enough. delayed_filter.py:198 */
 static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real time_s, fs_real dt_s,
                     const fs_estimator_params *params)
 {
@@ -142,7 +141,7 @@ static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real tim
 
 /*
  * Return True if the filter is so far behind the horizon that a sample does more than a part of its work.
- * delayed_filter.py:154
+ * delayed_filter.py:156
  */
 static bool is_behind(const fs_rings *r, fs_real horizon_s)
 {
@@ -150,7 +149,7 @@ static bool is_behind(const fs_rings *r, fs_real horizon_s)
     return r->cursors[FS_IMU_RING][1] > 0 && oldest_s < horizon_s - FS_BACKLOG_S;
 }
 
-/* Do a part of the filter's work, and all of it while it is behind horizon_s. delayed_filter.py:104 */
+/* Do a part of the filter's work, and all of it while it is behind horizon_s. delayed_filter.py:105 */
 static void work_up_to(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_s,
                        const fs_estimator_params *params)
 {
@@ -162,7 +161,7 @@ static void work_up_to(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_rea
     }
 }
 
-/* Write the output in the order of VehicleState. delayed_filter.py:161 */
+/* Write the output in the order of VehicleState. delayed_filter.py:163 */
 static void write_state(fs_estimator_memory *m, const fs_vector3 *rates)
 {
     for (int32_t i = 0; i < 3; i++) {
@@ -177,7 +176,7 @@ static void write_state(fs_estimator_memory *m, const fs_vector3 *rates)
     fs_write_vector(m->state, 10, rates);
 }
 
-/* delayed_filter.py:113 */
+/* delayed_filter.py:114 */
 void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
 {
     for (int32_t i = 0; i < 8; i++) {
@@ -197,6 +196,7 @@ void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
     const fs_vector3 gyro = fs_read_vector(sample, 2);
     const fs_vector3 accel = fs_read_vector(sample, 5);
     fs_add_sample(m->sums, &gyro, &accel, dt_s);
+    fs_note_clipping(m->sums, &gyro, &accel, params);
     if (m->flags[FS_ALIGNED] == 0) {
         collect(m, &accel, time_s, dt_s, params);
         return;
@@ -230,11 +230,9 @@ void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
     write_state(m, &less_bias);
 }
 
-/* delayed_filter.py:172 */
+/* delayed_filter.py:174 */
 void fs_field_kernel(fs_estimator_memory *memory)
 {
     fs_estimator_memory *m = memory;
-    if (m->flags[FS_ALIGNED] == 1) {
-        fs_take_earth_field(m, &m->filter, &m->params);
-    }
+    m->flags[FS_FIELD_IS_NEW] = m->flags[FS_ALIGNED]; /* the alignment uses the field as it is */
 }

@@ -17,6 +17,8 @@ typedef struct {
     fs_real body_field_walk;
     fs_real wind_walk;
     fs_real baro_walk;
+    fs_real gyro_range_rad_s;
+    fs_real accel_range_m_s2;
     fs_real tilt_rad;
     fs_real gyro_bias_rad_s;
     fs_real accel_bias_m_s2;

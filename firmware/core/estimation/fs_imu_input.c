@@ -9,9 +9,15 @@
 #include "fs_geometry.h"
 #include "fs_math.h"
 
+#define FS_GAP_RATE_RAD_S FS_LIT(0.3)
+#define FS_GAP_FORCE_M_S2 FS_LIT(3.0)
+#define FS_UNKNOWN 53
 #define FS_COUNT 14
 #define FS_SMOOTHING_S FS_LIT(0.1)
 #define FS_MEAN 8
+#define FS_CLIPPED FS_LIT(0.99)
+#define FS_SHOCK_RAD FS_LIT(0.3)
+#define FS_SHOCK_M_S FS_LIT(5.0)
 #define FS_PAIR_S 21
 #define FS_PAIR 22
 #define FS_PAIR_LENGTH_S FS_LIT(0.0155)
@@ -21,7 +27,16 @@
 #define FS_DIFFERENCE_VARIANCE FS_LIT(70.0)
 #define FS_NOISE 15
 
-/* imu_input.py:52 */
+/* imu_input.py:60 */
+void fs_note_gap(fs_real sums[64], fs_real gap_s)
+{
+    const fs_real angle_rad = FS_GAP_RATE_RAD_S * gap_s;
+    const fs_real speed_m_s = FS_GAP_FORCE_M_S2 * gap_s;
+    sums[FS_UNKNOWN] += angle_rad * angle_rad;
+    sums[FS_UNKNOWN + 1] += speed_m_s * speed_m_s;
+}
+
+/* imu_input.py:77 */
 fs_vector3 fs_in_start_frame(const fs_vector3 *angle, const fs_vector3 *velocity)
 {
     const fs_vector3 turn = fs_cross(angle, velocity);
@@ -32,7 +47,7 @@ fs_vector3 fs_in_start_frame(const fs_vector3 *angle, const fs_vector3 *velocity
     };
 }
 
-/* imu_input.py:62 */
+/* imu_input.py:87 */
 static void smooth(fs_real sums[64], int32_t at, const fs_vector3 *value, fs_real share)
 {
     sums[at] += share * (value->x - sums[at]);
@@ -40,7 +55,7 @@ static void smooth(fs_real sums[64], int32_t at, const fs_vector3 *value, fs_rea
     sums[at + 2] += share * (value->z - sums[at + 2]);
 }
 
-/* imu_input.py:34 */
+/* imu_input.py:42 */
 void fs_add_sample(fs_real sums[64], const fs_vector3 *gyro, const fs_vector3 *accel, fs_real dt_s)
 {
     const fs_vector3 angle = fs_scaled(gyro, dt_s);
@@ -65,12 +80,25 @@ void fs_add_sample(fs_real sums[64], const fs_vector3 *gyro, const fs_vector3 *a
     sums[FS_COUNT] += FS_LIT(1.0);
 }
 
+/* imu_input.py:68 */
+void fs_note_clipping(fs_real sums[64], const fs_vector3 *gyro, const fs_vector3 *accel,
+                      const fs_estimator_params *params)
+{
+    if (fs_max(fs_max(fs_abs(gyro->x), fs_abs(gyro->y)), fs_abs(gyro->z)) >= FS_CLIPPED * params->gyro_range_rad_s) {
+        sums[FS_UNKNOWN] += FS_SHOCK_RAD * FS_SHOCK_RAD;
+    }
+    if (fs_max(fs_max(fs_abs(accel->x), fs_abs(accel->y)), fs_abs(accel->z)) >= FS_CLIPPED *
+        params->accel_range_m_s2) {
+        sums[FS_UNKNOWN + 1] += FS_SHOCK_M_S * FS_SHOCK_M_S;
+    }
+}
+
 /*
  * Update the noise densities from the fourth difference of means over two steps, 20 ms.
  *
  * The vehicle's motion has little power there, and vibration, which averages out within that time, does not count.
  *
- * imu_input.py:69
+ * imu_input.py:94
  */
 static void measure_noise(fs_real sums[64], fs_real sample_dt_s, const fs_vector3 *angle, const fs_vector3 *velocity)
 {
@@ -111,7 +139,7 @@ static void measure_noise(fs_real sums[64], fs_real sample_dt_s, const fs_vector
     sums[FS_PAIRS] += FS_LIT(1.0);
 }
 
-/* imu_input.py:112 */
+/* imu_input.py:137 */
 fs_delta_sample fs_take_step(fs_real sums[64], fs_real time_s)
 {
     const fs_quaternion q = {sums[1], sums[2], sums[3], sums[4]};
@@ -125,7 +153,11 @@ fs_delta_sample fs_take_step(fs_real sums[64], fs_real time_s)
         .velocity_m_s = velocity,
         .gyro_density = fs_read_vector(sums, FS_NOISE),
         .accel_density = fs_read_vector(sums, FS_NOISE + 3),
+        .unknown_angle = sums[FS_UNKNOWN],
+        .unknown_velocity = sums[FS_UNKNOWN + 1],
     };
+    sums[FS_UNKNOWN] = FS_LIT(0.0);
+    sums[FS_UNKNOWN + 1] = FS_LIT(0.0);
     for (int32_t i = 0; i < 8; i++) {
         sums[i] = FS_LIT(0.0);
     }
@@ -133,7 +165,7 @@ fs_delta_sample fs_take_step(fs_real sums[64], fs_real time_s)
     return sample;
 }
 
-/* imu_input.py:137 */
+/* imu_input.py:171 */
 fs_delta_sample fs_read_step(const fs_real row[])
 {
     return (fs_delta_sample){
@@ -143,22 +175,24 @@ fs_delta_sample fs_read_step(const fs_real row[])
         .velocity_m_s = fs_read_vector(row, 5),
         .gyro_density = fs_read_vector(row, 8),
         .accel_density = fs_read_vector(row, 11),
+        .unknown_angle = row[14],
+        .unknown_velocity = row[15],
     };
 }
 
-/* imu_input.py:100 */
+/* imu_input.py:125 */
 fs_vector3 fs_mean_rate(const fs_real sums[64])
 {
     return fs_read_vector(sums, FS_MEAN);
 }
 
-/* imu_input.py:106 */
+/* imu_input.py:131 */
 fs_vector3 fs_mean_force(const fs_real sums[64])
 {
     return fs_read_vector(sums, FS_MEAN + 3);
 }
 
-/* imu_input.py:127 */
+/* imu_input.py:160 */
 void fs_write_step(fs_real row[], const fs_delta_sample *sample)
 {
     row[0] = sample->time_s;
@@ -167,4 +201,6 @@ void fs_write_step(fs_real row[], const fs_delta_sample *sample)
     fs_write_vector(row, 5, &sample->velocity_m_s);
     fs_write_vector(row, 8, &sample->gyro_density);
     fs_write_vector(row, 11, &sample->accel_density);
+    row[14] = sample->unknown_angle;
+    row[15] = sample->unknown_velocity;
 }

@@ -16,7 +16,7 @@ typedef struct {
     fs_estimator_params params;
     fs_filter filter;
     fs_rings rings;
-    fs_real means[5][7];
+    fs_real means[5][11];
     fs_real sums[64];
     fs_real alignment[9];
     fs_real output[11];
@@ -25,7 +25,7 @@ typedef struct {
     fs_real field[3];
     fs_real rate_filter[9];
     fs_real last_imu_s[1];
-    fs_real imu_gap[3];
+    fs_real imu_gap[2];
     fs_real last_gnss_s[1];
     fs_real gnss_speed_m_s[2];
     fs_real refused_s[6];
@@ -33,7 +33,7 @@ typedef struct {
     fs_real hold[3];
     fs_real rest_s[1];
     fs_real drag_s[1];
-    int32_t flags[8];
+    int32_t flags[9];
     fs_real resets[19];
     fs_real yaw_models[5][32];
     fs_real yaw_fix[4];
@@ -44,7 +44,7 @@ typedef struct {
     fs_real before_gnss[6];
 } fs_estimator_memory;
 
-/* Set what is not zero at the start in a memory of zeros that has its parameters. memory.py:96 */
+/* Set what is not zero at the start in a memory of zeros that has its parameters. memory.py:108 */
 void fs_start_memory(fs_estimator_memory *memory);
 
 #endif

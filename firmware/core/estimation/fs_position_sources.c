@@ -22,7 +22,6 @@
 #define FS_NOTHING -1
 #define FS_HOLD_PERIOD_S FS_LIT(0.2)
 #define FS_POSITION 6
-#define FS_BARO_BIAS 23
 #define FS_GNSS_BIAS 24
 #define FS_ELAPSED_S 0
 #define FS_GNSS_POSITION 3
@@ -88,17 +87,15 @@ static void start_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[]
         const fs_real accuracy_m = axis == 2 ? fs_vertical_accuracy(row) : fs_horizontal_accuracy(row);
         const fs_real variance = accuracy_m * accuracy_m;
         const int32_t at = FS_POSITION + axis;
-        f->covariance[at][at] += variance;
-        if (axis == 2) {
-            f->covariance[at][FS_BARO_BIAS] += variance;
-            f->covariance[FS_BARO_BIAS][FS_BARO_BIAS] += variance;
-        }
         const fs_real share = fs_gnss_bias_share(params, axis);
         const fs_real slow = fs_min(share * share, FS_LIT(1.0)) * variance;
-        fs_reset_variance(f->covariance, FS_GNSS_BIAS + axis, 1, slow);
-        f->covariance[at][FS_GNSS_BIAS + axis] = -slow;
         if (axis == 2) {
-            f->covariance[FS_BARO_BIAS][FS_GNSS_BIAS + axis] = -slow;
+            /* the height is that above the ground, the altitude of the origin has the error of the fix */
+            fs_reset_variance(f->covariance, FS_GNSS_BIAS + axis, 1, variance - slow);
+        } else {
+            f->covariance[at][at] += variance;
+            fs_reset_variance(f->covariance, FS_GNSS_BIAS + axis, 1, slow);
+            f->covariance[at][FS_GNSS_BIAS + axis] = -slow;
         }
     }
     m->last_gnss_s[0] = row[0];

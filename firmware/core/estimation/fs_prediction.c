@@ -20,20 +20,22 @@
 #define FS_BODY_FIELD 18
 #define FS_WIND 21
 #define FS_BARO_BIAS 23
+#define FS_MOST_ANGLE FS_LIT(0.09)
+#define FS_MOST_VELOCITY FS_LIT(25.0)
 
-/* prediction.py:78 */
+/* prediction.py:84 */
 fs_motion fs_motion_of(const fs_nominal *n)
 {
     return (fs_motion){n->attitude, n->velocity_ned_m_s, n->position_ned_m};
 }
 
-/* prediction.py:58 */
+/* prediction.py:64 */
 fs_vector3 fs_less_bias(const fs_vector3 *v, const fs_vector3 *bias, fs_real dt_s)
 {
     return (fs_vector3){v->x - bias->x * dt_s, v->y - bias->y * dt_s, v->z - bias->z * dt_s};
 }
 
-/* prediction.py:64 */
+/* prediction.py:70 */
 fs_motion fs_moved(const fs_motion *start, const fs_vector3 *angle, const fs_vector3 *delta_velocity, fs_real dt_s,
                    fs_real gravity)
 {
@@ -55,7 +57,7 @@ fs_motion fs_moved(const fs_motion *start, const fs_vector3 *angle, const fs_vec
     };
 }
 
-/* prediction.py:84 */
+/* prediction.py:90 */
 fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion)
 {
     return (fs_nominal){
@@ -73,7 +75,7 @@ fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion)
     };
 }
 
-/* prediction.py:155 */
+/* prediction.py:161 */
 void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_params *params)
 {
     const fs_nominal n = fs_read_nominal(f->nominal);
@@ -96,7 +98,7 @@ void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_
     f->clock[0] = sample->time_s;
 }
 
-/* prediction.py:102 */
+/* prediction.py:108 */
 static void add(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
 {
     for (int32_t i = at; i < at + count; i++) {
@@ -110,7 +112,7 @@ static void add(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
  * An error e gives e omega T after a turn of duration T. As white noise that is a density of (e omega)^2 T, with T =
  * 1 s.
  *
- * prediction.py:119
+ * prediction.py:125
  */
 static fs_real turn_variance(const fs_vector3 *angle, fs_real dt_s, const fs_estimator_params *params)
 {
@@ -119,7 +121,7 @@ static fs_real turn_variance(const fs_vector3 *angle, fs_real dt_s, const fs_est
     return error * error * square * (FS_TURN_S / dt_s);
 }
 
-/* Add the noise of one axis of the body, a unit vector in the world frame. prediction.py:108 */
+/* Add the noise of one axis of the body, a unit vector in the world frame. prediction.py:114 */
 static void add_body_noise(fs_real p[27][27], int32_t at, const fs_vector3 *axis, fs_real variance)
 {
     p[at][at] += variance * axis->x * axis->x;
@@ -130,7 +132,7 @@ static void add_body_noise(fs_real p[27][27], int32_t at, const fs_vector3 *axis
     p[at + 2][at + 2] += variance * axis->z * axis->z;
 }
 
-/* prediction.py:130 */
+/* prediction.py:136 */
 static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vector3 *angle, fs_real dt_s,
                               const fs_delta_sample *sample, const fs_estimator_params *params)
 {
@@ -158,7 +160,7 @@ static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vec
     add(f->covariance, FS_BARO_BIAS, 1, params->baro_walk * params->baro_walk * dt_s);
 }
 
-/* prediction.py:171 */
+/* prediction.py:177 */
 void fs_predict_errors(fs_filter *f, const fs_delta_sample *newest, const fs_estimator_params *params)
 {
     const fs_real dt_s = f->behind[0];
@@ -178,5 +180,23 @@ void fs_predict_errors(fs_filter *f, const fs_delta_sample *newest, const fs_est
     add_process_noise(f, &middle, &angle, dt_s, newest, params);
     for (int32_t i = 0; i < 7; i++) {
         f->behind[i] = FS_LIT(0.0);
+    }
+}
+
+/* prediction.py:192 */
+void fs_add_unknown(fs_filter *f, const fs_delta_sample *step)
+{
+    const fs_real half_s = FS_LIT(0.5) * step->dt_s;
+    for (int32_t axis = 0; axis < 3; axis++) {
+        const int32_t turn = FS_ATTITUDE + axis;
+        const int32_t speed = FS_VELOCITY + axis;
+        const int32_t place = FS_POSITION + axis;
+        f->covariance[turn][turn] += fs_min(step->unknown_angle,
+                                            fs_max(FS_MOST_ANGLE - f->covariance[turn][turn], FS_LIT(0.0)));
+        const fs_real variance = fs_min(step->unknown_velocity,
+                                        fs_max(FS_MOST_VELOCITY - f->covariance[speed][speed], FS_LIT(0.0)));
+        f->covariance[speed][speed] += variance;
+        f->covariance[speed][place] += half_s * variance;
+        f->covariance[place][place] += half_s * half_s * variance;
     }
 }

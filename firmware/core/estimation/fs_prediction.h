@@ -19,6 +19,8 @@ typedef struct {
     fs_vector3 velocity_m_s;
     fs_vector3 gyro_density;
     fs_vector3 accel_density;
+    fs_real unknown_angle;
+    fs_real unknown_velocity;
 } fs_delta_sample;
 
 /* Attitude, velocity and position. */
@@ -28,23 +30,23 @@ typedef struct {
     fs_vector3 position_ned_m;
 } fs_motion;
 
-/* Return the part of the nominal state that moves. prediction.py:78 */
+/* Return the part of the nominal state that moves. prediction.py:84 */
 fs_motion fs_motion_of(const fs_nominal *n);
 
-/* Return a delta angle or velocity without the bias of its rate. prediction.py:58 */
+/* Return a delta angle or velocity without the bias of its rate. prediction.py:64 */
 fs_vector3 fs_less_bias(const fs_vector3 *v, const fs_vector3 *bias, fs_real dt_s);
 
 /*
  * Integrate one step: angle and delta_velocity in the body frame at the start, velocity by trapezoids.
- * prediction.py:64
+ * prediction.py:70
  */
 fs_motion fs_moved(const fs_motion *start, const fs_vector3 *angle, const fs_vector3 *delta_velocity, fs_real dt_s,
                    fs_real gravity);
 
-/* Return the nominal state with another motion. prediction.py:84 */
+/* Return the nominal state with another motion. prediction.py:90 */
 fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion);
 
-/* Propagate the state over the sample. The covariance is behind it until predict_errors. prediction.py:155 */
+/* Propagate the state over the sample. The covariance is behind it until predict_errors. prediction.py:161 */
 void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_params *params);
 
 /*
@@ -52,8 +54,14 @@ void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_
  *
  * The errors then move with the attitude in the middle of that time.
  *
- * prediction.py:171
+ * prediction.py:177
  */
 void fs_predict_errors(fs_filter *f, const fs_delta_sample *newest, const fs_estimator_params *params);
+
+/*
+ * Add the uncertainty of what the sensor could not measure in a step; the position has half of the velocity's.
+ * prediction.py:192
+ */
+void fs_add_unknown(fs_filter *f, const fs_delta_sample *step);
 
 #endif

@@ -12,17 +12,18 @@
 #define FS_GNSS_ROWS 8
 #define FS_LAST_S 6
 #define FS_COUNT 4
+#define FS_FIRST 7
 #define FS_PUSHED_S 5
 #define FS_ROUNDING_S FS_LIT(0.00025)
 
-/* rings.py:39 */
+/* rings.py:40 */
 int32_t fs_slot_of(const fs_rings *rings, int32_t ring, int32_t size, int32_t number)
 {
     const int32_t slot = rings->cursors[ring][0] + number;
     return slot >= size ? slot - size : slot;
 }
 
-/* rings.py:99 */
+/* rings.py:102 */
 fs_real fs_newest_fix_time(const fs_rings *rings)
 {
     const int32_t count = rings->cursors[FS_GNSS_RING][1];
@@ -33,14 +34,14 @@ fs_real fs_newest_fix_time(const fs_rings *rings)
     return newest_s;
 }
 
-/* rings.py:72 */
+/* rings.py:73 */
 void fs_pop(fs_rings *rings, int32_t ring, int32_t size)
 {
     rings->cursors[ring][0] = fs_slot_of(rings, ring, size, 1);
     rings->cursors[ring][1] -= 1;
 }
 
-/* rings.py:62 */
+/* rings.py:63 */
 int32_t fs_push(fs_rings *rings, int32_t ring, int32_t size)
 {
     if (rings->cursors[ring][1] >= size) {
@@ -51,7 +52,7 @@ int32_t fs_push(fs_rings *rings, int32_t ring, int32_t size)
     return slot;
 }
 
-/* rings.py:116 */
+/* rings.py:119 */
 void fs_write_row(fs_real row[], int32_t row_size, const fs_real values[])
 {
     for (int32_t column = 0; column < row_size; column++) {
@@ -59,7 +60,7 @@ void fs_write_row(fs_real row[], int32_t row_size, const fs_real values[])
     }
 }
 
-/* rings.py:79 */
+/* rings.py:80 */
 bool fs_take_mean(fs_real mean[], fs_real row[], int32_t row_size, fs_real period_s)
 {
     if (row[0] - mean[FS_LAST_S] > period_s) { /* a gap: the older samples are outdated */
@@ -69,7 +70,10 @@ bool fs_take_mean(fs_real mean[], fs_real row[], int32_t row_size, fs_real perio
     }
     mean[FS_LAST_S] = row[0];
     for (int32_t i = 0; i < row_size; i++) {
-        mean[i] += row[i];
+        if (mean[FS_COUNT] == FS_LIT(0.0)) {
+            mean[FS_FIRST + i] = row[i];
+        }
+        mean[i] += row[i] - mean[FS_FIRST + i];
     }
     mean[FS_COUNT] += FS_LIT(1.0);
     if (row[0] - mean[FS_PUSHED_S] < FS_LIT(0.9) * period_s) {
@@ -77,7 +81,7 @@ bool fs_take_mean(fs_real mean[], fs_real row[], int32_t row_size, fs_real perio
     }
     mean[FS_PUSHED_S] = row[0];
     for (int32_t i = 0; i < row_size; i++) {
-        row[i] = mean[i] / mean[FS_COUNT];
+        row[i] = mean[FS_FIRST + i] + mean[i] / mean[FS_COUNT];
     }
     for (int32_t i = 0; i < 5; i++) {
         mean[i] = FS_LIT(0.0);
@@ -85,14 +89,14 @@ bool fs_take_mean(fs_real mean[], fs_real row[], int32_t row_size, fs_real perio
     return true;
 }
 
-/* rings.py:55 */
+/* rings.py:56 */
 bool fs_is_due(const fs_rings *rings, int32_t ring, fs_real row_s, fs_real now_s)
 {
     const int32_t count = rings->cursors[ring][1];
     return count > 0 && row_s <= now_s + FS_ROUNDING_S;
 }
 
-/* rings.py:109 */
+/* rings.py:112 */
 void fs_read_row(const fs_real row[], int32_t row_size, fs_real values[])
 {
     for (int32_t column = 0; column < row_size; column++) {

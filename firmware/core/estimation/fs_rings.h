@@ -14,33 +14,33 @@ typedef struct {
     fs_real mag[32][4];
     fs_real baro[32][2];
     fs_real range[32][2];
-    fs_real imu[64][14];
+    fs_real imu[64][16];
     fs_real track[64][11];
     int32_t cursors[5][2];
 } fs_rings;
 
-/* Return the slot of row number, counted from the oldest. rings.py:39 */
+/* Return the slot of row number, counted from the oldest. rings.py:40 */
 int32_t fs_slot_of(const fs_rings *rings, int32_t ring, int32_t size, int32_t number);
 
-/* Return the time of the newest row of GNSS, or minus infinity. rings.py:99 */
+/* Return the time of the newest row of GNSS, or minus infinity. rings.py:102 */
 fs_real fs_newest_fix_time(const fs_rings *rings);
 
-/* Remove the oldest row. rings.py:72 */
+/* Remove the oldest row. rings.py:73 */
 void fs_pop(fs_rings *rings, int32_t ring, int32_t size);
 
-/* Return the slot for a new row; the oldest row of a full ring is dropped. rings.py:62 */
+/* Return the slot for a new row; the oldest row of a full ring is dropped. rings.py:63 */
 int32_t fs_push(fs_rings *rings, int32_t ring, int32_t size);
 
-/* Copy the first values to a row. rings.py:116 */
+/* Copy the first values to a row. rings.py:119 */
 void fs_write_row(fs_real row[], int32_t row_size, const fs_real values[]);
 
-/* Add a sample to a mean; return True, with the mean in row, if period_s passed since the last one. rings.py:79 */
+/* Add a sample to a mean; return True, with the mean in row, if period_s passed since the last one. rings.py:80 */
 bool fs_take_mean(fs_real mean[], fs_real row[], int32_t row_size, fs_real period_s);
 
-/* Return True if the ring has rows and its oldest one, measured at row_s, is not in the future. rings.py:55 */
+/* Return True if the ring has rows and its oldest one, measured at row_s, is not in the future. rings.py:56 */
 bool fs_is_due(const fs_rings *rings, int32_t ring, fs_real row_s, fs_real now_s);
 
-/* Copy a row to the first of values. rings.py:109 */
+/* Copy a row to the first of values. rings.py:112 */
 void fs_read_row(const fs_real row[], int32_t row_size, fs_real values[]);
 
 #endif

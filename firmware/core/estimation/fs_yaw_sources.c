@@ -18,10 +18,18 @@
 #include "fs_yaw_estimator.h"
 
 #define FS_YAW_UPDATES 2
-#define FS_MAG_FAULT 7
+#define FS_FIELD_IS_NEW 8
+#define FS_NOTHING -1
 #define FS_HAS_MAG 5
-#define FS_HAS_YAW 6
+#define FS_MAG_FAULT 7
 #define FS_LANDED 1
+#define FS_LARGEST_TURN_RAD FS_LIT(0.5)
+#define FS_COUNTED_TURN_RAD FS_LIT(0.01)
+#define FS_EARTH_FIELD 15
+#define FS_DECLINATION_NOISE_RAD FS_LIT(0.01)
+#define FS_DECLINATION 22
+#define FS_KNOWN_FIELD 19
+#define FS_HAS_YAW 6
 #define FS_HAS_GNSS 3
 #define FS_YAW_TURN 0
 #define FS_YAW_VARIANCE 1
@@ -31,14 +39,8 @@
 #define FS_WRONG_YAW_RAD FS_LIT(0.436)
 #define FS_CERTAIN_SQUARE FS_LIT(16.0)
 #define FS_REFUSED_S FS_LIT(1.0)
-#define FS_LARGEST_TURN_RAD FS_LIT(0.5)
-#define FS_EARTH_FIELD 15
-#define FS_DECLINATION_NOISE_RAD FS_LIT(0.01)
-#define FS_DECLINATION 22
-#define FS_KNOWN_FIELD 19
-#define FS_COUNTED_TURN_RAD FS_LIT(0.01)
 
-/* yaw_sources.py:138 */
+/* yaw_sources.py:167 */
 void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_sample *step)
 {
     if (m->yaw_fix[FS_YAW_UPDATES] > FS_LIT(0.0)) {
@@ -50,7 +52,106 @@ void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_s
     }
 }
 
-/* Note the field; set the states of the field, and an unknown yaw, by the first one. yaw_sources.py:75 */
+/*
+ * Count the turn since the attitude in pending as a reset of the yaw; the field is not new any more.
+ * yaw_sources.py:137
+ */
+static void count_turn(fs_estimator_memory *m, const fs_filter *f)
+{
+    m->flags[FS_FIELD_IS_NEW] = 0;
+    const fs_nominal read_nominal = fs_read_nominal(f->nominal);
+    const fs_quaternion before_2 = {
+        .w = m->pending[0],
+        .x = m->pending[1],
+        .y = m->pending[2],
+        .z = m->pending[3],
+    };
+    const fs_real turn_rad = fs_turn_between(&before_2, &read_nominal.attitude);
+    if (fs_abs(turn_rad) > FS_COUNTED_TURN_RAD) {
+        fs_count_yaw_reset(m, turn_rad);
+    }
+}
+
+/*
+ * Turn the Earth's field by a change of the declination; the yaw follows as far as it depends on it.
+ * yaw_sources.py:149
+ */
+static void fuse_declination(fs_filter *f, fs_real was_rad, fs_real change_rad)
+{
+    const fs_real north = f->nominal[16];
+    const fs_real east = f->nominal[17];
+    const fs_real square = north * north + east * east;
+    fs_clear(f->h);
+    f->h[FS_EARTH_FIELD] = -east / square;
+    f->h[FS_EARTH_FIELD + 1] = north / square;
+    const fs_noise noise = {
+        .least = FS_DECLINATION_NOISE_RAD,
+        .start = FS_DECLINATION_NOISE_RAD,
+        .largest = FS_DECLINATION_NOISE_RAD,
+        .gate = FS_LIT(1000.0),
+        .is_slow = FS_LIT(0.0),
+    };
+    (void)fs_fuse(f, FS_DECLINATION, change_rad, &noise, FS_LIT(0.0));
+    fs_real sine;
+    fs_real cosine;
+    fs_sin_cos(was_rad + change_rad, &sine, &cosine);
+    const fs_real along = north * cosine + east * sine;
+    const fs_real across = f->nominal[17] * cosine - f->nominal[16] * sine;
+    /* the linear update would lengthen the field */
+    f->nominal[16] = along * cosine - across * sine;
+    f->nominal[17] = along * sine + across * cosine;
+}
+
+/* Align the yaw again, or fuse the declination; return the next stage. yaw_sources.py:120 */
+static int32_t begin_earth_field(fs_estimator_memory *m, fs_filter *f, const fs_estimator_params *params)
+{
+    const fs_vector3 known = fs_read_vector(m->earth, 0);
+    const fs_nominal before = fs_read_nominal(f->nominal);
+    const fs_quaternion *q = &before.attitude;
+    const fs_vector3 *held = &before.earth_field_ned_gauss;
+    m->pending[0] = q->w;
+    m->pending[1] = q->x;
+    m->pending[2] = q->y;
+    m->pending[3] = q->z;
+    const fs_real was_rad = fs_atan2(held->y, held->x);
+    const fs_real change_rad = fs_wrap_pi(fs_atan2(known.y, known.x) - was_rad);
+    if (m->flags[FS_LANDED] == 1 || fs_abs(change_rad) > FS_LARGEST_TURN_RAD) {
+        const fs_vector3 read_vector = fs_read_vector(m->field, 0);
+        (void)fs_align_yaw(f, &read_vector, &known, m->earth[3], params);
+        count_turn(m, f);
+        return 0;
+    }
+    fuse_declination(f, was_rad, change_rad);
+    return 1;
+}
+
+/* yaw_sources.py:93 */
+int32_t fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, int32_t stage, const fs_estimator_params *params)
+{
+    if (stage == 0) {
+        if (m->flags[FS_FIELD_IS_NEW] == 0) {
+            return FS_NOTHING;
+        }
+        if (m->flags[FS_HAS_MAG] == 0 || m->flags[FS_MAG_FAULT] == 1) {
+            m->flags[FS_FIELD_IS_NEW] = 0;
+            return FS_NOTHING;
+        }
+        return begin_earth_field(m, f, params);
+    }
+    const fs_real value = m->earth[stage - 1];
+    const fs_real noise = params->earth_field_gauss + params->field_scale * fs_abs(value);
+    fs_clear(f->h);
+    f->h[FS_EARTH_FIELD + stage - 1] = FS_LIT(1.0);
+    const fs_noise of_model = {noise, noise, noise, FS_LIT(1000.0), FS_LIT(0.0)};
+    (void)fs_fuse(f, FS_KNOWN_FIELD + stage - 1, value - f->nominal[15 + stage], &of_model, FS_LIT(0.0));
+    if (stage < 3) {
+        return stage + 1;
+    }
+    count_turn(m, f);
+    return 0;
+}
+
+/* Note the field; set the states of the field, and an unknown yaw, by the first one. yaw_sources.py:77 */
 static void start_field(fs_estimator_memory *m, fs_filter *f, const fs_vector3 *field,
                         const fs_estimator_params *params)
 {
@@ -73,7 +174,7 @@ static void start_field(fs_estimator_memory *m, fs_filter *f, const fs_vector3 *
     }
 }
 
-/* yaw_sources.py:60 */
+/* yaw_sources.py:62 */
 int32_t fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t axis,
                       const fs_estimator_params *params)
 {
@@ -88,7 +189,7 @@ int32_t fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[],
     return axis < 2 ? axis + 1 : 0;
 }
 
-/* Take tilt and yaw from the models, velocity and position from GNSS. yaw_sources.py:185 */
+/* Take tilt and yaw from the models, velocity and position from GNSS. yaw_sources.py:214 */
 static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 {
     m->yaw_fix[FS_YAW_WRONG_S] = FS_LIT(0.0);
@@ -119,7 +220,7 @@ static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real 
 
 /*
  * Return True if the models have contradicted the yaw for a second, or do while GNSS velocities are refused.
- * yaw_sources.py:171
+ * yaw_sources.py:200
  */
 static bool is_wrong(fs_estimator_memory *m, fs_real time_s)
 {
@@ -137,7 +238,7 @@ static bool is_wrong(fs_estimator_memory *m, fs_real time_s)
     return lasts || (differs && is_refused);
 }
 
-/* yaw_sources.py:147 */
+/* yaw_sources.py:176 */
 void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 {
     if (m->flags[FS_LANDED] == 1 || m->flags[FS_HAS_GNSS] == 0) {
@@ -166,67 +267,5 @@ void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
             m->flags[FS_MAG_FAULT] = m->flags[FS_HAS_MAG];
             reset_to_models(m, f, row);
         }
-    }
-}
-
-/*
- * Turn the Earth's field by a change of the declination; the yaw follows as far as it depends on it.
- * yaw_sources.py:120
- */
-static void fuse_declination(fs_filter *f, fs_real was_rad, fs_real change_rad)
-{
-    const fs_real north = f->nominal[16];
-    const fs_real east = f->nominal[17];
-    const fs_real square = north * north + east * east;
-    fs_clear(f->h);
-    f->h[FS_EARTH_FIELD] = -east / square;
-    f->h[FS_EARTH_FIELD + 1] = north / square;
-    const fs_noise noise = {
-        .least = FS_DECLINATION_NOISE_RAD,
-        .start = FS_DECLINATION_NOISE_RAD,
-        .largest = FS_DECLINATION_NOISE_RAD,
-        .gate = FS_LIT(1000.0),
-        .is_slow = FS_LIT(0.0),
-    };
-    (void)fs_fuse(f, FS_DECLINATION, change_rad, &noise, FS_LIT(0.0));
-    fs_real sine;
-    fs_real cosine;
-    fs_sin_cos(was_rad + change_rad, &sine, &cosine);
-    const fs_real along = north * cosine + east * sine;
-    const fs_real across = f->nominal[17] * cosine - f->nominal[16] * sine;
-    /* the linear update would lengthen the field */
-    f->nominal[16] = along * cosine - across * sine;
-    f->nominal[17] = along * sine + across * cosine;
-}
-
-/* yaw_sources.py:91 */
-void fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, const fs_estimator_params *params)
-{
-    if (m->flags[FS_HAS_MAG] == 0 || m->flags[FS_MAG_FAULT] == 1) {
-        return;
-    }
-    const fs_vector3 known = fs_read_vector(m->earth, 0);
-    const fs_nominal before = fs_read_nominal(f->nominal);
-    const fs_vector3 *held = &before.earth_field_ned_gauss;
-    const fs_real was_rad = fs_atan2(held->y, held->x);
-    const fs_real change_rad = fs_wrap_pi(fs_atan2(known.y, known.x) - was_rad);
-    if (m->flags[FS_LANDED] == 1 || fs_abs(change_rad) > FS_LARGEST_TURN_RAD) {
-        const fs_vector3 read_vector = fs_read_vector(m->field, 0);
-        (void)fs_align_yaw(f, &read_vector, &known, m->earth[3], params);
-    } else {
-        fuse_declination(f, was_rad, change_rad);
-        for (int32_t axis = 0; axis < 3; axis++) {
-            const fs_real value = axis == 0 ? known.x : (axis == 1 ? known.y : known.z);
-            const fs_real noise = params->earth_field_gauss + params->field_scale * fs_abs(value);
-            fs_clear(f->h);
-            f->h[FS_EARTH_FIELD + axis] = FS_LIT(1.0);
-            const fs_noise of_model = {noise, noise, noise, FS_LIT(1000.0), FS_LIT(0.0)};
-            (void)fs_fuse(f, FS_KNOWN_FIELD + axis, value - f->nominal[16 + axis], &of_model, FS_LIT(0.0));
-        }
-    }
-    const fs_nominal read_nominal = fs_read_nominal(f->nominal);
-    const fs_real turn_rad = fs_turn_between(&before.attitude, &read_nominal.attitude);
-    if (fs_abs(turn_rad) > FS_COUNTED_TURN_RAD) {
-        fs_count_yaw_reset(m, turn_rad);
     }
 }

@@ -13,30 +13,30 @@
 #include "fs_rings.h"
 #include "fs_types.h"
 
-/* Move the models over a step of the flight. yaw_sources.py:138 */
+/* Move the models over a step of the flight. yaw_sources.py:167 */
 void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_sample *step);
+
+/*
+ * Correct yaw and field with the Earth's field when it has become known; return the next stage.
+ *
+ * On the ground, or if it is far off, the yaw is aligned again. In flight it changes as far as it depends on the
+ * field: by its declination first, then by its three components.
+ *
+ * yaw_sources.py:93
+ */
+int32_t fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, int32_t stage, const fs_estimator_params *params);
 
 /*
  * Fuse an axis of a magnetic field, and return the next one, 0 after the last.
  *
  * The first field after the alignment gives the yaw if that is unknown.
  *
- * yaw_sources.py:60
+ * yaw_sources.py:62
  */
 int32_t fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t axis,
                       const fs_estimator_params *params);
 
-/* Weigh the models with a GNSS velocity; reset the yaw if it is unknown, or wrong. yaw_sources.py:147 */
+/* Weigh the models with a GNSS velocity; reset the yaw if it is unknown, or wrong. yaw_sources.py:176 */
 void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[]);
-
-/*
- * Correct yaw and field with the Earth's field, now known.
- *
- * On the ground, or if it is far off, the yaw is aligned again. In flight it changes as far as it depends on the
- * field.
- *
- * yaw_sources.py:91
- */
-void fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, const fs_estimator_params *params);
 
 #endif
