@@ -14,7 +14,7 @@ from flightstack.estimation.error_state import read_nominal, read_vector, scaled
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.fusion import fuse_drag, fuse_rest_rate, fuse_rest_velocity
 from flightstack.estimation.height_sources import take_baro, take_range
-from flightstack.estimation.imu_input import mean_force, mean_rate, read_step
+from flightstack.estimation.imu_input import mean_force, mean_rate, noise_of, read_step
 from flightstack.estimation.kalman import Filter
 from flightstack.estimation.memory import (
     AXIS,
@@ -126,7 +126,7 @@ def _begin(m: MemoryRecord, f: Filter, r: Rings, horizon_s: float, params: Estim
     predict_yaw(m, f, step)
     predict(f, step, params)
     if _is_covariance_due(m, f, r, params):
-        predict_errors(f, step, params)
+        predict_errors(f, noise_of(m["sums"]), params)
     add_unknown(f, step)
     add_fault_noise(m["checks"], f, step.dt_s)
     agenda[SOURCE], agenda[AXIS], agenda[FUSED_ANY] = EARTH_SOURCE, 0, 0
@@ -267,8 +267,8 @@ def _rest(m: MemoryRecord, f: Filter, r: Rings, stage: int, params: EstimatorPar
     if axis < 3:
         fuse_rest_velocity(f, axis, params)
     else:
-        step = read_step(r.imu[slot_of(r, IMU_RING, IMU_ROWS, 0)])
-        density = max(step.gyro_density.x, step.gyro_density.y, step.gyro_density.z)
+        noise = noise_of(m["sums"]).gyro
+        density = max(noise.x, noise.y, noise.z)
         fuse_rest_rate(f, axis - 3, mean_rate(m["sums"]), density / _REST_MEAN_S, params)
     return axis + 1 if axis < 5 else 0
 

@@ -97,6 +97,16 @@ def _set_attitude(f: Filter, q: Quaternion) -> None:
 def align_yaw(
     f: Filter, field: Vector3, earth: Vector3, declination_rad: float, params: EstimatorParams
 ) -> float:
+    """Turn the attitude to the yaw of the measured field, and fuse the field; return the turn [rad]."""
+    turn_rad = turn_to_field(f, field, earth, declination_rad, params)
+    fuse_field(f, field, params)
+    return turn_rad
+
+
+@compiled
+def turn_to_field(
+    f: Filter, field: Vector3, earth: Vector3, declination_rad: float, params: EstimatorParams
+) -> float:
     """Turn the attitude to the yaw of the measured field, and set the states of the field; return the turn [rad]."""
     n = read_nominal(f.nominal)
     level = rotate(n.attitude, field)
@@ -104,7 +114,6 @@ def align_yaw(
     _set_attitude(f, turned(n.attitude, Vector3(0.0, 0.0, turn)))
     reset_variance(f.covariance, ATTITUDE + 2, 1, _UNKNOWN_YAW_RAD * _UNKNOWN_YAW_RAD)
     set_field(f, level, earth, declination_rad, params)
-    fuse_field(f, field, params)
     return turn
 
 

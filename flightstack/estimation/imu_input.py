@@ -16,12 +16,12 @@ from flightstack.core.geometry import (
 )
 from flightstack.estimation.error_state import read_vector, scaled, write_vector
 from flightstack.estimation.estimator_params import EstimatorParams
-from flightstack.estimation.prediction import DeltaSample
+from flightstack.estimation.prediction import DeltaSample, ImuNoise
 
 SUMS_SIZE = 64
 """Elapsed time, rotation (4), velocity change (3); smoothed rate and specific force (6); number of samples; noise of
-gyro and accelerometer (6); sums of two steps (7), their last four means (24), and the number of means; variances of
-unknown rotation and velocity change."""
+gyro and accelerometer (6); sums of two steps (7), their last four means (24), and the number of means; variance of
+the unknown velocity change."""
 Sums: TypeAlias = Annotated[FloatArray, SUMS_SIZE]
 
 _MEAN, _COUNT, _NOISE, _PAIR_S, _PAIR, _PAST, _PAIRS, _UNKNOWN = 8, 14, 15, 21, 22, 28, 52, 53
@@ -30,10 +30,9 @@ _NOISE_SMOOTHING_S = 2.0
 _PAIR_LENGTH_S = 0.0155
 _DIFFERENCE_VARIANCE = 70.0
 """Variance of the fourth difference of white noise of variance 1."""
-_GAP_RATE_RAD_S, _GAP_FORCE_M_S2 = 0.3, 3.0
-"""Deviation of the mean rate and specific force of a gap from those of the sample that bridges it."""
-_SHOCK_RAD, _SHOCK_M_S = 0.3, 5.0
-"""Deviation of what a sample at the end of the sensor's range measures, as in an impact."""
+_GAP_FORCE_M_S2, _SHOCK_M_S = 3.0, 5.0
+"""Deviation of the mean specific force of a gap from that of the sample that bridges it, and of the velocity change of
+a sample at the end of the sensor's range, as in an impact."""
 _CLIPPED = 0.99
 """Share of the range from which a value may have been cut off."""
 
@@ -59,18 +58,17 @@ def add_sample(sums: Sums, gyro: Vector3, accel: Vector3, dt_s: float) -> None:
 @compiled
 def note_gap(sums: Sums, gap_s: float) -> None:
     """Note a time without samples, which the next sample bridges."""
-    angle_rad, speed_m_s = _GAP_RATE_RAD_S * gap_s, _GAP_FORCE_M_S2 * gap_s
-    sums[_UNKNOWN] += angle_rad * angle_rad
-    sums[_UNKNOWN + 1] += speed_m_s * speed_m_s
+    speed_m_s = _GAP_FORCE_M_S2 * gap_s
+    sums[_UNKNOWN] += speed_m_s * speed_m_s
 
 
 @compiled
 def note_clipping(sums: Sums, gyro: Vector3, accel: Vector3, params: EstimatorParams) -> None:
     """Note a sample with a value at the end of its range: the true one may be far larger."""
-    if max(abs(gyro.x), abs(gyro.y), abs(gyro.z)) >= _CLIPPED * params.gyro_range_rad_s:
-        sums[_UNKNOWN] += _SHOCK_RAD * _SHOCK_RAD
-    if max(abs(accel.x), abs(accel.y), abs(accel.z)) >= _CLIPPED * params.accel_range_m_s2:
-        sums[_UNKNOWN + 1] += _SHOCK_M_S * _SHOCK_M_S
+    rate = max(abs(gyro.x), abs(gyro.y), abs(gyro.z)) / params.gyro_range_rad_s
+    force = max(abs(accel.x), abs(accel.y), abs(accel.z)) / params.accel_range_m_s2
+    if max(rate, force) >= _CLIPPED:
+        sums[_UNKNOWN] += _SHOCK_M_S * _SHOCK_M_S
 
 
 @compiled
@@ -134,6 +132,12 @@ def mean_force(sums: Sums) -> Vector3:
 
 
 @compiled
+def noise_of(sums: Sums) -> ImuNoise:
+    """Return the noise that is measured of the sensor."""
+    return ImuNoise(read_vector(sums, _NOISE), read_vector(sums, _NOISE + 3))
+
+
+@compiled
 def take_step(sums: Sums, time_s: float) -> DeltaSample:
     """Return the accumulated step that ends at ``time_s``, and start the next one."""
     angle = rotation_vector(Quaternion(sums[1], sums[2], sums[3], sums[4]))
@@ -144,12 +148,9 @@ def take_step(sums: Sums, time_s: float) -> DeltaSample:
         sums[0],
         angle,
         velocity,
-        read_vector(sums, _NOISE),
-        read_vector(sums, _NOISE + 3),
         sums[_UNKNOWN],
-        sums[_UNKNOWN + 1],
     )
-    sums[_UNKNOWN], sums[_UNKNOWN + 1] = 0.0, 0.0
+    sums[_UNKNOWN] = 0.0
     for i in range(8):
         sums[i] = 0.0
     sums[1] = 1.0
@@ -158,13 +159,11 @@ def take_step(sums: Sums, time_s: float) -> DeltaSample:
 
 @compiled
 def write_step(row: FloatArray, sample: DeltaSample) -> None:
-    """Write a step to a row of the IMU ring, shape (16,)."""
+    """Write a step to a row of the IMU ring, shape (9,)."""
     row[0], row[1] = sample.time_s, sample.dt_s
     write_vector(row, 2, sample.angle_rad)
     write_vector(row, 5, sample.velocity_m_s)
-    write_vector(row, 8, sample.gyro_density)
-    write_vector(row, 11, sample.accel_density)
-    row[14], row[15] = sample.unknown_angle, sample.unknown_velocity
+    row[8] = sample.unknown
 
 
 @compiled
@@ -175,8 +174,5 @@ def read_step(row: FloatArray) -> DeltaSample:
         row[1],
         read_vector(row, 2),
         read_vector(row, 5),
-        read_vector(row, 8),
-        read_vector(row, 11),
-        row[14],
-        row[15],
+        row[8],
     )

@@ -30,6 +30,8 @@ from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import BEHIND_SIZE, Filter
 
 _TURN_S = 1.0
+_TURN_OF_SPEED = 0.1
+"""Unknown rotation [rad] beside an unknown velocity change [m/s]."""
 _MOST_ANGLE, _MOST_VELOCITY = 0.3**2, 5.0**2
 """Variances [rad²], [m²/s²] beyond which unknown motion adds nothing: other sensors are believed by then."""
 
@@ -37,19 +39,22 @@ _MOST_ANGLE, _MOST_VELOCITY = 0.3**2, 5.0**2
 class DeltaSample(NamedTuple):
     """Rotation vector and velocity change over ``dt_s``, in the body frame at its start, biases included.
 
-    The densities are those measured of the white noise of each axis, [rad²/s] and [m²/s³]. The unknown parts are the
-    variances, [rad²] and [m²/s²] for each axis, of what the sensor could not measure: time without samples, and values
-    beyond its range.
+    ``unknown`` is the variance [m²/s²] of each axis of the velocity change that the sensor could not measure: in time
+    without samples, and beyond its range. The rotation is unknown by ``_TURN_OF_SPEED`` times as much.
     """
 
     time_s: float
     dt_s: float
     angle_rad: Vector3
     velocity_m_s: Vector3
-    gyro_density: Vector3
-    accel_density: Vector3
-    unknown_angle: float
-    unknown_velocity: float
+    unknown: float
+
+
+class ImuNoise(NamedTuple):
+    """Densities of the white noise that is measured of each axis, [rad²/s] and [m²/s³]."""
+
+    gyro: Vector3
+    accel: Vector3
 
 
 class Motion(NamedTuple):
@@ -134,7 +139,7 @@ def _turn_variance(angle: Vector3, dt_s: float, params: EstimatorParams) -> floa
 
 @compiled
 def _add_process_noise(
-    f: Filter, q: Quaternion, angle: Vector3, dt_s: float, sample: DeltaSample, params: EstimatorParams
+    f: Filter, q: Quaternion, angle: Vector3, dt_s: float, noise: ImuNoise, params: EstimatorParams
 ) -> None:
     p, share = f.covariance, f.clock[1]
     gyro, accel = params.gyro_noise, params.accel_noise
@@ -142,12 +147,12 @@ def _add_process_noise(
     y = rotate(q, Vector3(0.0, 1.0, 0.0))
     z = cross(x, y)
     _add(p, ATTITUDE, 3, _turn_variance(angle, dt_s, params))
-    _add_body_noise(p, ATTITUDE, x, max(gyro * gyro, share * sample.gyro_density.x) * dt_s)
-    _add_body_noise(p, ATTITUDE, y, max(gyro * gyro, share * sample.gyro_density.y) * dt_s)
-    _add_body_noise(p, ATTITUDE, z, max(gyro * gyro, share * sample.gyro_density.z) * dt_s)
-    _add_body_noise(p, VELOCITY, x, max(accel * accel, share * sample.accel_density.x) * dt_s)
-    _add_body_noise(p, VELOCITY, y, max(accel * accel, share * sample.accel_density.y) * dt_s)
-    _add_body_noise(p, VELOCITY, z, max(accel * accel, share * sample.accel_density.z) * dt_s)
+    _add_body_noise(p, ATTITUDE, x, max(gyro * gyro, share * noise.gyro.x) * dt_s)
+    _add_body_noise(p, ATTITUDE, y, max(gyro * gyro, share * noise.gyro.y) * dt_s)
+    _add_body_noise(p, ATTITUDE, z, max(gyro * gyro, share * noise.gyro.z) * dt_s)
+    _add_body_noise(p, VELOCITY, x, max(accel * accel, share * noise.accel.x) * dt_s)
+    _add_body_noise(p, VELOCITY, y, max(accel * accel, share * noise.accel.y) * dt_s)
+    _add_body_noise(p, VELOCITY, z, max(accel * accel, share * noise.accel.z) * dt_s)
     _add(p, POSITION, 3, 1e-8 * dt_s)
     _add(p, GYRO_BIAS, 3, params.gyro_bias_walk * params.gyro_bias_walk * dt_s)
     _add(p, ACCEL_BIAS, 3, params.accel_bias_walk * params.accel_bias_walk * dt_s)
@@ -174,8 +179,8 @@ def predict(f: Filter, sample: DeltaSample, params: EstimatorParams) -> None:
 
 
 @compiled
-def predict_errors(f: Filter, newest: DeltaSample, params: EstimatorParams) -> None:
-    """Propagate the covariance to the time of the state, over all samples since it was last, ``newest`` among them.
+def predict_errors(f: Filter, noise: ImuNoise, params: EstimatorParams) -> None:
+    """Propagate the covariance to the time of the state, over all samples since it was last.
 
     The errors then move with the attitude in the middle of that time.
     """
@@ -183,7 +188,7 @@ def predict_errors(f: Filter, newest: DeltaSample, params: EstimatorParams) -> N
     attitude = Quaternion(f.nominal[0], f.nominal[1], f.nominal[2], f.nominal[3])
     middle = quaternion_product(attitude, rotation_over(angle, -0.5))
     predict_covariance(f.covariance, middle, rotate(conjugate(middle), change), dt_s)
-    _add_process_noise(f, middle, angle, dt_s, newest, params)
+    _add_process_noise(f, middle, angle, dt_s, noise, params)
     for i in range(BEHIND_SIZE):
         f.behind[i] = 0.0
 
@@ -194,8 +199,9 @@ def add_unknown(f: Filter, step: DeltaSample) -> None:
     p, half_s = f.covariance, 0.5 * step.dt_s
     for axis in range(3):
         turn, speed, place = ATTITUDE + axis, VELOCITY + axis, POSITION + axis
-        p[turn, turn] += min(step.unknown_angle, max(_MOST_ANGLE - p[turn, turn], 0.0))
-        variance = min(step.unknown_velocity, max(_MOST_VELOCITY - p[speed, speed], 0.0))
+        unknown_angle = _TURN_OF_SPEED * _TURN_OF_SPEED * step.unknown
+        p[turn, turn] += min(unknown_angle, max(_MOST_ANGLE - p[turn, turn], 0.0))
+        variance = min(step.unknown, max(_MOST_VELOCITY - p[speed, speed], 0.0))
         p[speed, speed] += variance
         p[speed, place] += half_s * variance
         p[place, place] += half_s * half_s * variance

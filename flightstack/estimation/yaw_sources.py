@@ -6,7 +6,7 @@ from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Quaternion, Vector3
 from flightstack.core.geometry import rotate, wrap_pi
 from flightstack.core.portable_math import atan2, sin_cos
-from flightstack.estimation.alignment import align_yaw, set_field
+from flightstack.estimation.alignment import align_yaw, set_field, turn_to_field
 from flightstack.estimation.error_state import (
     ATTITUDE,
     EARTH_FIELD,
@@ -56,6 +56,8 @@ _WRONG_YAW_RAD = 0.436
 _CERTAIN_SQUARE = 16.0
 """Square of the difference by its variance from which it is certain."""
 _REFUSED_S = 1.0
+_FIELD_STAGE = 4
+"""First of three stages in which the measured field is fused after an alignment."""
 
 
 @compiled
@@ -93,8 +95,8 @@ def _start_field(m: MemoryRecord, f: Filter, field: Vector3, params: EstimatorPa
 def take_earth_field(m: MemoryRecord, f: Filter, stage: int, params: EstimatorParams) -> int:
     """Correct yaw and field with the Earth's field when it has become known; return the next stage.
 
-    On the ground, or if it is far off, the yaw is aligned again. In flight it changes as far as it depends on the
-    field: by its declination first, then by its three components.
+    On the ground, or if it is far off, the yaw is aligned again, and the measured field is fused. In flight the yaw
+    changes as far as it depends on the field: by its declination first, then by its three components.
     """
     flags = m["flags"]
     if stage == 0:
@@ -104,16 +106,25 @@ def take_earth_field(m: MemoryRecord, f: Filter, stage: int, params: EstimatorPa
             flags[FIELD_IS_NEW] = 0
             return NOTHING
         return _begin_earth_field(m, f, params)
-    value = m["earth"][stage - 1]
+    if stage >= _FIELD_STAGE:
+        fuse_field_axis(f, stage - _FIELD_STAGE, read_vector(m["field"], 0), params)
+    else:
+        _fuse_known_field(m, f, stage - 1, params)
+    if stage == _FIELD_STAGE - 1 or stage == _FIELD_STAGE + 2:
+        _count_turn(m, f)
+        return 0
+    return stage + 1
+
+
+@compiled
+def _fuse_known_field(m: MemoryRecord, f: Filter, axis: int, params: EstimatorParams) -> None:
+    """Fuse a component of the Earth's field."""
+    value = m["earth"][axis]
     noise = params.earth_field_gauss + params.field_scale * abs(value)
     clear(f.h)
-    f.h[EARTH_FIELD + stage - 1] = 1.0
+    f.h[EARTH_FIELD + axis] = 1.0
     of_model = Noise(noise, noise, noise, 1e3, 0.0)
-    fuse(f, KNOWN_FIELD + stage - 1, value - f.nominal[15 + stage], of_model, 0.0)
-    if stage < 3:
-        return stage + 1
-    _count_turn(m, f)
-    return 0
+    fuse(f, KNOWN_FIELD + axis, value - f.nominal[16 + axis], of_model, 0.0)
 
 
 @compiled
@@ -126,9 +137,8 @@ def _begin_earth_field(m: MemoryRecord, f: Filter, params: EstimatorParams) -> i
     was_rad = atan2(held.y, held.x)
     change_rad = wrap_pi(atan2(known.y, known.x) - was_rad)
     if m["flags"][LANDED] == 1 or abs(change_rad) > _LARGEST_TURN_RAD:
-        align_yaw(f, read_vector(m["field"], 0), known, m["earth"][3], params)
-        _count_turn(m, f)
-        return 0
+        turn_to_field(f, read_vector(m["field"], 0), known, m["earth"][3], params)
+        return _FIELD_STAGE
     _fuse_declination(f, was_rad, change_rad)
     return 1
 

@@ -15,7 +15,7 @@ from tests.support.filter_flights import STREAMS
 from tests.support.tools import missing
 
 NEVER = {
-    "for (int32_t count = 0; count < 8; count++) {": "the last source ends the step",
+    "for (int32_t count = 0; count < 9; count++) {": "the last source ends the step",
     "for (int32_t count = 0; count < 256; count++) {": "a step has fewer parts",
     "for (int32_t count_2 = 0; count_2 < 256; count_2++) {": "all steps that wait have fewer parts",
     "if (m->flags[FS_LANDED] == 1 || m->flags[FS_HAS_GNSS] == 0) {": "a velocity comes with a position",

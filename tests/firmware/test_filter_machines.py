@@ -15,7 +15,7 @@ FLIGHT = "square" if NIGHTLY else "hop"
 AVR_EVENTS = 3000 if NIGHTLY else 500
 """From the start to behind the alignment; a simulated AVR takes 100 events in a second."""
 MEAN_INSTRUCTIONS = {"hop": 4140, "square": 4370}
-MOST_INSTRUCTIONS, OUTPUT_INSTRUCTIONS = 14_130, 895
+MOST_INSTRUCTIONS, OUTPUT_INSTRUCTIONS = 14_130, 940
 MOST_OF_PART = {
     "predict": 405, "predict errors": 3630, "predict yaw models": 1500, "drift of GNSS": 400,
     "fuse GNSS velocity": 5610, "fuse GNSS position": 5830, "fuse field": 7200, "fuse barometer": 5820,

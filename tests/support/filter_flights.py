@@ -206,14 +206,16 @@ def _new_earth_field(events: Events, turn_rad: float) -> list[Event]:
 
 
 def _broken(events: Events) -> list[Event]:
-    """Give samples that are not finite, out of order, without a duration, and a gap."""
+    """Give samples that are not finite, out of order, without a duration, a gap, and a hit beyond the range."""
     middle_s = _time_of(events[len(events) // 2])
     made = []
     for number, event in enumerate(events):
         if event.kind == IMU and middle_s < _time_of(event) < middle_s + 0.2:
             continue
-        made.append(event)
         row = event.row.copy()
+        if event.kind == IMU and 0.5 <= _time_of(event) - middle_s < 0.504:
+            row[6] = 300.0
+        made.append(Event(event.kind, row.copy()))
         if number % 50 == 0:
             row[-1] = np.nan
             made.append(Event(event.kind, row) if event.kind in (IMU, MAG_RING) else event)

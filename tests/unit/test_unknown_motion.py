@@ -82,9 +82,7 @@ def test_gnss_velocity_is_believed_after_a_gap_with_unseen_acceleration(gap_s: f
     accel = np.tile([2.5, 0.0, 0.0], (round(gap_s / STEP_S), 1))
     estimator = list(fed(START_S + gap_s + 2.0, accel, gap_s))[-1]
     observed = estimator.memory["observations"][0, GNSS_VELOCITY]
-    assert (
-        observed[REFUSED] == 0.0
-    )  # of 0.4 s: 14 while an earlier step had the uncertainty
+    assert observed[REFUSED] == 0.0  # of 0.4 s: 14 while an earlier step had the uncertainty
     assert abs(estimator.state().velocity_ned_m_s.x - 2.5 * gap_s) < 0.1  # measured 0.04
 
 

@@ -89,7 +89,8 @@ static bool begin(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, fs_re
     fs_predict_yaw(m, f, &step);
     fs_predict(f, &step, params);
     if (is_covariance_due(m, f, r, params)) {
-        fs_predict_errors(f, &step, params);
+        const fs_imu_noise noise_of = fs_noise_of(m->sums);
+        fs_predict_errors(f, &noise_of, params);
     }
     fs_add_unknown(f, &step);
     fs_add_fault_noise(m->checks, f, step.dt_s);
@@ -117,6 +118,7 @@ static bool stands(const fs_estimator_memory *m, const fs_estimator_params *para
 static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t stage,
                     const fs_estimator_params *params)
 {
+    (void)r;
     int32_t axis = stage;
     if (stage == 0) {
         if (f->clock[0] - m->rest_s[0] < FS_REST_PERIOD_S || !stands(m, params)) {
@@ -130,8 +132,9 @@ static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int
     if (axis < 3) {
         fs_fuse_rest_velocity(f, axis, params);
     } else {
-        const fs_delta_sample step = fs_read_step(r->imu[fs_slot_of(r, FS_IMU_RING, FS_IMU_ROWS, 0)]);
-        const fs_real density = fs_max(fs_max(step.gyro_density.x, step.gyro_density.y), step.gyro_density.z);
+        const fs_imu_noise noise_of = fs_noise_of(m->sums);
+        const fs_vector3 noise = noise_of.gyro;
+        const fs_real density = fs_max(fs_max(noise.x, noise.y), noise.z);
         const fs_vector3 mean_rate = fs_mean_rate(m->sums);
         fs_fuse_rest_rate(f, axis - 3, &mean_rate, density / FS_REST_MEAN_S, params);
     }

@@ -59,7 +59,7 @@ fs_quaternion fs_level_attitude(const fs_vector3 *force, fs_real yaw_rad)
     return fs_quaternion_from_euler(roll, pitch, yaw_rad);
 }
 
-/* Return the direction [rad] of the Earth's field. alignment.py:112 */
+/* Return the direction [rad] of the Earth's field. alignment.py:121 */
 static fs_real north(const fs_vector3 *earth, fs_real declination_rad)
 {
     if (earth->x != FS_LIT(0.0) || earth->y != FS_LIT(0.0)) {
@@ -70,7 +70,7 @@ static fs_real north(const fs_vector3 *earth, fs_real declination_rad)
 
 /*
  * Set the covariance of the field: along it by a share of it, across it by an error of its direction.
- * alignment.py:136
+ * alignment.py:145
  */
 static void set_field_variances(fs_real p[27][27], const fs_vector3 *earth, fs_real scale, fs_real turn_rad,
                                 const fs_estimator_params *params)
@@ -85,7 +85,7 @@ static void set_field_variances(fs_real p[27][27], const fs_vector3 *earth, fs_r
     fs_reset_variance(p, FS_BODY_FIELD, 3, params->body_field_gauss * params->body_field_gauss);
 }
 
-/* alignment.py:120 */
+/* alignment.py:129 */
 void fs_set_field(fs_filter *f, const fs_vector3 *level, const fs_vector3 *earth, fs_real declination_rad,
                   const fs_estimator_params *params)
 {
@@ -110,9 +110,9 @@ void fs_set_field(fs_filter *f, const fs_vector3 *level, const fs_vector3 *earth
     set_field_variances(f->covariance, &start, scale, turn_rad, params);
 }
 
-/* alignment.py:97 */
-fs_real fs_align_yaw(fs_filter *f, const fs_vector3 *field, const fs_vector3 *earth, fs_real declination_rad,
-                     const fs_estimator_params *params)
+/* alignment.py:107 */
+fs_real fs_turn_to_field(fs_filter *f, const fs_vector3 *field, const fs_vector3 *earth, fs_real declination_rad,
+                         const fs_estimator_params *params)
 {
     const fs_nominal n = fs_read_nominal(f->nominal);
     const fs_vector3 level = fs_rotate(&n.attitude, field);
@@ -122,8 +122,16 @@ fs_real fs_align_yaw(fs_filter *f, const fs_vector3 *field, const fs_vector3 *ea
     set_attitude(f, &turned);
     fs_reset_variance(f->covariance, FS_ATTITUDE + 2, 1, FS_UNKNOWN_YAW_RAD * FS_UNKNOWN_YAW_RAD);
     fs_set_field(f, &level, earth, declination_rad, params);
-    fs_fuse_field(f, field, params);
     return turn;
+}
+
+/* alignment.py:97 */
+fs_real fs_align_yaw(fs_filter *f, const fs_vector3 *field, const fs_vector3 *earth, fs_real declination_rad,
+                     const fs_estimator_params *params)
+{
+    const fs_real turn_rad = fs_turn_to_field(f, field, earth, declination_rad, params);
+    fs_fuse_field(f, field, params);
+    return turn_rad;
 }
 
 /* alignment.py:69 */

@@ -18,15 +18,19 @@ fs_quaternion fs_level_attitude(const fs_vector3 *force, fs_real yaw_rad);
 
 /*
  * Set the states of the field: the Earth's field, or level, the measured one in level axes, turned to north.
- * alignment.py:120
+ * alignment.py:129
  */
 void fs_set_field(fs_filter *f, const fs_vector3 *level, const fs_vector3 *earth, fs_real declination_rad,
                   const fs_estimator_params *params);
 
 /*
  * Turn the attitude to the yaw of the measured field, and set the states of the field; return the turn [rad].
- * alignment.py:97
+ * alignment.py:107
  */
+fs_real fs_turn_to_field(fs_filter *f, const fs_vector3 *field, const fs_vector3 *earth, fs_real declination_rad,
+                         const fs_estimator_params *params);
+
+/* Turn the attitude to the yaw of the measured field, and fuse the field; return the turn [rad]. alignment.py:97 */
 fs_real fs_align_yaw(fs_filter *f, const fs_vector3 *field, const fs_vector3 *earth, fs_real declination_rad,
                      const fs_estimator_params *params);
 

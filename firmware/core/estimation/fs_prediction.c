@@ -20,22 +20,23 @@
 #define FS_BODY_FIELD 18
 #define FS_WIND 21
 #define FS_BARO_BIAS 23
+#define FS_TURN_OF_SPEED FS_LIT(0.1)
 #define FS_MOST_ANGLE FS_LIT(0.09)
 #define FS_MOST_VELOCITY FS_LIT(25.0)
 
-/* prediction.py:84 */
+/* prediction.py:89 */
 fs_motion fs_motion_of(const fs_nominal *n)
 {
     return (fs_motion){n->attitude, n->velocity_ned_m_s, n->position_ned_m};
 }
 
-/* prediction.py:64 */
+/* prediction.py:69 */
 fs_vector3 fs_less_bias(const fs_vector3 *v, const fs_vector3 *bias, fs_real dt_s)
 {
     return (fs_vector3){v->x - bias->x * dt_s, v->y - bias->y * dt_s, v->z - bias->z * dt_s};
 }
 
-/* prediction.py:70 */
+/* prediction.py:75 */
 fs_motion fs_moved(const fs_motion *start, const fs_vector3 *angle, const fs_vector3 *delta_velocity, fs_real dt_s,
                    fs_real gravity)
 {
@@ -57,7 +58,7 @@ fs_motion fs_moved(const fs_motion *start, const fs_vector3 *angle, const fs_vec
     };
 }
 
-/* prediction.py:90 */
+/* prediction.py:95 */
 fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion)
 {
     return (fs_nominal){
@@ -75,7 +76,7 @@ fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion)
     };
 }
 
-/* prediction.py:161 */
+/* prediction.py:166 */
 void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_params *params)
 {
     const fs_nominal n = fs_read_nominal(f->nominal);
@@ -98,7 +99,7 @@ void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_
     f->clock[0] = sample->time_s;
 }
 
-/* prediction.py:108 */
+/* prediction.py:113 */
 static void add(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
 {
     for (int32_t i = at; i < at + count; i++) {
@@ -112,7 +113,7 @@ static void add(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
  * An error e gives e omega T after a turn of duration T. As white noise that is a density of (e omega)^2 T, with T =
  * 1 s.
  *
- * prediction.py:125
+ * prediction.py:130
  */
 static fs_real turn_variance(const fs_vector3 *angle, fs_real dt_s, const fs_estimator_params *params)
 {
@@ -121,7 +122,7 @@ static fs_real turn_variance(const fs_vector3 *angle, fs_real dt_s, const fs_est
     return error * error * square * (FS_TURN_S / dt_s);
 }
 
-/* Add the noise of one axis of the body, a unit vector in the world frame. prediction.py:114 */
+/* Add the noise of one axis of the body, a unit vector in the world frame. prediction.py:119 */
 static void add_body_noise(fs_real p[27][27], int32_t at, const fs_vector3 *axis, fs_real variance)
 {
     p[at][at] += variance * axis->x * axis->x;
@@ -132,9 +133,9 @@ static void add_body_noise(fs_real p[27][27], int32_t at, const fs_vector3 *axis
     p[at + 2][at + 2] += variance * axis->z * axis->z;
 }
 
-/* prediction.py:136 */
+/* prediction.py:141 */
 static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vector3 *angle, fs_real dt_s,
-                              const fs_delta_sample *sample, const fs_estimator_params *params)
+                              const fs_imu_noise *noise, const fs_estimator_params *params)
 {
     const fs_real share = f->clock[1];
     const fs_real gyro = params->gyro_noise;
@@ -145,12 +146,12 @@ static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vec
     const fs_vector3 y = fs_rotate(q, &v_2);
     const fs_vector3 z = fs_cross(&x, &y);
     add(f->covariance, FS_ATTITUDE, 3, turn_variance(angle, dt_s, params));
-    add_body_noise(f->covariance, FS_ATTITUDE, &x, fs_max(gyro * gyro, share * sample->gyro_density.x) * dt_s);
-    add_body_noise(f->covariance, FS_ATTITUDE, &y, fs_max(gyro * gyro, share * sample->gyro_density.y) * dt_s);
-    add_body_noise(f->covariance, FS_ATTITUDE, &z, fs_max(gyro * gyro, share * sample->gyro_density.z) * dt_s);
-    add_body_noise(f->covariance, FS_VELOCITY, &x, fs_max(accel * accel, share * sample->accel_density.x) * dt_s);
-    add_body_noise(f->covariance, FS_VELOCITY, &y, fs_max(accel * accel, share * sample->accel_density.y) * dt_s);
-    add_body_noise(f->covariance, FS_VELOCITY, &z, fs_max(accel * accel, share * sample->accel_density.z) * dt_s);
+    add_body_noise(f->covariance, FS_ATTITUDE, &x, fs_max(gyro * gyro, share * noise->gyro.x) * dt_s);
+    add_body_noise(f->covariance, FS_ATTITUDE, &y, fs_max(gyro * gyro, share * noise->gyro.y) * dt_s);
+    add_body_noise(f->covariance, FS_ATTITUDE, &z, fs_max(gyro * gyro, share * noise->gyro.z) * dt_s);
+    add_body_noise(f->covariance, FS_VELOCITY, &x, fs_max(accel * accel, share * noise->accel.x) * dt_s);
+    add_body_noise(f->covariance, FS_VELOCITY, &y, fs_max(accel * accel, share * noise->accel.y) * dt_s);
+    add_body_noise(f->covariance, FS_VELOCITY, &z, fs_max(accel * accel, share * noise->accel.z) * dt_s);
     add(f->covariance, FS_POSITION, 3, FS_LIT(1e-08) * dt_s);
     add(f->covariance, FS_GYRO_BIAS, 3, params->gyro_bias_walk * params->gyro_bias_walk * dt_s);
     add(f->covariance, FS_ACCEL_BIAS, 3, params->accel_bias_walk * params->accel_bias_walk * dt_s);
@@ -160,8 +161,8 @@ static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vec
     add(f->covariance, FS_BARO_BIAS, 1, params->baro_walk * params->baro_walk * dt_s);
 }
 
-/* prediction.py:177 */
-void fs_predict_errors(fs_filter *f, const fs_delta_sample *newest, const fs_estimator_params *params)
+/* prediction.py:182 */
+void fs_predict_errors(fs_filter *f, const fs_imu_noise *noise, const fs_estimator_params *params)
 {
     const fs_real dt_s = f->behind[0];
     const fs_vector3 angle = fs_read_vector(f->behind, 1);
@@ -177,13 +178,13 @@ void fs_predict_errors(fs_filter *f, const fs_delta_sample *newest, const fs_est
     const fs_quaternion conjugate = fs_conjugate(&middle);
     const fs_vector3 rotate = fs_rotate(&conjugate, &change);
     fs_predict_covariance(f->covariance, &middle, &rotate, dt_s);
-    add_process_noise(f, &middle, &angle, dt_s, newest, params);
+    add_process_noise(f, &middle, &angle, dt_s, noise, params);
     for (int32_t i = 0; i < 7; i++) {
         f->behind[i] = FS_LIT(0.0);
     }
 }
 
-/* prediction.py:192 */
+/* prediction.py:197 */
 void fs_add_unknown(fs_filter *f, const fs_delta_sample *step)
 {
     const fs_real half_s = FS_LIT(0.5) * step->dt_s;
@@ -191,9 +192,10 @@ void fs_add_unknown(fs_filter *f, const fs_delta_sample *step)
         const int32_t turn = FS_ATTITUDE + axis;
         const int32_t speed = FS_VELOCITY + axis;
         const int32_t place = FS_POSITION + axis;
-        f->covariance[turn][turn] += fs_min(step->unknown_angle,
+        const fs_real unknown_angle = FS_TURN_OF_SPEED * FS_TURN_OF_SPEED * step->unknown;
+        f->covariance[turn][turn] += fs_min(unknown_angle,
                                             fs_max(FS_MOST_ANGLE - f->covariance[turn][turn], FS_LIT(0.0)));
-        const fs_real variance = fs_min(step->unknown_velocity,
+        const fs_real variance = fs_min(step->unknown,
                                         fs_max(FS_MOST_VELOCITY - f->covariance[speed][speed], FS_LIT(0.0)));
         f->covariance[speed][speed] += variance;
         f->covariance[speed][place] += half_s * variance;

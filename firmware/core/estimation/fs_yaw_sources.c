@@ -24,11 +24,12 @@
 #define FS_MAG_FAULT 7
 #define FS_LANDED 1
 #define FS_LARGEST_TURN_RAD FS_LIT(0.5)
-#define FS_COUNTED_TURN_RAD FS_LIT(0.01)
+#define FS_FIELD_STAGE 4
 #define FS_EARTH_FIELD 15
 #define FS_DECLINATION_NOISE_RAD FS_LIT(0.01)
 #define FS_DECLINATION 22
 #define FS_KNOWN_FIELD 19
+#define FS_COUNTED_TURN_RAD FS_LIT(0.01)
 #define FS_HAS_YAW 6
 #define FS_HAS_GNSS 3
 #define FS_YAW_TURN 0
@@ -40,7 +41,7 @@
 #define FS_CERTAIN_SQUARE FS_LIT(16.0)
 #define FS_REFUSED_S FS_LIT(1.0)
 
-/* yaw_sources.py:167 */
+/* yaw_sources.py:177 */
 void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_sample *step)
 {
     if (m->yaw_fix[FS_YAW_UPDATES] > FS_LIT(0.0)) {
@@ -53,28 +54,8 @@ void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_s
 }
 
 /*
- * Count the turn since the attitude in pending as a reset of the yaw; the field is not new any more.
- * yaw_sources.py:137
- */
-static void count_turn(fs_estimator_memory *m, const fs_filter *f)
-{
-    m->flags[FS_FIELD_IS_NEW] = 0;
-    const fs_nominal read_nominal = fs_read_nominal(f->nominal);
-    const fs_quaternion before_2 = {
-        .w = m->pending[0],
-        .x = m->pending[1],
-        .y = m->pending[2],
-        .z = m->pending[3],
-    };
-    const fs_real turn_rad = fs_turn_between(&before_2, &read_nominal.attitude);
-    if (fs_abs(turn_rad) > FS_COUNTED_TURN_RAD) {
-        fs_count_yaw_reset(m, turn_rad);
-    }
-}
-
-/*
  * Turn the Earth's field by a change of the declination; the yaw follows as far as it depends on it.
- * yaw_sources.py:149
+ * yaw_sources.py:159
  */
 static void fuse_declination(fs_filter *f, fs_real was_rad, fs_real change_rad)
 {
@@ -102,7 +83,7 @@ static void fuse_declination(fs_filter *f, fs_real was_rad, fs_real change_rad)
     f->nominal[17] = along * sine + across * cosine;
 }
 
-/* Align the yaw again, or fuse the declination; return the next stage. yaw_sources.py:120 */
+/* Align the yaw again, or fuse the declination; return the next stage. yaw_sources.py:131 */
 static int32_t begin_earth_field(fs_estimator_memory *m, fs_filter *f, const fs_estimator_params *params)
 {
     const fs_vector3 known = fs_read_vector(m->earth, 0);
@@ -117,15 +98,46 @@ static int32_t begin_earth_field(fs_estimator_memory *m, fs_filter *f, const fs_
     const fs_real change_rad = fs_wrap_pi(fs_atan2(known.y, known.x) - was_rad);
     if (m->flags[FS_LANDED] == 1 || fs_abs(change_rad) > FS_LARGEST_TURN_RAD) {
         const fs_vector3 read_vector = fs_read_vector(m->field, 0);
-        (void)fs_align_yaw(f, &read_vector, &known, m->earth[3], params);
-        count_turn(m, f);
-        return 0;
+        (void)fs_turn_to_field(f, &read_vector, &known, m->earth[3], params);
+        return FS_FIELD_STAGE;
     }
     fuse_declination(f, was_rad, change_rad);
     return 1;
 }
 
-/* yaw_sources.py:93 */
+/* Fuse a component of the Earth's field. yaw_sources.py:120 */
+static void fuse_known_field(const fs_estimator_memory *m, fs_filter *f, int32_t axis,
+                             const fs_estimator_params *params)
+{
+    const fs_real value = m->earth[axis];
+    const fs_real noise = params->earth_field_gauss + params->field_scale * fs_abs(value);
+    fs_clear(f->h);
+    f->h[FS_EARTH_FIELD + axis] = FS_LIT(1.0);
+    const fs_noise of_model = {noise, noise, noise, FS_LIT(1000.0), FS_LIT(0.0)};
+    (void)fs_fuse(f, FS_KNOWN_FIELD + axis, value - f->nominal[16 + axis], &of_model, FS_LIT(0.0));
+}
+
+/*
+ * Count the turn since the attitude in pending as a reset of the yaw; the field is not new any more.
+ * yaw_sources.py:147
+ */
+static void count_turn(fs_estimator_memory *m, const fs_filter *f)
+{
+    m->flags[FS_FIELD_IS_NEW] = 0;
+    const fs_nominal read_nominal = fs_read_nominal(f->nominal);
+    const fs_quaternion before_2 = {
+        .w = m->pending[0],
+        .x = m->pending[1],
+        .y = m->pending[2],
+        .z = m->pending[3],
+    };
+    const fs_real turn_rad = fs_turn_between(&before_2, &read_nominal.attitude);
+    if (fs_abs(turn_rad) > FS_COUNTED_TURN_RAD) {
+        fs_count_yaw_reset(m, turn_rad);
+    }
+}
+
+/* yaw_sources.py:95 */
 int32_t fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, int32_t stage, const fs_estimator_params *params)
 {
     if (stage == 0) {
@@ -138,20 +150,20 @@ int32_t fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, int32_t stage,
         }
         return begin_earth_field(m, f, params);
     }
-    const fs_real value = m->earth[stage - 1];
-    const fs_real noise = params->earth_field_gauss + params->field_scale * fs_abs(value);
-    fs_clear(f->h);
-    f->h[FS_EARTH_FIELD + stage - 1] = FS_LIT(1.0);
-    const fs_noise of_model = {noise, noise, noise, FS_LIT(1000.0), FS_LIT(0.0)};
-    (void)fs_fuse(f, FS_KNOWN_FIELD + stage - 1, value - f->nominal[15 + stage], &of_model, FS_LIT(0.0));
-    if (stage < 3) {
-        return stage + 1;
+    if (stage >= FS_FIELD_STAGE) {
+        const fs_vector3 read_vector = fs_read_vector(m->field, 0);
+        fs_fuse_field_axis(f, stage - FS_FIELD_STAGE, &read_vector, params);
+    } else {
+        fuse_known_field(m, f, stage - 1, params);
     }
-    count_turn(m, f);
-    return 0;
+    if (stage == FS_FIELD_STAGE - 1 || stage == FS_FIELD_STAGE + 2) {
+        count_turn(m, f);
+        return 0;
+    }
+    return stage + 1;
 }
 
-/* Note the field; set the states of the field, and an unknown yaw, by the first one. yaw_sources.py:77 */
+/* Note the field; set the states of the field, and an unknown yaw, by the first one. yaw_sources.py:79 */
 static void start_field(fs_estimator_memory *m, fs_filter *f, const fs_vector3 *field,
                         const fs_estimator_params *params)
 {
@@ -174,7 +186,7 @@ static void start_field(fs_estimator_memory *m, fs_filter *f, const fs_vector3 *
     }
 }
 
-/* yaw_sources.py:62 */
+/* yaw_sources.py:64 */
 int32_t fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t axis,
                       const fs_estimator_params *params)
 {
@@ -189,7 +201,7 @@ int32_t fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[],
     return axis < 2 ? axis + 1 : 0;
 }
 
-/* Take tilt and yaw from the models, velocity and position from GNSS. yaw_sources.py:214 */
+/* Take tilt and yaw from the models, velocity and position from GNSS. yaw_sources.py:224 */
 static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 {
     m->yaw_fix[FS_YAW_WRONG_S] = FS_LIT(0.0);
@@ -220,7 +232,7 @@ static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real 
 
 /*
  * Return True if the models have contradicted the yaw for a second, or do while GNSS velocities are refused.
- * yaw_sources.py:200
+ * yaw_sources.py:210
  */
 static bool is_wrong(fs_estimator_memory *m, fs_real time_s)
 {
@@ -238,7 +250,7 @@ static bool is_wrong(fs_estimator_memory *m, fs_real time_s)
     return lasts || (differs && is_refused);
 }
 
-/* yaw_sources.py:176 */
+/* yaw_sources.py:186 */
 void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 {
     if (m->flags[FS_LANDED] == 1 || m->flags[FS_HAS_GNSS] == 0) {

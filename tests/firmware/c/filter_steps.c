@@ -2,6 +2,7 @@
 
 #include "fs_estimation_math.h"
 #include "fs_fusion.h"
+#include "fs_imu_input.h"
 #include "fs_output_predictor.h"
 #include "fs_yaw_estimator.h"
 
@@ -143,6 +144,7 @@ void filter_steps_costs(filter_steps *s, uint32_t costs[FILTER_PARTS])
     static const fs_vector3 still = {FS_LIT(0.001), FS_LIT(0.002), FS_LIT(0.003)};
     static const fs_vector3 force = {FS_LIT(0.1), FS_LIT(0.2), FS_LIT(-0.4)};
     static fs_real gnss[10];
+    const fs_imu_noise noise = fs_noise_of(m->sums);
     static fs_delta_sample step;
     fs_motion motion;
     fs_nominal nominal;
@@ -161,7 +163,7 @@ void filter_steps_costs(filter_steps *s, uint32_t costs[FILTER_PARTS])
     step.angle_rad = still;
     step.velocity_m_s = force;
     COST(0, fs_predict(f, &step, p));
-    COST(14, fs_predict_errors(f, &step, p));
+    COST(14, fs_predict_errors(f, &noise, p));
     COST(1, fs_predict_models(m->yaw_models, &still, &force, FS_LIT(0.01)));
     COST(2, fs_drift_gnss_bias(f, gnss, FS_LIT(0.2), p));
     COST(3, fs_fuse_gnss_velocity(f, gnss, 0, FS_LIT(0.0), p));
