@@ -83,6 +83,8 @@ class _Truth:
     def __init__(self, world: World) -> None:
         self._simulator, self._rows = world.engine.simulator, []  # type: ignore[var-annotated]
         self._world = world
+        self.start_m = float(self._simulator.frame.state[2])
+        """Position down of the vehicle at rest."""
         world.watch(self._take)
 
     def _take(self) -> None:
@@ -112,14 +114,15 @@ def _errors(world: World, truth: _Truth) -> tuple[FloatArray, FloatArray]:
     assert estimation.estimator.frame is not None
     record = estimation.estimator.memory[0]
     x, true = record["nominal"], truth.state_at(float(record["clock"][0]))
-    origin = LocalFrame(world.setup.home).to_ned(estimation.estimator.frame.origin)
+    north_m, east_m, _ = LocalFrame(world.setup.home).to_ned(estimation.estimator.frame.origin)
+    origin = np.array([north_m, east_m, truth.start_m])  # the height is that above the start
     attitude, estimate = Quaternion(*true[6:10].tolist()), Quaternion(*x[:4].tolist())
     turn = rotation_vector(quaternion_product(attitude, conjugate(estimate)))
     errors = np.concatenate(
         [
             turn,
             true[3:6] - x[4:7],
-            true[:3] - x[7:10] - np.array(origin),
+            true[:3] - x[7:10] - origin,
             truth.biases() - x[10:16],
         ]
     )
@@ -131,12 +134,12 @@ def fly(kind: str, seed: int) -> tuple[dict[str, float], dict[str, float]]:
     route, conditions = KINDS[kind]
     with World(vehicle="x_quad", state="estimated", seed=seed, **conditions) as world:
         world.wait_until_ready()
+        truth = _Truth(world)
         world.takeoff(5.0)
         world.run_for(CLIMB_S)
         assert world.engine.stack.estimation is not None
         observations = world.engine.stack.estimation.estimator.memory["observations"][0]
         before = observations.copy()
-        truth = _Truth(world)
         route(world)
         errors, covariance = _errors(world, truth)
         counts = observations - before
