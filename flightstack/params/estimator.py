@@ -43,8 +43,8 @@ ESTIMATOR_PARAMS = (
     _param("IMU_ACCEL_RANGE", 156.9, 10.0, 1e5, "m/s^2", "Full scale of the accelerometer: a specific force beyond it,"
            " as in an impact, is not measured", "accel_range_m_s2", 1.0, 1, group="Sensors"),
     # process
-    _param("EKF2_GYR_NOISE", 0.009, 1e-4, 0.1, "rad/s", "Gyro noise for the prediction", "gyro_noise", _STEP, 4),
-    _param("EKF2_ACC_NOISE", 0.135, 0.01, 1.0, "m/s^2", "Accelerometer noise for the prediction", "accel_noise", _STEP),
+    _param("EKF2_GYR_NOISE", 0.005, 1e-4, 0.1, "rad/s", "Gyro noise for the prediction", "gyro_noise", _STEP, 4),
+    _param("EKF2_ACC_NOISE", 0.07, 0.01, 1.0, "m/s^2", "Accelerometer noise for the prediction", "accel_noise", _STEP),
     _param("EKF2_GYR_B_NOISE", 0.0034, 0.0, 0.01, "rad/s^2", "Process noise of the gyro bias", "gyro_bias_walk", _STEP,
            4),
     _param("EKF2_ACC_B_NOISE", 0.011, 0.0, 0.1, "m/s^3", "Process noise of the accelerometer bias", "accel_bias_walk",
@@ -57,7 +57,7 @@ ESTIMATOR_PARAMS = (
     # initial uncertainty
     _param("EKF2_ANGERR_INIT", 0.05, 0.0, 0.5, "rad", "Initial uncertainty of tilt", "tilt_rad"),
     _param("EKF2_GBIAS_INIT", 0.02, 0.0, 0.2, "rad/s", "Initial uncertainty of the gyro bias", "gyro_bias_rad_s"),
-    _param("EKF2_ABIAS_INIT", 0.1, 0.0, 0.5, "m/s^2", "Initial uncertainty of the accelerometer bias",
+    _param("EKF2_ABIAS_INIT", 0.05, 0.0, 0.5, "m/s^2", "Initial uncertainty of the accelerometer bias",
            "accel_bias_m_s2"),
     # GNSS
     _param("EKF2_GPS_DELAY", 110.0, 0.0, 300.0, "ms", "Delay of GNSS measurements", "gnss_delay_s", _MS, 1),
@@ -67,7 +67,7 @@ ESTIMATOR_PARAMS = (
     _param("EKF2_GPS_P_GATE", 5.0, 1.0, 100.0, "SD", "Gate of GNSS position", "gnss_position_gate", 1.0, 1),
     # height
     _param("EKF2_BARO_DELAY", 0.0, 0.0, 300.0, "ms", "Delay of the barometer", "baro_delay_s", _MS, 1),
-    _param("EKF2_BARO_NOISE", 0.1, 0.01, 15.0, "m", "Least noise of the barometer", "baro_noise_m"),
+    _param("EKF2_BARO_NOISE", 0.05, 0.01, 15.0, "m", "Least noise of the barometer", "baro_noise_m"),
     _param("EKF2_BARO_GATE", 5.0, 1.0, 100.0, "SD", "Gate of the barometer", "baro_gate", 1.0, 1),
     _param("EKF2_RNG_DELAY", 5.0, 0.0, 300.0, "ms", "Delay of the rangefinder", "range_delay_s", _MS, 1),
     _param("EKF2_RNG_NOISE", 0.1, 0.01, 10.0, "m", "Least noise of the rangefinder", "range_noise_m"),
@@ -82,7 +82,7 @@ ESTIMATOR_PARAMS = (
     _param("EKF2_MCOEF", 0.15, 0.0, 1.0, "1/s", "Drag of the rotors' momentum, per m/s", "momentum_drag_1_s"),
     # magnetometer
     _param("EKF2_MAG_DELAY", 0.0, 0.0, 300.0, "ms", "Delay of the magnetometer", "mag_delay_s", _MS, 1),
-    _param("EKF2_MAG_NOISE", 0.005, 0.001, 1.0, "gauss", "Least noise of the magnetometer", "mag_noise_gauss"),
+    _param("EKF2_MAG_NOISE", 0.002, 0.001, 1.0, "gauss", "Least noise of the magnetometer", "mag_noise_gauss"),
     _param("EKF2_MAG_GATE", 3.0, 1.0, 100.0, "SD", "Gate of the magnetometer", "mag_gate", 1.0, 1),
     # first fix
     _param("EKF2_REQ_EPH", 3.0, 2.0, 100.0, "m", "Horizontal accuracy that the first fix needs; unknown counts as 5",

@@ -2,8 +2,8 @@
 #include "fs_estimator.h"
 
 const fs_estimator_params fs_default_estimator_params = {
-    .gyro_noise = FS_LIT(0.0008049844718999242),
-    .accel_noise = FS_LIT(0.012074767078498866),
+    .gyro_noise = FS_LIT(0.00044721359549995795),
+    .accel_noise = FS_LIT(0.006260990336999412),
     .imu_noise_share = FS_LIT(0.1),
     .gyro_scale_error = FS_LIT(0.0035),
     .gyro_bias_walk = FS_LIT(0.0003041052449399714),
@@ -16,7 +16,7 @@ const fs_estimator_params fs_default_estimator_params = {
     .accel_range_m_s2 = FS_LIT(156.9),
     .tilt_rad = FS_LIT(0.05),
     .gyro_bias_rad_s = FS_LIT(0.02),
-    .accel_bias_m_s2 = FS_LIT(0.1),
+    .accel_bias_m_s2 = FS_LIT(0.05),
     .earth_field_gauss = FS_LIT(0.005),
     .field_scale = FS_LIT(0.1),
     .body_field_gauss = FS_LIT(0.01),
@@ -31,7 +31,7 @@ const fs_estimator_params fs_default_estimator_params = {
     .hold_noise_m = FS_LIT(5.0),
     .hold_velocity_m_s = FS_LIT(3.0),
     .baro_delay_s = FS_LIT(0.0),
-    .baro_noise_m = FS_LIT(0.1),
+    .baro_noise_m = FS_LIT(0.05),
     .baro_largest_noise_m = FS_LIT(3.5),
     .baro_gate = FS_LIT(5.0),
     .range_delay_s = FS_LIT(0.005),
@@ -43,7 +43,7 @@ const fs_estimator_params fs_default_estimator_params = {
     .ballistic_y_kg_m2 = FS_LIT(100.0),
     .momentum_drag_1_s = FS_LIT(0.15),
     .mag_delay_s = FS_LIT(0.0),
-    .mag_noise_gauss = FS_LIT(0.005),
+    .mag_noise_gauss = FS_LIT(0.002),
     .mag_largest_noise_gauss = FS_LIT(0.05),
     .mag_gate = FS_LIT(3.0),
     .mag_corrects_tilt = FS_LIT(0.0),
