@@ -6,6 +6,7 @@ one after the other, so that other load on the machine counts little.
 
 from __future__ import annotations
 
+import argparse
 import math
 import os
 import subprocess
@@ -89,8 +90,15 @@ def main() -> None:
     if sys.argv[1:] == ["--serve"]:
         serve()
         return
-    other = Path(sys.argv[1]).resolve()
-    rounds = int(sys.argv[2]) if len(sys.argv) > 2 else ROUNDS
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.against", description=__doc__)
+    parser.add_argument("directory", type=Path, help="another checkout, with flightstack/testing/world.py")
+    parser.add_argument(
+        "rounds", nargs="?", type=int, default=ROUNDS, help="flights of each (default %(default)s)"
+    )
+    given = parser.parse_args()
+    other, rounds = given.directory.resolve(), given.rounds
+    if not (other / "flightstack" / "testing" / "world.py").is_file():
+        parser.error(f"{other} is no checkout that can be compared: flightstack/testing/world.py is missing")
     rows = [
         (name, ours.text(), theirs.text(), short(ratio.median))
         for name, (ours, theirs, ratio) in compared(other, rounds).items()

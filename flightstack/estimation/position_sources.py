@@ -31,6 +31,7 @@ from flightstack.estimation.resets import count_correction, reset_position, rese
 from flightstack.estimation.source_checks import (
     GNSS_FAULT,
     follow_drift,
+    follow_height_drift,
     position_drifts,
     take_gnss_innovations,
     take_horizontal_innovations,
@@ -83,6 +84,7 @@ def _begin_gnss(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorPa
     for axis in range(2):
         before[_BEFORE + axis], before[_BEFORE + 2 + axis] = f.nominal[7 + axis], f.nominal[4 + axis]
     m["last_gnss_s"][0] = row[0]
+    follow_height_drift(m["checks"], row, m["flags"][LANDED] == 1)
     follow_drift(m["checks"], f, row, horizontal_accuracy(row))
     drift_gnss_bias(f, row, before[_ELAPSED_S], params)
 

@@ -3,8 +3,8 @@
 The mean of the normalised innovations of a sensor is near zero if filter and sensor agree, whatever the noise. A fault
 shows in the signs of several means, as in PX4's check of the vertical acceleration
 (``Ekf::estimateInertialNavFallingLikelihood``): if GNSS and barometer contradict the prediction alike, the
-accelerometer is wrong; if GNSS velocity contradicts it alone for 2 s, the barometer, which then holds the prediction,
-drifts. Position and velocity of GNSS are compared with each other.
+accelerometer is wrong. Position and velocity of GNSS are compared with each other, over 20 s, and so is the pressure
+altitude with the vertical velocity: where they drift apart, the height of GNSS tells which one is wrong.
 """
 
 from __future__ import annotations
@@ -25,28 +25,41 @@ from flightstack.estimation.kalman import (
     Filter,
 )
 
-CHECKS_SIZE = 26
+CHECKS_SIZE = 28
 """Means of the innovations upwards (3); times until which the accelerometer and the barometer count as wrong; altitude
 of the barometer, and the time since which it is equal; time, position and velocity of the last GNSS measurement (7),
-drift of its position from its velocity (3), fault of each axis (3); time since which GNSS velocity contradicts the
-prediction alone, 0 if it does not; means of the innovations of GNSS velocity along north and east, and the time at
-which it contradicted the prediction last, with the sign of its error (2); time of the last altitude."""
+drift of its position from its velocity (3), fault of each axis (3); drift of the barometer, downwards, from the
+velocity of GNSS; means of the innovations of GNSS velocity along north and east, and the time at which it contradicted
+the prediction last, with the sign of its error (2); time of the last altitude; altitude at the last measurement of
+GNSS; 1 if its vertical velocity was blamed last."""
 Checks: TypeAlias = Annotated[FloatArray, CHECKS_SIZE]
 
 _SPEED, _HEIGHT, _PRESSURE, ACCEL_UNTIL_S, BARO_UNTIL_S = 0, 1, 2, 3, 4
 _ALTITUDE, _EQUAL_SINCE_S, _GNSS_S, _PLACE, _MOTION, _DRIFT = 5, 6, 7, 8, 11, 14
-GNSS_FAULT, _ALONE_SINCE_S, _SIDEWAYS, _ONSET_S, _ALTITUDE_S = 17, 20, 21, 23, 25
+GNSS_FAULT, _BARO_DRIFT, _SIDEWAYS, _ONSET_S, _ALTITUDE_S, _ALTITUDE_THEN, _CLIMB_BLAMED = (
+    17,
+    20,
+    21,
+    23,
+    25,
+    26,
+    27,
+)
 CONSISTENT, POSITION_DRIFTS, VELOCITY_IS_WRONG = 0.0, 1.0, 2.0
 """Faults of GNSS along an axis."""
 
 _LEAST_VARIANCE = 1e-12
 _MEAN_S, _LARGEST = 1.0, 3.0
 """Time constant of a mean, and the largest normalised innovation that counts."""
-_LIMIT, _AGREES = 1.0, 0.3
+_LIMIT = 1.0
 """Mean of white innovations: 0.22 (GNSS, 10 Hz) or 0.17 (means of the barometer, 17 Hz)."""
-_ALONE_S, _ACCEL_HOLD_S, _BARO_HOLD_S = 2.0, 1.0, 10.0
-_ACCEL_DENSITY, _ACCEL_BIAS_DENSITY, _BARO_DENSITY = 1.0, 0.25, 0.25
-"""Variance per second that a wrong sensor adds to vertical velocity, accelerometer bias and barometer bias."""
+_ACCEL_HOLD_S, _BARO_HOLD_S = 1.0, 10.0
+_APART_M, _SURELY_APART_M, _LARGEST_CHANGE_M, _SIDES = 1.5, 2.0, 0.5, 0.7
+"""Drift between barometer and GNSS velocity from which the barometer, and from which the velocity counts as wrong;
+change between two measurements that counts at most; share of the drift from which the height of GNSS sides with the
+barometer. A barometer that is blamed wrongly costs little: GNSS holds the height meanwhile."""
+_ACCEL_DENSITY, _ACCEL_BIAS_DENSITY, _BARO_DENSITY, _HEIGHT_DENSITY = 1.0, 0.25, 0.25, 0.1
+"""Variance per second that a wrong sensor adds to vertical velocity, accelerometer bias, barometer bias and height."""
 WRONG_VELOCITY_M_S = 2.0
 """Noise of a GNSS velocity that contradicts other sensors; the filter learns the smaller one again."""
 _STUCK_S, _EQUAL_M = 1.0, 1e-9
@@ -84,25 +97,24 @@ def take_horizontal_innovations(c: Checks, f: Filter, dt_s: float) -> None:
 
 @compiled
 def take_gnss_innovations(c: Checks, f: Filter, dt_s: float, has_baro: bool) -> None:
-    """Take the vertical innovations of GNSS, and decide which sensor is wrong."""
+    """Take the vertical innovations of GNSS, and decide whether accelerometer or barometer is wrong."""
     _take(c, _SPEED, f, GNSS_VELOCITY + 2, -1.0, dt_s)
     _take(c, _HEIGHT, f, GNSS_POSITION + 2, -1.0, dt_s)
     up = 1.0 if c[_SPEED] >= 0.0 else -1.0
-    if up * c[_SPEED] < _LIMIT:
-        c[_ALONE_SINCE_S] = 0.0
+    second = c[_PRESSURE] if has_baro else c[_HEIGHT]
+    if min(up * c[_SPEED], up * second) > _LIMIT:
+        c[ACCEL_UNTIL_S] = f.clock[0] + _ACCEL_HOLD_S
+    apart_m = c[_BARO_DRIFT]
+    if not has_baro or abs(apart_m) < _APART_M:
         return
-    second = up * (c[_PRESSURE] if has_baro else c[_HEIGHT])
-    if second > _LIMIT:
-        c[ACCEL_UNTIL_S], c[_ALONE_SINCE_S] = f.clock[0] + _ACCEL_HOLD_S, 0.0
-    elif c[_ALONE_SINCE_S] == 0.0:
-        c[_ALONE_SINCE_S] = f.clock[0]
-    elif f.clock[0] - c[_ALONE_SINCE_S] > _ALONE_S:
-        if (
-            min(_AGREES - second, up * c[_HEIGHT] - _AGREES) > 0.0
-        ):  # GNSS height sides with it, and the other does not
-            c[BARO_UNTIL_S] = f.clock[0] + _BARO_HOLD_S
-        else:  # nothing sides with the velocity
-            f.observations[GNSS_VELOCITY + 2, NOISE] = WRONG_VELOCITY_M_S * WRONG_VELOCITY_M_S
+    if c[_DRIFT + 2] < _SIDES * apart_m if apart_m > 0.0 else c[_DRIFT + 2] > _SIDES * apart_m:
+        if c[_CLIMB_BLAMED] == 1.0:
+            f.observations[GNSS_VELOCITY + 2, NOISE] = 0.0  # it starts as stated
+        c[_CLIMB_BLAMED] = 0.0
+        c[BARO_UNTIL_S] = f.clock[0] + _BARO_HOLD_S
+    elif abs(apart_m) > _SURELY_APART_M:
+        f.observations[GNSS_VELOCITY + 2, NOISE] = WRONG_VELOCITY_M_S * WRONG_VELOCITY_M_S
+        c[_CLIMB_BLAMED] = 1.0
 
 
 @compiled
@@ -114,6 +126,7 @@ def add_fault_noise(c: Checks, f: Filter, dt_s: float) -> None:
         p[ACCEL_BIAS + 2, ACCEL_BIAS + 2] += _ACCEL_BIAS_DENSITY * dt_s
     if f.clock[0] < c[BARO_UNTIL_S]:
         p[BARO_BIAS, BARO_BIAS] += _BARO_DENSITY * dt_s
+        p[POSITION + 2, POSITION + 2] += _HEIGHT_DENSITY * dt_s  # it has moved with the barometer
 
 
 @compiled
@@ -152,6 +165,25 @@ def follow_drift(c: Checks, f: Filter, row: FloatArray, eph_m: float) -> None:
         elif fault == POSITION_DRIFTS:
             _doubt_position(c, f, axis, dt_s)
     c[_GNSS_S] = row[0]
+
+
+@compiled
+def follow_height_drift(c: Checks, row: FloatArray, landed: bool) -> None:
+    """Compare the changes of height of GNSS and barometer with the vertical velocity of GNSS, over 20 s of flight."""
+    dt_s, altitude_m = row[0] - c[_GNSS_S], c[_ALTITUDE]
+    if landed or c[_GNSS_S] == 0.0 or dt_s > _LONGEST_GAP_S:
+        c[_DRIFT + 2], c[_BARO_DRIFT] = 0.0, 0.0
+    else:
+        moved_m = 0.5 * dt_s * (row[6] + c[_MOTION + 2])
+        _add_drift(c, _DRIFT + 2, row[3] - c[_PLACE + 2] - moved_m, dt_s)
+        _add_drift(c, _BARO_DRIFT, c[_ALTITUDE_THEN] - altitude_m - moved_m, dt_s)
+    c[_PLACE + 2], c[_MOTION + 2], c[_ALTITUDE_THEN] = row[3], row[6], altitude_m
+
+
+@compiled
+def _add_drift(c: Checks, at: int, change_m: float, dt_s: float) -> None:
+    change_m = min(max(change_m, -_LARGEST_CHANGE_M), _LARGEST_CHANGE_M)
+    c[at] += change_m - min(dt_s / _DRIFT_S, 1.0) * c[at]
 
 
 @compiled

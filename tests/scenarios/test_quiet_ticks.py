@@ -58,8 +58,9 @@ def test_a_reset_of_the_estimate_ends_a_compiled_call(monkeypatch: pytest.Monkey
 
     def counted(block: QuietBlock, count: int, is_taken: bool = False) -> int:
         done = run(block, count, is_taken)
-        if block.waited and world.engine.stack.journal.texts[-1].text.startswith("Estimate reset"):
-            resets.append(world.engine.stack.journal.texts[-1].time_us)
+        texts = world.engine.stack.journal.texts
+        if block.waited and texts and texts[-1].text.startswith("Estimate reset"):
+            resets.append(texts[-1].time_us)
         return done
 
     monkeypatch.setattr(QuietBlock, "run", counted)

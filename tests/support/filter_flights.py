@@ -123,13 +123,16 @@ def _stuck_barometer(events: Events) -> list[Event]:
     return made
 
 
-def _wrong_barometer(events: Events, step_m: float, drift_m_s: float) -> list[Event]:
-    """Add a step and a drift to the barometer's altitudes after the climb."""
+def _wrong_barometer(
+    events: Events, step_m: float, drift_m_s: float, begin_s: float | None = None
+) -> list[Event]:
+    """Add a step and a drift to the barometer's altitudes from ``begin_s`` on, or after the climb."""
+    since_s = _CLIMB_S if begin_s is None else begin_s
     made = []
     for kind, row in events:
         changed = row.copy()
-        if kind == BARO_RING and row[0] > _CLIMB_S:
-            changed[1] += step_m + drift_m_s * (row[0] - _CLIMB_S)
+        if kind == BARO_RING and row[0] > since_s:
+            changed[1] += step_m + drift_m_s * (row[0] - since_s)
         made.append(Event(kind, changed))
     return made
 
@@ -295,8 +298,8 @@ STREAMS: dict[str, Callable[[], Events]] = {
     ),
     "vertical velocity wrong": lambda: _wrong_climb(_LONG(), 0.4),
     "vertical velocity wrong without a barometer": lambda: _wrong_climb(_without(_LONG(), BARO_RING), 0.4),
-    "vertical velocity wrong, the barometer half as much": lambda: _wrong_climb(
-        _wrong_barometer(_LONG(), 0.0, -0.3), 0.6
+    "vertical velocity wrong, then the barometer too": lambda: _wrong_climb(
+        _wrong_barometer(_LONG(), 0.0, 2.0, 14.0), 1.0
     ),
     "accelerometer slightly wrong": lambda: _wrong_accelerometer(_LONG(), 0.4),
     "accelerometer wrong": lambda: _wrong_accelerometer(_LONG(), 0.8),

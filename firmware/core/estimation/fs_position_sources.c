@@ -27,22 +27,22 @@
 #define FS_GNSS_POSITION 3
 #define FS_OUTAGE_S 1
 #define FS_BEFORE 2
+#define FS_LANDED 1
 #define FS_GNSS_FAULT 17
 #define FS_YAW_STAGE 6
-#define FS_LANDED 1
 #define FS_HAS_BARO 2
 #define FS_COUNTED_M FS_LIT(0.5)
 #define FS_LONGEST_INTERVAL_S FS_LIT(2.5)
 #define FS_SPEED_SMOOTHING_S FS_LIT(2.0)
 
-/* position_sources.py:158 */
+/* position_sources.py:160 */
 bool fs_is_velocity_measured(const fs_filter *f)
 {
     const fs_real fused_s = f->observations[FS_GNSS_VELOCITY][FS_FUSED_S];
     return fused_s > FS_LIT(0.0) && f->clock[0] - fused_s < FS_GNSS_LOST_S;
 }
 
-/* position_sources.py:165 */
+/* position_sources.py:167 */
 bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f)
 {
     const fs_real north = m->gnss_speed_m_s[0];
@@ -51,7 +51,7 @@ bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f)
     return !is_measured || fs_sqrt(north * north + east * east) < FS_MOVES_M_S;
 }
 
-/* position_sources.py:173 */
+/* position_sources.py:175 */
 int32_t fs_hold_position(fs_estimator_memory *m, fs_filter *f, int32_t axis, const fs_estimator_params *params)
 {
     const fs_real now_s = f->clock[0];
@@ -79,7 +79,7 @@ int32_t fs_hold_position(fs_estimator_memory *m, fs_filter *f, int32_t axis, con
  *
  * The slow part of that error is the bias of the next ones too: position and bias have opposite errors.
  *
- * position_sources.py:133
+ * position_sources.py:135
  */
 static void start_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params)
 {
@@ -103,7 +103,7 @@ static void start_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[]
 }
 
 /*
- * Propagate what belongs to GNSS to the time of the measurement, and note the state before it. position_sources.py:76
+ * Propagate what belongs to GNSS to the time of the measurement, and note the state before it. position_sources.py:77
  */
 static void begin_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params)
 {
@@ -119,13 +119,14 @@ static void begin_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[]
         m->before_gnss[FS_BEFORE + 2 + axis] = value_2;
     }
     m->last_gnss_s[0] = row[0];
+    fs_follow_height_drift(m->checks, row, m->flags[FS_LANDED] == 1);
     fs_follow_drift(m->checks, f, row, fs_horizontal_accuracy(row));
     fs_drift_gnss_bias(f, row, m->before_gnss[FS_ELAPSED_S], params);
 }
 
 /*
  * Add up the time between refused measurements; an accepted one ends it. Time without any does not count.
- * position_sources.py:119
+ * position_sources.py:121
  */
 static void count_refused(fs_estimator_memory *m, const fs_filter *f, int32_t first, fs_real elapsed_s)
 {
@@ -143,7 +144,7 @@ static void count_refused(fs_estimator_memory *m, const fs_filter *f, int32_t fi
     }
 }
 
-/* Judge the measurement by its innovations, and reset what was refused too long. position_sources.py:91 */
+/* Judge the measurement by its innovations, and reset what was refused too long. position_sources.py:93 */
 static void end_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t first,
                      const fs_estimator_params *params)
 {
@@ -182,7 +183,7 @@ static void end_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], 
     }
 }
 
-/* position_sources.py:54 */
+/* position_sources.py:55 */
 int32_t fs_take_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t stage,
                      const fs_estimator_params *params)
 {
