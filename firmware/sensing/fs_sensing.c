@@ -6,7 +6,7 @@
 #define ROW 10U
 #define STATE 13U
 #define RESETS 19U
-#define FLAGS 8U
+#define FLAGS 9U
 #define EARTH 4U
 #define KNOWN 4U      /* place of the flag behind the Earth's field */
 #define VALUES_AT 2U  /* of parameters, behind the first index and their number */

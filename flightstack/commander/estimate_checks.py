@@ -32,7 +32,6 @@ PREFLIGHT: tuple[tuple[str, Callable[[EstimateHealth], bool]], ...] = (
     ("the barometer is stuck", lambda h: not h.baro_is_stuck),
     ("GNSS has no fix", lambda h: h.fix_age_s < MISSING_S),
     ("the attitude is not aligned yet", lambda h: h.aligned),
-    ("the heading is not aligned yet", lambda h: not h.heading_is_new),
     ("the GNSS fix is not accurate enough yet", lambda h: h.has_origin or not h.fix_age_s < MISSING_S),
     ("the gyroscope bias is too high", lambda h: h.gyro_bias_rad_s < MOST_GYRO_BIAS_RAD_S),
     ("the accelerometer bias is too high", lambda h: h.accel_bias_m_s2 < MOST_ACCEL_BIAS_M_S2),

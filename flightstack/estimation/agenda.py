@@ -78,9 +78,12 @@ from flightstack.estimation.yaw_sources import predict_yaw, take_earth_field, ta
 )
 SOURCES = 9
 """What the agenda is at; the sources of measurements in the order in which they are fused."""
+MOST_PARTS = 256
+"""Bound of the parts of work in one call: more than a step has."""
+_FIELD_STAGES = 8
 _LATE_S = 0.3
 """Measurements that are older than the horizon by this much are dropped."""
-_GAP_S, _GAP_LATE_S = 0.06, 0.02
+_GAP_S, _GAP_LATE_S = 0.2, 0.02
 """Step that bridges a gap, and what counts as late in it: the motion within the gap is unknown, so that measurements
 taken then say little about its end."""
 _BEHIND_S = 0.035
@@ -111,6 +114,21 @@ def work(m: MemoryRecord, f: Filter, r: Rings, horizon_s: float, params: Estimat
         agenda[SOURCE] += 1
     _finish(m, f, r, params)
     return True
+
+
+@compiled
+def take_field_at_rest(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorParams) -> None:
+    """Correct the filter with the Earth's field now, after the open step: a vehicle that is ready may arm next."""
+    for _ in range(MOST_PARTS):
+        if m["agenda"][SOURCE] == IDLE:
+            break
+        work(m, f, r, f.clock[0], params)
+    predict_errors(f, noise_of(m["sums"]), params)
+    stage = 0
+    for _ in range(_FIELD_STAGES):
+        stage = take_earth_field(m, f, stage, params)
+        if stage <= 0:
+            break
 
 
 @compiled
@@ -153,8 +171,9 @@ def _is_covariance_due(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorPa
 def _finish(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorParams) -> None:
     """Move the output as the filter has moved, and close the step."""
     agenda, dt_s = m["agenda"], r.imu[slot_of(r, IMU_RING, IMU_ROWS, 0), 1]
-    share = 1.0 if params.output_s <= dt_s else dt_s / params.output_s
-    if agenda[FUSED_ANY] == 1 or share < 1.0:  # else the output has moved as the filter has
+    is_reset = count_of_resets(m) != m["followed"][0]  # between two steps, by the Earth's field
+    share = 1.0 if is_reset or params.output_s <= dt_s else dt_s / params.output_s
+    if is_reset or agenda[FUSED_ANY] == 1 or share < 1.0:  # else the output has moved as the filter has
         _move_output(m, f, r, share, params)
     pop(r, IMU_RING, IMU_ROWS)
     agenda[SOURCE] = IDLE

@@ -7,7 +7,7 @@ import math
 from flightstack.core.array_items import as_tuple
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Vector3
-from flightstack.estimation.agenda import work
+from flightstack.estimation.agenda import MOST_PARTS, take_field_at_rest, work
 from flightstack.estimation.alignment import ALIGNMENT_S, WAIT_FOR_MAG_S, align
 from flightstack.estimation.error_state import read_nominal, read_vector, scaled, write_vector
 from flightstack.estimation.estimator_params import PARAMS_SIZE, EstimatorParams
@@ -28,6 +28,7 @@ from flightstack.estimation.memory import (
     GAPS,
     HAS_MAG,
     HAS_YAW,
+    LANDED,
     MemoryArray,
     MemoryRecord,
     filter_of,
@@ -55,8 +56,6 @@ from flightstack.estimation.rings import (
     write_row,
 )
 
-_MOST_PARTS = 256
-"""Bound of the parts of work in one sample: more than a step has."""
 _BACKLOG_S = 0.03
 """Time by which the filter may be behind the horizon, so that a sample does one part of its work."""
 _MEASURED = 7
@@ -104,7 +103,7 @@ def push_kernel(memory: MemoryArray, ring: int, row: FloatArray) -> None:
 @compiled
 def _work_up_to(m: MemoryRecord, f: Filter, r: Rings, horizon_s: float, params: EstimatorParams) -> None:
     """Do a part of the filter's work, and all of it while it is behind ``horizon_s``."""
-    for _ in range(_MOST_PARTS):
+    for _ in range(MOST_PARTS):
         has_worked = work(m, f, r, horizon_s, params)
         if not (has_worked and _is_behind(r, horizon_s)):
             break
@@ -139,7 +138,7 @@ def imu_kernel(memory: MemoryArray, sample: FloatArray) -> None:
     write_motion(output, time_s, moved(read_motion(output), angle, dv, dt_s, params.gravity_m_s2))
     if sums[0] >= params.period_s - 0.25 * dt_s:
         step = take_step(sums, time_s)
-        for _ in range(_MOST_PARTS):
+        for _ in range(MOST_PARTS):
             if r.cursors[IMU_RING, 1] < IMU_ROWS:
                 break
             work(m, f, r, time_s, params)  # move early, so that the filter integrates every step
@@ -172,9 +171,14 @@ def _write_state(m: MemoryRecord, rates: Vector3) -> None:
 
 @compiled
 def field_kernel(memory: MemoryArray) -> None:
-    """Let the next step of the filter correct it with the Earth's field in ``earth``."""
+    """Correct the filter with the Earth's field in ``earth``: on the ground at once, in flight in its next step."""
     m = memory[0]
-    m["flags"][FIELD_IS_NEW] = m["flags"][ALIGNED]  # the alignment uses the field as it is
+    if m["flags"][ALIGNED] == 0:  # the alignment uses the field as it is
+        return
+    m["flags"][FIELD_IS_NEW] = 1
+    if m["flags"][LANDED] == 1:
+        params = EstimatorParams(*as_tuple(m["params"], PARAMS_SIZE))
+        take_field_at_rest(m, filter_of(m), rings_of(m), params)
 
 
 @compiled

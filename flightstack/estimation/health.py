@@ -19,7 +19,7 @@ from flightstack.estimation.kalman import (
     TEST_RATIO,
     Observations,
 )
-from flightstack.estimation.memory import ALIGNED, FIELD_IS_NEW, LANDED, MemoryArray
+from flightstack.estimation.memory import ALIGNED, LANDED, MemoryArray
 from flightstack.estimation.sensor_feed import NewestSamples
 from flightstack.estimation.sensor_samples import BaroSample, GnssFix
 
@@ -70,8 +70,6 @@ class EstimateHealth(NamedTuple):
     position_ratio: float
     height_ratio: float
     heading_ratio: float
-    heading_is_new: bool = False
-    """True until the filter has corrected the heading with an Earth's field that has become known."""
     spare_imu_has_failed: bool = False
     """True if an inertial sensor that is not selected cannot replace the selected one."""
     imus_disagree: bool = False
@@ -215,7 +213,7 @@ class HealthMonitor:
             refused_s if has_origin and fix_age_s < MISSING_FIX_S else 0.0,
             self._accuracy.is_inaccurate,
             *summary[_LAG:],  # type: ignore[arg-type]  # the fields from lag_s to heading_ratio
-        )._replace(heading_is_new=bool(self._flags[FIELD_IS_NEW]))
+        )
 
     def _baro_is_stuck(self, baro: BaroSample | None, time_s: float) -> bool:
         if baro is None:

@@ -37,7 +37,7 @@ def take_baro(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorPara
     if m["flags"][HAS_BARO] == 0:
         _start_baro(m, f, row[1], params)
     fuse_baro(f, row[1], f.clock[0] - row[0], params)
-    take_pressure_innovation(c, f, row[0])
+    take_pressure_innovation(c, f, row[0], row[1])
 
 
 @compiled

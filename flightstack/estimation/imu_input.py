@@ -20,8 +20,8 @@ from flightstack.estimation.prediction import DeltaSample, ImuNoise
 
 SUMS_SIZE = 64
 """Elapsed time, rotation (4), velocity change (3); smoothed rate and specific force (6); number of samples; noise of
-gyro and accelerometer (6); sums of two steps (7), their last four means (24), and the number of means; variance of
-the unknown velocity change."""
+gyro and accelerometer (6); sums of two steps (7), their last four means (24), and the number of means; variances of
+the unknown rotation and velocity change."""
 Sums: TypeAlias = Annotated[FloatArray, SUMS_SIZE]
 
 _MEAN, _COUNT, _NOISE, _PAIR_S, _PAIR, _PAST, _PAIRS, _UNKNOWN = 8, 14, 15, 21, 22, 28, 52, 53
@@ -30,9 +30,10 @@ _NOISE_SMOOTHING_S = 2.0
 _PAIR_LENGTH_S = 0.0155
 _DIFFERENCE_VARIANCE = 70.0
 """Variance of the fourth difference of white noise of variance 1."""
-_GAP_FORCE_M_S2, _SHOCK_M_S = 3.0, 5.0
-"""Deviation of the mean specific force of a gap from that of the sample that bridges it, and of the velocity change of
-a sample at the end of the sensor's range, as in an impact."""
+_GAP_RATE_RAD_S, _GAP_FORCE_M_S2 = 0.3, 3.0
+"""Deviation of the mean rate and specific force of a gap from those of the sample that bridges it."""
+_SHOCK_RAD, _SHOCK_M_S = 0.1, 5.0
+"""Deviation of what a sample at the end of the range of gyro or accelerometer measures, as in an impact."""
 _CLIPPED = 0.99
 """Share of the range from which a value may have been cut off."""
 
@@ -58,17 +59,18 @@ def add_sample(sums: Sums, gyro: Vector3, accel: Vector3, dt_s: float) -> None:
 @compiled
 def note_gap(sums: Sums, gap_s: float) -> None:
     """Note a time without samples, which the next sample bridges."""
-    speed_m_s = _GAP_FORCE_M_S2 * gap_s
-    sums[_UNKNOWN] += speed_m_s * speed_m_s
+    angle_rad, speed_m_s = _GAP_RATE_RAD_S * gap_s, _GAP_FORCE_M_S2 * gap_s
+    sums[_UNKNOWN] += angle_rad * angle_rad
+    sums[_UNKNOWN + 1] += speed_m_s * speed_m_s
 
 
 @compiled
 def note_clipping(sums: Sums, gyro: Vector3, accel: Vector3, params: EstimatorParams) -> None:
     """Note a sample with a value at the end of its range: the true one may be far larger."""
-    rate = max(abs(gyro.x), abs(gyro.y), abs(gyro.z)) / params.gyro_range_rad_s
-    force = max(abs(accel.x), abs(accel.y), abs(accel.z)) / params.accel_range_m_s2
-    if max(rate, force) >= _CLIPPED:
-        sums[_UNKNOWN] += _SHOCK_M_S * _SHOCK_M_S
+    if max(abs(gyro.x), abs(gyro.y), abs(gyro.z)) >= _CLIPPED * params.gyro_range_rad_s:
+        sums[_UNKNOWN] += _SHOCK_RAD * _SHOCK_RAD
+    if max(abs(accel.x), abs(accel.y), abs(accel.z)) >= _CLIPPED * params.accel_range_m_s2:
+        sums[_UNKNOWN + 1] += _SHOCK_M_S * _SHOCK_M_S
 
 
 @compiled
@@ -149,8 +151,9 @@ def take_step(sums: Sums, time_s: float) -> DeltaSample:
         angle,
         velocity,
         sums[_UNKNOWN],
+        sums[_UNKNOWN + 1],
     )
-    sums[_UNKNOWN] = 0.0
+    sums[_UNKNOWN], sums[_UNKNOWN + 1] = 0.0, 0.0
     for i in range(8):
         sums[i] = 0.0
     sums[1] = 1.0
@@ -159,11 +162,11 @@ def take_step(sums: Sums, time_s: float) -> DeltaSample:
 
 @compiled
 def write_step(row: FloatArray, sample: DeltaSample) -> None:
-    """Write a step to a row of the IMU ring, shape (9,)."""
+    """Write a step to a row of the IMU ring, shape (10,)."""
     row[0], row[1] = sample.time_s, sample.dt_s
     write_vector(row, 2, sample.angle_rad)
     write_vector(row, 5, sample.velocity_m_s)
-    row[8] = sample.unknown
+    row[8], row[9] = sample.unknown_angle, sample.unknown_velocity
 
 
 @compiled
@@ -175,4 +178,5 @@ def read_step(row: FloatArray) -> DeltaSample:
         read_vector(row, 2),
         read_vector(row, 5),
         row[8],
+        row[9],
     )

@@ -15,6 +15,7 @@ from flightstack.estimation.fusion import (
     fuse_hold,
     gnss_bias_share,
     horizontal_accuracy,
+    speed_accuracy,
     vertical_accuracy,
 )
 from flightstack.estimation.height_sources import reset_height
@@ -84,7 +85,7 @@ def _begin_gnss(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorPa
     for axis in range(2):
         before[_BEFORE + axis], before[_BEFORE + 2 + axis] = f.nominal[7 + axis], f.nominal[4 + axis]
     m["last_gnss_s"][0] = row[0]
-    follow_height_drift(m["checks"], row, m["flags"][LANDED] == 1)
+    follow_height_drift(m["checks"], row, m["flags"][LANDED] == 0, speed_accuracy(row))
     follow_drift(m["checks"], f, row, horizontal_accuracy(row))
     drift_gnss_bias(f, row, before[_ELAPSED_S], params)
 

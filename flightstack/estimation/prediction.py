@@ -29,9 +29,7 @@ from flightstack.estimation.error_state import (
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import BEHIND_SIZE, Filter
 
-_TURN_S = 1.0
-_TURN_OF_SPEED = 0.1
-"""Unknown rotation [rad] beside an unknown velocity change [m/s]."""
+_TURN_S, _LEAST_S = 1.0, 1e-3
 _MOST_ANGLE, _MOST_VELOCITY = 0.3**2, 5.0**2
 """Variances [rad²], [m²/s²] beyond which unknown motion adds nothing: other sensors are believed by then."""
 
@@ -39,15 +37,16 @@ _MOST_ANGLE, _MOST_VELOCITY = 0.3**2, 5.0**2
 class DeltaSample(NamedTuple):
     """Rotation vector and velocity change over ``dt_s``, in the body frame at its start, biases included.
 
-    ``unknown`` is the variance [m²/s²] of each axis of the velocity change that the sensor could not measure: in time
-    without samples, and beyond its range. The rotation is unknown by ``_TURN_OF_SPEED`` times as much.
+    The unknown parts are the variances [rad²] and [m²/s²] of each axis of what the sensor could not measure: in time
+    without samples, and beyond its range.
     """
 
     time_s: float
     dt_s: float
     angle_rad: Vector3
     velocity_m_s: Vector3
-    unknown: float
+    unknown_angle: float
+    unknown_velocity: float
 
 
 class ImuNoise(NamedTuple):
@@ -134,7 +133,7 @@ def _turn_variance(angle: Vector3, dt_s: float, params: EstimatorParams) -> floa
     """
     square = angle.x * angle.x + angle.y * angle.y + angle.z * angle.z
     error = params.gyro_scale_error
-    return error * error * square * (_TURN_S / dt_s)
+    return error * error * square * (_TURN_S / max(dt_s, _LEAST_S))
 
 
 @compiled
@@ -199,9 +198,8 @@ def add_unknown(f: Filter, step: DeltaSample) -> None:
     p, half_s = f.covariance, 0.5 * step.dt_s
     for axis in range(3):
         turn, speed, place = ATTITUDE + axis, VELOCITY + axis, POSITION + axis
-        unknown_angle = _TURN_OF_SPEED * _TURN_OF_SPEED * step.unknown
-        p[turn, turn] += min(unknown_angle, max(_MOST_ANGLE - p[turn, turn], 0.0))
-        variance = min(step.unknown, max(_MOST_VELOCITY - p[speed, speed], 0.0))
+        p[turn, turn] += min(step.unknown_angle, max(_MOST_ANGLE - p[turn, turn], 0.0))
+        variance = min(step.unknown_velocity, max(_MOST_VELOCITY - p[speed, speed], 0.0))
         p[speed, speed] += variance
         p[speed, place] += half_s * variance
         p[place, place] += half_s * half_s * variance

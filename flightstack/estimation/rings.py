@@ -12,7 +12,7 @@ from flightstack.core.contract import FloatArray
 
 GNSS_ROWS, MAG_ROWS, BARO_ROWS, RANGE_ROWS, IMU_ROWS = 8, 32, 32, 32, 64
 GNSS_RING, MAG_RING, BARO_RING, RANGE_RING, IMU_RING, RINGS = 0, 1, 2, 3, 4, 5
-IMU_COLUMNS, TRACK_COLUMNS = 9, 11
+IMU_COLUMNS, TRACK_COLUMNS = 10, 11
 _COUNT, _PUSHED_S, _LAST_S, _FIRST, MEAN_SIZE = 4, 5, 6, 7, 11
 """Columns of a mean of samples: sums of their differences to the first (4), their number, times of the last row and of
 the last sample, the first sample (4). Equal samples so have exactly their value as mean."""

@@ -21,30 +21,22 @@ from flightstack.estimation.kalman import (
     GNSS_VELOCITY,
     INNOVATION,
     INNOVATION_VARIANCE,
-    NOISE,
     Filter,
 )
 
-CHECKS_SIZE = 28
+CHECKS_SIZE = 29
 """Means of the innovations upwards (3); times until which the accelerometer and the barometer count as wrong; altitude
 of the barometer, and the time since which it is equal; time, position and velocity of the last GNSS measurement (7),
 drift of its position from its velocity (3), fault of each axis (3); drift of the barometer, downwards, from the
 velocity of GNSS; means of the innovations of GNSS velocity along north and east, and the time at which it contradicted
 the prediction last, with the sign of its error (2); time of the last altitude; altitude at the last measurement of
-GNSS; 1 if its vertical velocity was blamed last."""
+GNSS, and now; 1 if there was one at that measurement."""
 Checks: TypeAlias = Annotated[FloatArray, CHECKS_SIZE]
 
 _SPEED, _HEIGHT, _PRESSURE, ACCEL_UNTIL_S, BARO_UNTIL_S = 0, 1, 2, 3, 4
 _ALTITUDE, _EQUAL_SINCE_S, _GNSS_S, _PLACE, _MOTION, _DRIFT = 5, 6, 7, 8, 11, 14
-GNSS_FAULT, _BARO_DRIFT, _SIDEWAYS, _ONSET_S, _ALTITUDE_S, _ALTITUDE_THEN, _CLIMB_BLAMED = (
-    17,
-    20,
-    21,
-    23,
-    25,
-    26,
-    27,
-)
+GNSS_FAULT, _BARO_DRIFT, _SIDEWAYS, _ONSET_S, _ALTITUDE_S = 17, 20, 21, 23, 25
+_ALTITUDE_THEN, _ALTITUDE_NOW, _HAD_ALTITUDE = 26, 27, 28
 CONSISTENT, POSITION_DRIFTS, VELOCITY_IS_WRONG = 0.0, 1.0, 2.0
 """Faults of GNSS along an axis."""
 
@@ -54,10 +46,11 @@ _MEAN_S, _LARGEST = 1.0, 3.0
 _LIMIT = 1.0
 """Mean of white innovations: 0.22 (GNSS, 10 Hz) or 0.17 (means of the barometer, 17 Hz)."""
 _ACCEL_HOLD_S, _BARO_HOLD_S = 1.0, 10.0
-_APART_M, _SURELY_APART_M, _LARGEST_CHANGE_M, _SIDES = 1.5, 2.0, 0.5, 0.7
+_APART_M, _SURELY_APART_M, _LARGEST_CHANGE_M, _SIDES, _NOISE_SHARE, _MISSING_S = 1.5, 2.0, 0.5, 0.7, 3.0, 0.5
 """Drift between barometer and GNSS velocity from which the barometer, and from which the velocity counts as wrong;
-change between two measurements that counts at most; share of the drift from which the height of GNSS sides with the
-barometer. A barometer that is blamed wrongly costs little: GNSS holds the height meanwhile."""
+change of the altitude between two measurements that counts at most; share of the drift from which the height of GNSS
+sides with the barometer; deviations of the drift by the noise of the velocity; age of an altitude that is missing.
+A barometer that is blamed wrongly costs little: GNSS holds the height meanwhile."""
 _ACCEL_DENSITY, _ACCEL_BIAS_DENSITY, _BARO_DENSITY, _HEIGHT_DENSITY = 1.0, 0.25, 0.25, 0.1
 """Variance per second that a wrong sensor adds to vertical velocity, accelerometer bias, barometer bias and height."""
 WRONG_VELOCITY_M_S = 2.0
@@ -80,10 +73,10 @@ def _take(c: Checks, at: int, f: Filter, row: int, sign: float, dt_s: float) -> 
 
 
 @compiled
-def take_pressure_innovation(c: Checks, f: Filter, measured_s: float) -> None:
+def take_pressure_innovation(c: Checks, f: Filter, measured_s: float, altitude_m: float) -> None:
     """Take the barometer's newest innovation, of an altitude measured at ``measured_s``."""
     _take(c, _PRESSURE, f, BARO, 1.0, max(0.0, measured_s - c[_ALTITUDE_S]))
-    c[_ALTITUDE_S] = measured_s
+    c[_ALTITUDE_S], c[_ALTITUDE_NOW] = measured_s, altitude_m
 
 
 @compiled
@@ -97,24 +90,13 @@ def take_horizontal_innovations(c: Checks, f: Filter, dt_s: float) -> None:
 
 @compiled
 def take_gnss_innovations(c: Checks, f: Filter, dt_s: float, has_baro: bool) -> None:
-    """Take the vertical innovations of GNSS, and decide whether accelerometer or barometer is wrong."""
+    """Take the vertical innovations of GNSS, and decide whether the accelerometer is wrong."""
     _take(c, _SPEED, f, GNSS_VELOCITY + 2, -1.0, dt_s)
     _take(c, _HEIGHT, f, GNSS_POSITION + 2, -1.0, dt_s)
     up = 1.0 if c[_SPEED] >= 0.0 else -1.0
     second = c[_PRESSURE] if has_baro else c[_HEIGHT]
     if min(up * c[_SPEED], up * second) > _LIMIT:
         c[ACCEL_UNTIL_S] = f.clock[0] + _ACCEL_HOLD_S
-    apart_m = c[_BARO_DRIFT]
-    if not has_baro or abs(apart_m) < _APART_M:
-        return
-    if c[_DRIFT + 2] < _SIDES * apart_m if apart_m > 0.0 else c[_DRIFT + 2] > _SIDES * apart_m:
-        if c[_CLIMB_BLAMED] == 1.0:
-            f.observations[GNSS_VELOCITY + 2, NOISE] = 0.0  # it starts as stated
-        c[_CLIMB_BLAMED] = 0.0
-        c[BARO_UNTIL_S] = f.clock[0] + _BARO_HOLD_S
-    elif abs(apart_m) > _SURELY_APART_M:
-        f.observations[GNSS_VELOCITY + 2, NOISE] = WRONG_VELOCITY_M_S * WRONG_VELOCITY_M_S
-        c[_CLIMB_BLAMED] = 1.0
 
 
 @compiled
@@ -168,22 +150,36 @@ def follow_drift(c: Checks, f: Filter, row: FloatArray, eph_m: float) -> None:
 
 
 @compiled
-def follow_height_drift(c: Checks, row: FloatArray, landed: bool) -> None:
-    """Compare the changes of height of GNSS and barometer with the vertical velocity of GNSS, over 20 s of flight."""
-    dt_s, altitude_m = row[0] - c[_GNSS_S], c[_ALTITUDE]
-    if landed or c[_GNSS_S] == 0.0 or dt_s > _LONGEST_GAP_S:
+def follow_height_drift(c: Checks, row: FloatArray, flies: bool, accuracy_m_s: float) -> None:
+    """Compare the changes of height of GNSS and barometer with the vertical velocity of GNSS, over 20 s of flight.
+
+    ``accuracy_m_s`` is that of the velocity, whose noise adds up.
+    """
+    dt_s, altitude_m = row[0] - c[_GNSS_S], c[_ALTITUDE_NOW]
+    has_altitude = abs(row[0] - c[_ALTITUDE_S]) < _MISSING_S
+    if not flies or c[_GNSS_S] == 0.0 or dt_s > _LONGEST_GAP_S:
         c[_DRIFT + 2], c[_BARO_DRIFT] = 0.0, 0.0
     else:
-        moved_m = 0.5 * dt_s * (row[6] + c[_MOTION + 2])
-        _add_drift(c, _DRIFT + 2, row[3] - c[_PLACE + 2] - moved_m, dt_s)
-        _add_drift(c, _BARO_DRIFT, c[_ALTITUDE_THEN] - altitude_m - moved_m, dt_s)
+        kept, moved_m = 1.0 - min(dt_s / _DRIFT_S, 1.0), 0.5 * dt_s * (row[6] + c[_MOTION + 2])
+        c[_DRIFT + 2] = kept * c[_DRIFT + 2] + row[3] - c[_PLACE + 2] - moved_m
+        change_m = 0.0 if c[_HAD_ALTITUDE] == 0.0 else c[_ALTITUDE_THEN] - altitude_m - moved_m
+        change_m = min(max(change_m, -_LARGEST_CHANGE_M), _LARGEST_CHANGE_M)
+        c[_BARO_DRIFT] = kept * c[_BARO_DRIFT] + change_m if has_altitude else 0.0
+        _judge_height(c, row[0], _NOISE_SHARE * accuracy_m_s * math.sqrt(0.5 * _DRIFT_S * dt_s))
     c[_PLACE + 2], c[_MOTION + 2], c[_ALTITUDE_THEN] = row[3], row[6], altitude_m
+    c[_HAD_ALTITUDE] = 1.0 if has_altitude else 0.0
 
 
 @compiled
-def _add_drift(c: Checks, at: int, change_m: float, dt_s: float) -> None:
-    change_m = min(max(change_m, -_LARGEST_CHANGE_M), _LARGEST_CHANGE_M)
-    c[at] += change_m - min(dt_s / _DRIFT_S, 1.0) * c[at]
+def _judge_height(c: Checks, now_s: float, noise_m: float) -> None:
+    """Decide whether barometer or vertical GNSS velocity is wrong, beyond the noise of their drift."""
+    apart_m, side = abs(c[_BARO_DRIFT]), c[_DRIFT + 2] if c[_BARO_DRIFT] > 0.0 else -c[_DRIFT + 2]
+    if apart_m < 0.5 * max(_APART_M, noise_m):
+        c[GNSS_FAULT + 2] = CONSISTENT
+    elif apart_m > max(_APART_M, noise_m) and side < _SIDES * apart_m:
+        c[BARO_UNTIL_S], c[GNSS_FAULT + 2] = now_s + _BARO_HOLD_S, CONSISTENT
+    elif apart_m > max(_SURELY_APART_M, noise_m):
+        c[GNSS_FAULT + 2] = VELOCITY_IS_WRONG
 
 
 @compiled

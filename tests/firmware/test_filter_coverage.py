@@ -16,8 +16,8 @@ from tests.support.tools import missing
 
 NEVER = {
     "for (int32_t count = 0; count < 9; count++) {": "the last source ends the step",
-    "for (int32_t count = 0; count < 256; count++) {": "a step has fewer parts",
-    "for (int32_t count_2 = 0; count_2 < 256; count_2++) {": "all steps that wait have fewer parts",
+    "for (int32_t count = 0; count < 256; count++) {": "a step, and all steps that wait, have fewer parts",
+    "for (int32_t count_2 = 0; count_2 < 8; count_2++) {": "the Earth's field has fewer stages",
     "if (m->flags[FS_LANDED] == 1 || m->flags[FS_HAS_GNSS] == 0) {": "a velocity comes with a position",
 }
 """Branches that no stream can take, and the reasons."""
@@ -43,7 +43,7 @@ def test_every_line_and_branch_of_the_filter_is_run(tmp_path: Path) -> None:
         place for place in missed if " branch " in place and re.sub(r"^\S+ branch \d+: ", "", place) in NEVER
     ]
     assert missed == known, "\n".join(sorted(set(missed) - set(known)))
-    assert len(known) == len(NEVER)
+    assert {re.sub(r"^\S+ branch \d+: ", "", place) for place in known} == set(NEVER)
 
 
 def never_run(report: Path) -> list[str]:

@@ -217,7 +217,7 @@ def _broken(events: Events) -> list[Event]:
             continue
         row = event.row.copy()
         if event.kind == IMU and 0.5 <= _time_of(event) - middle_s < 0.504:
-            row[6] = 300.0
+            row[2], row[6] = 60.0, 300.0
         made.append(Event(event.kind, row.copy()))
         if number % 50 == 0:
             row[-1] = np.nan
@@ -297,7 +297,9 @@ STREAMS: dict[str, Callable[[], Events]] = {
         gnss_position_gate=100.0,
     ),
     "vertical velocity wrong": lambda: _wrong_climb(_LONG(), 0.4),
-    "vertical velocity wrong without a barometer": lambda: _wrong_climb(_without(_LONG(), BARO_RING), 0.4),
+    "vertical velocity wrong without a barometer": lambda: _with_params(
+        _wrong_climb(_without(_LONG(), BARO_RING), 8.0), reset_s=1.0
+    ),
     "vertical velocity wrong, then the barometer too": lambda: _wrong_climb(
         _wrong_barometer(_LONG(), 0.0, 2.0, 14.0), 1.0
     ),

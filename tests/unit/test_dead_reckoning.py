@@ -65,7 +65,7 @@ def still(seconds: float, params: EstimatorParams, gyro_bias: float = 0.0, accel
         f.covariance[ACCEL_BIAS + axis, ACCEL_BIAS + axis] = accel_bias * accel_bias
     lift = Vector3(0.0, 0.0, -GRAVITY * STEP_S)
     for step in range(round(seconds / STEP_S)):
-        predict(f, DeltaSample((step + 1) * STEP_S, STEP_S, NONE, lift, 0.0), params)
+        predict(f, DeltaSample((step + 1) * STEP_S, STEP_S, NONE, lift, 0.0, 0.0), params)
     return f
 
 
@@ -106,7 +106,7 @@ def test_state_moves_by_a_bias_as_the_covariance_says() -> None:
     for step in range(round(t / STEP_S)):
         angle = Vector3(bias * STEP_S, 0.0, 0.0)
         lift = Vector3(0.0, 0.0, -GRAVITY * STEP_S)
-        predict(f, DeltaSample((step + 1) * STEP_S, STEP_S, angle, lift, 0.0), QUIET)
+        predict(f, DeltaSample((step + 1) * STEP_S, STEP_S, angle, lift, 0.0, 0.0), QUIET)
     assert f.nominal[5] == pytest.approx(0.5 * GRAVITY * bias * t * t, rel=0.01)
     assert f.nominal[8] == pytest.approx(GRAVITY * bias * t**3 / 6.0, rel=0.01)
     deviation = math.sqrt(variances(still(t, QUIET, bias))[2])

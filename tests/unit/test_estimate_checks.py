@@ -40,7 +40,6 @@ REFUSED = [
     ({"baro_is_stuck": True}, "the barometer is stuck"),
     ({"fix_age_s": 3.0}, "GNSS has no fix"),
     ({"aligned": False}, "the attitude is not aligned yet"),
-    ({"heading_is_new": True}, "the heading is not aligned yet"),
     ({"has_origin": False}, "the GNSS fix is not accurate enough yet"),
     ({"gyro_bias_rad_s": 0.2}, "the gyroscope bias is too high"),
     ({"accel_bias_m_s2": 0.4}, "the accelerometer bias is too high"),

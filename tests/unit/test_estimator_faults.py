@@ -57,6 +57,10 @@ def fly(
     return estimator
 
 
+def without_barometer(sample: Any) -> Any:
+    return None if isinstance(sample, BaroSample) else sample
+
+
 def yaw_error_deg(estimator: Estimator, time_s: float) -> float:
     return math.degrees(turn_between(flown.attitude(time_s), estimator.state().attitude))
 
@@ -165,7 +169,7 @@ def test_reset_to_gnss_of_unknown_accuracy_stays_finite(accuracy: float) -> None
     def unknown(sample: Any) -> Any:
         if isinstance(sample, GnssSample):
             return sample._replace(eph_m=accuracy, epv_m=accuracy, speed_accuracy_m_s=accuracy)
-        return sample
+        return without_barometer(sample)
 
     faults = Faults(jump_s=(12.0, math.inf), jump_m=60.0, vertical_jump_m_s=6.0)
     estimator = fly(30.0, faults, unknown, GnssLimits(eph_m=5.0, epv_m=8.0))
@@ -198,11 +202,18 @@ def test_ideal_gnss_with_zero_accuracies_is_trusted() -> None:
     assert estimator.deviations()[POSITION] < 0.3
 
 
-def test_lasting_error_of_the_vertical_velocity_resets_it_alone() -> None:
-    estimator = fly(25.0, Faults(jump_s=(12.0, math.inf), vertical_jump_m_s=4.0))
+def test_lasting_error_of_the_vertical_velocity_without_a_barometer_resets_it_alone() -> None:
+    estimator = fly(25.0, Faults(jump_s=(12.0, math.inf), vertical_jump_m_s=4.0), without_barometer)
     assert resets(estimator, VELOCITY_RESET) >= 1.0
     assert estimator.memory["resets"][0, VELOCITY_RESET + 1 : VELOCITY_RESET + 3].tolist() == [0.0, 0.0]
     assert np.abs(np.array(estimator.state().velocity_ned_m_s)[:2] - flown.velocity(25.0)[:2]).max() < 0.3
+
+
+def test_vertical_velocity_that_contradicts_both_heights_is_not_followed() -> None:
+    estimator = fly(40.0, Faults(jump_s=(12.0, math.inf), vertical_jump_m_s=4.0))
+    assert resets(estimator, VELOCITY_RESET) == 0.0
+    assert abs(estimator.state().velocity_ned_m_s.z - flown.velocity(40.0)[2]) < 0.5  # measured 0.1
+    assert abs(estimator.state().position_ned_m.z - flown.position(40.0)[2]) < 1.0
 
 
 def test_lasting_jump_of_slow_gnss_resets_the_position() -> None:

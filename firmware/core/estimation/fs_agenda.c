@@ -46,7 +46,7 @@
 #define FS_HOLD_SOURCE 3
 #define FS_DRAG_SOURCE 8
 #define FS_DRAG_PERIOD_S FS_LIT(0.05)
-#define FS_GAP_S FS_LIT(0.06)
+#define FS_GAP_S FS_LIT(0.2)
 #define FS_LATE_S FS_LIT(0.3)
 #define FS_GAP_LATE_S FS_LIT(0.02)
 #define FS_MAG_SOURCE 4
@@ -56,7 +56,7 @@
 
 /*
  * Return True if a measurement may be fused in the step at hand, or the covariance is behind by the most.
- * agenda.py:137
+ * agenda.py:155
  */
 static bool is_covariance_due(const fs_estimator_memory *m, const fs_filter *f, const fs_rings *r,
                               const fs_estimator_params *params)
@@ -74,7 +74,7 @@ static bool is_covariance_due(const fs_estimator_memory *m, const fs_filter *f, 
            fs_is_due(r, FS_GNSS_RING, r->gnss[fs_slot_of(r, FS_GNSS_RING, FS_GNSS_ROWS, 0)][0], now_s);
 }
 
-/* Predict a step that is not later than the horizon; return False if there is none. agenda.py:117 */
+/* Predict a step that is not later than the horizon; return False if there is none. agenda.py:135 */
 static bool begin(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, fs_real horizon_s,
                   const fs_estimator_params *params)
 {
@@ -100,7 +100,7 @@ static bool begin(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, fs_re
     return true;
 }
 
-/* Return True if the vehicle is on the ground and nothing moves it. agenda.py:246 */
+/* Return True if the vehicle is on the ground and nothing moves it. agenda.py:265 */
 static bool stands(const fs_estimator_memory *m, const fs_estimator_params *params)
 {
     if (m->flags[FS_LANDED] == 0) {
@@ -114,7 +114,7 @@ static bool stands(const fs_estimator_memory *m, const fs_estimator_params *para
     return fs_abs(off) < FS_STILL_FORCE_M_S2 && largest < FS_STILL_RATE_RAD_S;
 }
 
-/* Fuse rest ten times a second: three axes of the velocity, three of the rate. agenda.py:258 */
+/* Fuse rest ten times a second: three axes of the velocity, three of the rate. agenda.py:277 */
 static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t stage,
                     const fs_estimator_params *params)
 {
@@ -141,7 +141,7 @@ static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int
     return axis < 5 ? axis + 1 : 0;
 }
 
-/* Fuse drag in flight while the velocity over ground is measured, twenty times a second. agenda.py:277 */
+/* Fuse drag in flight while the velocity over ground is measured, twenty times a second. agenda.py:296 */
 static int32_t drag(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t axis,
                     const fs_estimator_params *params)
 {
@@ -159,7 +159,7 @@ static int32_t drag(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int
     return 1 - axis;
 }
 
-/* Move the oldest row of a ring to row; return False if none is due. agenda.py:236 */
+/* Move the oldest row of a ring to row; return False if none is due. agenda.py:255 */
 static bool next_row(fs_rings *r, int32_t ring, int32_t size, const fs_real oldest[], int32_t oldest_size,
                      fs_real now_s, fs_real row[])
 {
@@ -171,7 +171,7 @@ static bool next_row(fs_rings *r, int32_t ring, int32_t size, const fs_real olde
     return true;
 }
 
-/* Move the oldest row of a source that is due to pending; drop those that are too late. agenda.py:209 */
+/* Move the oldest row of a source that is due to pending; drop those that are too late. agenda.py:228 */
 static bool take_row(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, int32_t source)
 {
     const fs_real now_s = f->clock[0];
@@ -206,7 +206,7 @@ static bool take_row(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, in
     return false;
 }
 
-/* Fuse the next scalar of a sensor whose rows wait. agenda.py:188 */
+/* Fuse the next scalar of a sensor whose rows wait. agenda.py:207 */
 static int32_t measured(fs_estimator_memory *m, fs_filter *f, fs_rings *r, int32_t source, int32_t axis,
                         const fs_estimator_params *params)
 {
@@ -236,7 +236,7 @@ static int32_t measured(fs_estimator_memory *m, fs_filter *f, fs_rings *r, int32
     return following;
 }
 
-/* Fuse the next scalar of the source at hand. agenda.py:171 */
+/* Fuse the next scalar of the source at hand. agenda.py:190 */
 static int32_t part(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_estimator_params *params)
 {
     const int32_t source = m->agenda[FS_SOURCE];
@@ -259,7 +259,7 @@ static int32_t part(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_
     return measured(m, f, r, source, axis, params);
 }
 
-/* Move the output by a share of its difference to the filter. agenda.py:164 */
+/* Move the output by a share of its difference to the filter. agenda.py:183 */
 static void move_output(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, fs_real share,
                         const fs_estimator_params *params)
 {
@@ -269,19 +269,21 @@ static void move_output(fs_estimator_memory *m, const fs_filter *f, fs_rings *r,
     fs_follow(r, m->output, &motion_of, share, params->gravity_m_s2);
 }
 
-/* Move the output as the filter has moved, and close the step. agenda.py:153 */
+/* Move the output as the filter has moved, and close the step. agenda.py:171 */
 static void finish(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, const fs_estimator_params *params)
 {
     const fs_real dt_s = r->imu[fs_slot_of(r, FS_IMU_RING, FS_IMU_ROWS, 0)][1];
-    const fs_real share = params->output_s <= dt_s ? FS_LIT(1.0) : dt_s / params->output_s;
-    if (m->agenda[FS_FUSED_ANY] == 1 || share < FS_LIT(1.0)) { /* else the output has moved as the filter has */
+    const bool is_reset = fs_count_of_resets(m) != m->followed[0]; /* between two steps, by the Earth's field */
+    const fs_real share = is_reset || params->output_s <= dt_s ? FS_LIT(1.0) : dt_s / params->output_s;
+    /* else the output has moved as the filter has */
+    if (is_reset || m->agenda[FS_FUSED_ANY] == 1 || share < FS_LIT(1.0)) {
         move_output(m, f, r, share, params);
     }
     fs_pop(r, FS_IMU_RING, FS_IMU_ROWS);
     m->agenda[FS_SOURCE] = FS_IDLE;
 }
 
-/* agenda.py:93 */
+/* agenda.py:96 */
 bool fs_work(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_s, const fs_estimator_params *params)
 {
     if (m->agenda[FS_SOURCE] == FS_IDLE) {
@@ -306,4 +308,24 @@ bool fs_work(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_
     }
     finish(m, f, r, params);
     return true;
+}
+
+/* agenda.py:120 */
+void fs_take_field_at_rest(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_estimator_params *params)
+{
+    for (int32_t count = 0; count < 256; count++) {
+        if (m->agenda[FS_SOURCE] == FS_IDLE) {
+            break;
+        }
+        (void)fs_work(m, f, r, f->clock[0], params);
+    }
+    const fs_imu_noise noise_of = fs_noise_of(m->sums);
+    fs_predict_errors(f, &noise_of, params);
+    int32_t stage = 0;
+    for (int32_t count_2 = 0; count_2 < 8; count_2++) {
+        stage = fs_take_earth_field(m, f, stage, params);
+        if (stage <= 0) {
+            break;
+        }
+    }
 }

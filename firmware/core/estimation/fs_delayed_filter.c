@@ -39,8 +39,9 @@
 #define FS_IMU_ROWS 64
 #define FS_BACKLOG_S FS_LIT(0.03)
 #define FS_FIELD_IS_NEW 8
+#define FS_LANDED 1
 
-/* delayed_filter.py:70 */
+/* delayed_filter.py:69 */
 void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], int32_t row_size)
 {
     for (int32_t i = 0; i < row_size; i++) {
@@ -86,7 +87,7 @@ void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], in
 
 /*
  * Return the time that a sample has to cover: its own, or longer after a gap; zero for one that came too late.
- * delayed_filter.py:181
+ * delayed_filter.py:185
  */
 static fs_real real_step(fs_estimator_memory *m, fs_real time_s, fs_real dt_s)
 {
@@ -106,7 +107,7 @@ static fs_real real_step(fs_estimator_memory *m, fs_real time_s, fs_real dt_s)
     return covered_s;
 }
 
-/* Add a sample to the alignment; align when it is long enough. delayed_filter.py:198 */
+/* Add a sample to the alignment; align when it is long enough. delayed_filter.py:202 */
 static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real time_s, fs_real dt_s,
                     const fs_estimator_params *params)
 {
@@ -141,7 +142,7 @@ static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real tim
 
 /*
  * Return True if the filter is so far behind the horizon that a sample does more than a part of its work.
- * delayed_filter.py:156
+ * delayed_filter.py:155
  */
 static bool is_behind(const fs_rings *r, fs_real horizon_s)
 {
@@ -149,7 +150,7 @@ static bool is_behind(const fs_rings *r, fs_real horizon_s)
     return r->cursors[FS_IMU_RING][1] > 0 && oldest_s < horizon_s - FS_BACKLOG_S;
 }
 
-/* Do a part of the filter's work, and all of it while it is behind horizon_s. delayed_filter.py:105 */
+/* Do a part of the filter's work, and all of it while it is behind horizon_s. delayed_filter.py:104 */
 static void work_up_to(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_s,
                        const fs_estimator_params *params)
 {
@@ -161,7 +162,7 @@ static void work_up_to(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_rea
     }
 }
 
-/* Write the output in the order of VehicleState. delayed_filter.py:163 */
+/* Write the output in the order of VehicleState. delayed_filter.py:162 */
 static void write_state(fs_estimator_memory *m, const fs_vector3 *rates)
 {
     for (int32_t i = 0; i < 3; i++) {
@@ -176,7 +177,7 @@ static void write_state(fs_estimator_memory *m, const fs_vector3 *rates)
     fs_write_vector(m->state, 10, rates);
 }
 
-/* delayed_filter.py:114 */
+/* delayed_filter.py:113 */
 void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
 {
     for (int32_t i = 0; i < 8; i++) {
@@ -230,9 +231,16 @@ void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
     write_state(m, &less_bias);
 }
 
-/* delayed_filter.py:174 */
+/* delayed_filter.py:173 */
 void fs_field_kernel(fs_estimator_memory *memory)
 {
     fs_estimator_memory *m = memory;
-    m->flags[FS_FIELD_IS_NEW] = m->flags[FS_ALIGNED]; /* the alignment uses the field as it is */
+    if (m->flags[FS_ALIGNED] == 0) { /* the alignment uses the field as it is */
+        return;
+    }
+    m->flags[FS_FIELD_IS_NEW] = 1;
+    if (m->flags[FS_LANDED] == 1) {
+        const fs_estimator_params *params = &m->params;
+        fs_take_field_at_rest(m, &m->filter, &m->rings, params);
+    }
 }

@@ -17,7 +17,7 @@
 #define FS_BARO 6
 #define FS_MAG 7
 
-/* health.py:92 */
+/* health.py:90 */
 static fs_real largest(const fs_real values[], int32_t first, int32_t count)
 {
     fs_real largest_ = FS_LIT(0.0);
@@ -27,7 +27,7 @@ static fs_real largest(const fs_real values[], int32_t first, int32_t count)
     return largest_;
 }
 
-/* Return a mean of test ratios after the newest one, the largest of count rows. health.py:100 */
+/* Return a mean of test ratios after the newest one, the largest of count rows. health.py:98 */
 static fs_real mean_ratio(fs_real mean, const fs_real observations[25][9], int32_t first, int32_t count)
 {
     fs_real largest_ = FS_LIT(0.0);
@@ -37,7 +37,7 @@ static fs_real mean_ratio(fs_real mean, const fs_real observations[25][9], int32
     return mean + FS_SMOOTHING * (fs_sqrt(largest_) - mean);
 }
 
-/* health.py:109 */
+/* health.py:107 */
 void fs_health_kernel(const fs_estimator_memory *memory, fs_real summary[12])
 {
     const fs_estimator_memory *m = memory;

@@ -62,7 +62,7 @@ void fs_take_baro(fs_estimator_memory *m, fs_filter *f, const fs_real row[], con
         start_baro(m, f, row[1], params);
     }
     fs_fuse_baro(f, row[1], f->clock[0] - row[0], params);
-    fs_take_pressure_innovation(m->checks, f, row[0]);
+    fs_take_pressure_innovation(m->checks, f, row[0], row[1]);
 }
 
 /* height_sources.py:60 */

@@ -9,12 +9,14 @@
 #include "fs_geometry.h"
 #include "fs_math.h"
 
+#define FS_GAP_RATE_RAD_S FS_LIT(0.3)
 #define FS_GAP_FORCE_M_S2 FS_LIT(3.0)
 #define FS_UNKNOWN 53
 #define FS_COUNT 14
 #define FS_SMOOTHING_S FS_LIT(0.1)
 #define FS_MEAN 8
 #define FS_CLIPPED FS_LIT(0.99)
+#define FS_SHOCK_RAD FS_LIT(0.1)
 #define FS_SHOCK_M_S FS_LIT(5.0)
 #define FS_PAIR_S 21
 #define FS_PAIR 22
@@ -25,14 +27,16 @@
 #define FS_DIFFERENCE_VARIANCE FS_LIT(70.0)
 #define FS_NOISE 15
 
-/* imu_input.py:59 */
+/* imu_input.py:60 */
 void fs_note_gap(fs_real sums[64], fs_real gap_s)
 {
+    const fs_real angle_rad = FS_GAP_RATE_RAD_S * gap_s;
     const fs_real speed_m_s = FS_GAP_FORCE_M_S2 * gap_s;
-    sums[FS_UNKNOWN] += speed_m_s * speed_m_s;
+    sums[FS_UNKNOWN] += angle_rad * angle_rad;
+    sums[FS_UNKNOWN + 1] += speed_m_s * speed_m_s;
 }
 
-/* imu_input.py:75 */
+/* imu_input.py:77 */
 fs_vector3 fs_in_start_frame(const fs_vector3 *angle, const fs_vector3 *velocity)
 {
     const fs_vector3 turn = fs_cross(angle, velocity);
@@ -43,7 +47,7 @@ fs_vector3 fs_in_start_frame(const fs_vector3 *angle, const fs_vector3 *velocity
     };
 }
 
-/* imu_input.py:85 */
+/* imu_input.py:87 */
 static void smooth(fs_real sums[64], int32_t at, const fs_vector3 *value, fs_real share)
 {
     sums[at] += share * (value->x - sums[at]);
@@ -51,7 +55,7 @@ static void smooth(fs_real sums[64], int32_t at, const fs_vector3 *value, fs_rea
     sums[at + 2] += share * (value->z - sums[at + 2]);
 }
 
-/* imu_input.py:41 */
+/* imu_input.py:42 */
 void fs_add_sample(fs_real sums[64], const fs_vector3 *gyro, const fs_vector3 *accel, fs_real dt_s)
 {
     const fs_vector3 angle = fs_scaled(gyro, dt_s);
@@ -76,15 +80,16 @@ void fs_add_sample(fs_real sums[64], const fs_vector3 *gyro, const fs_vector3 *a
     sums[FS_COUNT] += FS_LIT(1.0);
 }
 
-/* imu_input.py:66 */
+/* imu_input.py:68 */
 void fs_note_clipping(fs_real sums[64], const fs_vector3 *gyro, const fs_vector3 *accel,
                       const fs_estimator_params *params)
 {
-    const fs_real rate = fs_max(fs_max(fs_abs(gyro->x), fs_abs(gyro->y)), fs_abs(gyro->z)) / params->gyro_range_rad_s;
-    const fs_real force = fs_max(fs_max(fs_abs(accel->x), fs_abs(accel->y)), fs_abs(accel->z)) /
-                          params->accel_range_m_s2;
-    if (fs_max(rate, force) >= FS_CLIPPED) {
-        sums[FS_UNKNOWN] += FS_SHOCK_M_S * FS_SHOCK_M_S;
+    if (fs_max(fs_max(fs_abs(gyro->x), fs_abs(gyro->y)), fs_abs(gyro->z)) >= FS_CLIPPED * params->gyro_range_rad_s) {
+        sums[FS_UNKNOWN] += FS_SHOCK_RAD * FS_SHOCK_RAD;
+    }
+    if (fs_max(fs_max(fs_abs(accel->x), fs_abs(accel->y)), fs_abs(accel->z)) >= FS_CLIPPED *
+        params->accel_range_m_s2) {
+        sums[FS_UNKNOWN + 1] += FS_SHOCK_M_S * FS_SHOCK_M_S;
     }
 }
 
@@ -93,7 +98,7 @@ void fs_note_clipping(fs_real sums[64], const fs_vector3 *gyro, const fs_vector3
  *
  * The vehicle's motion has little power there, and vibration, which averages out within that time, does not count.
  *
- * imu_input.py:92
+ * imu_input.py:94
  */
 static void measure_noise(fs_real sums[64], fs_real sample_dt_s, const fs_vector3 *angle, const fs_vector3 *velocity)
 {
@@ -134,15 +139,23 @@ static void measure_noise(fs_real sums[64], fs_real sample_dt_s, const fs_vector
     sums[FS_PAIRS] += FS_LIT(1.0);
 }
 
-/* imu_input.py:141 */
+/* imu_input.py:143 */
 fs_delta_sample fs_take_step(fs_real sums[64], fs_real time_s)
 {
     const fs_quaternion q = {sums[1], sums[2], sums[3], sums[4]};
     const fs_vector3 angle = fs_rotation_vector(&q);
     const fs_vector3 velocity = fs_read_vector(sums, 5);
     measure_noise(sums, sums[0], &angle, &velocity);
-    const fs_delta_sample sample = {time_s, sums[0], angle, velocity, sums[FS_UNKNOWN]};
+    const fs_delta_sample sample = {
+        .time_s = time_s,
+        .dt_s = sums[0],
+        .angle_rad = angle,
+        .velocity_m_s = velocity,
+        .unknown_angle = sums[FS_UNKNOWN],
+        .unknown_velocity = sums[FS_UNKNOWN + 1],
+    };
     sums[FS_UNKNOWN] = FS_LIT(0.0);
+    sums[FS_UNKNOWN + 1] = FS_LIT(0.0);
     for (int32_t i = 0; i < 8; i++) {
         sums[i] = FS_LIT(0.0);
     }
@@ -150,7 +163,7 @@ fs_delta_sample fs_take_step(fs_real sums[64], fs_real time_s)
     return sample;
 }
 
-/* imu_input.py:170 */
+/* imu_input.py:173 */
 fs_delta_sample fs_read_step(const fs_real row[])
 {
     return (fs_delta_sample){
@@ -158,34 +171,36 @@ fs_delta_sample fs_read_step(const fs_real row[])
         .dt_s = row[1],
         .angle_rad = fs_read_vector(row, 2),
         .velocity_m_s = fs_read_vector(row, 5),
-        .unknown = row[8],
+        .unknown_angle = row[8],
+        .unknown_velocity = row[9],
     };
 }
 
-/* imu_input.py:135 */
+/* imu_input.py:137 */
 fs_imu_noise fs_noise_of(const fs_real sums[64])
 {
     return (fs_imu_noise){fs_read_vector(sums, FS_NOISE), fs_read_vector(sums, FS_NOISE + 3)};
 }
 
-/* imu_input.py:123 */
+/* imu_input.py:125 */
 fs_vector3 fs_mean_rate(const fs_real sums[64])
 {
     return fs_read_vector(sums, FS_MEAN);
 }
 
-/* imu_input.py:129 */
+/* imu_input.py:131 */
 fs_vector3 fs_mean_force(const fs_real sums[64])
 {
     return fs_read_vector(sums, FS_MEAN + 3);
 }
 
-/* imu_input.py:161 */
+/* imu_input.py:164 */
 void fs_write_step(fs_real row[], const fs_delta_sample *sample)
 {
     row[0] = sample->time_s;
     row[1] = sample->dt_s;
     fs_write_vector(row, 2, &sample->angle_rad);
     fs_write_vector(row, 5, &sample->velocity_m_s);
-    row[8] = sample->unknown;
+    row[8] = sample->unknown_angle;
+    row[9] = sample->unknown_velocity;
 }

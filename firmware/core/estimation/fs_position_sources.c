@@ -35,14 +35,14 @@
 #define FS_LONGEST_INTERVAL_S FS_LIT(2.5)
 #define FS_SPEED_SMOOTHING_S FS_LIT(2.0)
 
-/* position_sources.py:160 */
+/* position_sources.py:161 */
 bool fs_is_velocity_measured(const fs_filter *f)
 {
     const fs_real fused_s = f->observations[FS_GNSS_VELOCITY][FS_FUSED_S];
     return fused_s > FS_LIT(0.0) && f->clock[0] - fused_s < FS_GNSS_LOST_S;
 }
 
-/* position_sources.py:167 */
+/* position_sources.py:168 */
 bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f)
 {
     const fs_real north = m->gnss_speed_m_s[0];
@@ -51,7 +51,7 @@ bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f)
     return !is_measured || fs_sqrt(north * north + east * east) < FS_MOVES_M_S;
 }
 
-/* position_sources.py:175 */
+/* position_sources.py:176 */
 int32_t fs_hold_position(fs_estimator_memory *m, fs_filter *f, int32_t axis, const fs_estimator_params *params)
 {
     const fs_real now_s = f->clock[0];
@@ -79,7 +79,7 @@ int32_t fs_hold_position(fs_estimator_memory *m, fs_filter *f, int32_t axis, con
  *
  * The slow part of that error is the bias of the next ones too: position and bias have opposite errors.
  *
- * position_sources.py:135
+ * position_sources.py:136
  */
 static void start_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params)
 {
@@ -103,7 +103,7 @@ static void start_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[]
 }
 
 /*
- * Propagate what belongs to GNSS to the time of the measurement, and note the state before it. position_sources.py:77
+ * Propagate what belongs to GNSS to the time of the measurement, and note the state before it. position_sources.py:78
  */
 static void begin_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params)
 {
@@ -119,14 +119,14 @@ static void begin_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[]
         m->before_gnss[FS_BEFORE + 2 + axis] = value_2;
     }
     m->last_gnss_s[0] = row[0];
-    fs_follow_height_drift(m->checks, row, m->flags[FS_LANDED] == 1);
+    fs_follow_height_drift(m->checks, row, m->flags[FS_LANDED] == 0, fs_speed_accuracy(row));
     fs_follow_drift(m->checks, f, row, fs_horizontal_accuracy(row));
     fs_drift_gnss_bias(f, row, m->before_gnss[FS_ELAPSED_S], params);
 }
 
 /*
  * Add up the time between refused measurements; an accepted one ends it. Time without any does not count.
- * position_sources.py:121
+ * position_sources.py:122
  */
 static void count_refused(fs_estimator_memory *m, const fs_filter *f, int32_t first, fs_real elapsed_s)
 {
@@ -144,7 +144,7 @@ static void count_refused(fs_estimator_memory *m, const fs_filter *f, int32_t fi
     }
 }
 
-/* Judge the measurement by its innovations, and reset what was refused too long. position_sources.py:93 */
+/* Judge the measurement by its innovations, and reset what was refused too long. position_sources.py:94 */
 static void end_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t first,
                      const fs_estimator_params *params)
 {
@@ -183,7 +183,7 @@ static void end_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], 
     }
 }
 
-/* position_sources.py:55 */
+/* position_sources.py:56 */
 int32_t fs_take_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t stage,
                      const fs_estimator_params *params)
 {

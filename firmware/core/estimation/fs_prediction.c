@@ -12,6 +12,7 @@
 
 #define FS_ATTITUDE 0
 #define FS_TURN_S FS_LIT(1.0)
+#define FS_LEAST_S FS_LIT(0.001)
 #define FS_VELOCITY 3
 #define FS_POSITION 6
 #define FS_GYRO_BIAS 9
@@ -20,23 +21,22 @@
 #define FS_BODY_FIELD 18
 #define FS_WIND 21
 #define FS_BARO_BIAS 23
-#define FS_TURN_OF_SPEED FS_LIT(0.1)
 #define FS_MOST_ANGLE FS_LIT(0.09)
 #define FS_MOST_VELOCITY FS_LIT(25.0)
 
-/* prediction.py:89 */
+/* prediction.py:88 */
 fs_motion fs_motion_of(const fs_nominal *n)
 {
     return (fs_motion){n->attitude, n->velocity_ned_m_s, n->position_ned_m};
 }
 
-/* prediction.py:69 */
+/* prediction.py:68 */
 fs_vector3 fs_less_bias(const fs_vector3 *v, const fs_vector3 *bias, fs_real dt_s)
 {
     return (fs_vector3){v->x - bias->x * dt_s, v->y - bias->y * dt_s, v->z - bias->z * dt_s};
 }
 
-/* prediction.py:75 */
+/* prediction.py:74 */
 fs_motion fs_moved(const fs_motion *start, const fs_vector3 *angle, const fs_vector3 *delta_velocity, fs_real dt_s,
                    fs_real gravity)
 {
@@ -58,7 +58,7 @@ fs_motion fs_moved(const fs_motion *start, const fs_vector3 *angle, const fs_vec
     };
 }
 
-/* prediction.py:95 */
+/* prediction.py:94 */
 fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion)
 {
     return (fs_nominal){
@@ -76,7 +76,7 @@ fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion)
     };
 }
 
-/* prediction.py:166 */
+/* prediction.py:165 */
 void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_params *params)
 {
     const fs_nominal n = fs_read_nominal(f->nominal);
@@ -99,7 +99,7 @@ void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_
     f->clock[0] = sample->time_s;
 }
 
-/* prediction.py:113 */
+/* prediction.py:112 */
 static void add(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
 {
     for (int32_t i = at; i < at + count; i++) {
@@ -113,16 +113,16 @@ static void add(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
  * An error e gives e omega T after a turn of duration T. As white noise that is a density of (e omega)^2 T, with T =
  * 1 s.
  *
- * prediction.py:130
+ * prediction.py:129
  */
 static fs_real turn_variance(const fs_vector3 *angle, fs_real dt_s, const fs_estimator_params *params)
 {
     const fs_real square = angle->x * angle->x + angle->y * angle->y + angle->z * angle->z;
     const fs_real error = params->gyro_scale_error;
-    return error * error * square * (FS_TURN_S / dt_s);
+    return error * error * square * (FS_TURN_S / fs_max(dt_s, FS_LEAST_S));
 }
 
-/* Add the noise of one axis of the body, a unit vector in the world frame. prediction.py:119 */
+/* Add the noise of one axis of the body, a unit vector in the world frame. prediction.py:118 */
 static void add_body_noise(fs_real p[27][27], int32_t at, const fs_vector3 *axis, fs_real variance)
 {
     p[at][at] += variance * axis->x * axis->x;
@@ -133,7 +133,7 @@ static void add_body_noise(fs_real p[27][27], int32_t at, const fs_vector3 *axis
     p[at + 2][at + 2] += variance * axis->z * axis->z;
 }
 
-/* prediction.py:141 */
+/* prediction.py:140 */
 static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vector3 *angle, fs_real dt_s,
                               const fs_imu_noise *noise, const fs_estimator_params *params)
 {
@@ -161,7 +161,7 @@ static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vec
     add(f->covariance, FS_BARO_BIAS, 1, params->baro_walk * params->baro_walk * dt_s);
 }
 
-/* prediction.py:182 */
+/* prediction.py:181 */
 void fs_predict_errors(fs_filter *f, const fs_imu_noise *noise, const fs_estimator_params *params)
 {
     const fs_real dt_s = f->behind[0];
@@ -184,7 +184,7 @@ void fs_predict_errors(fs_filter *f, const fs_imu_noise *noise, const fs_estimat
     }
 }
 
-/* prediction.py:197 */
+/* prediction.py:196 */
 void fs_add_unknown(fs_filter *f, const fs_delta_sample *step)
 {
     const fs_real half_s = FS_LIT(0.5) * step->dt_s;
@@ -192,10 +192,9 @@ void fs_add_unknown(fs_filter *f, const fs_delta_sample *step)
         const int32_t turn = FS_ATTITUDE + axis;
         const int32_t speed = FS_VELOCITY + axis;
         const int32_t place = FS_POSITION + axis;
-        const fs_real unknown_angle = FS_TURN_OF_SPEED * FS_TURN_OF_SPEED * step->unknown;
-        f->covariance[turn][turn] += fs_min(unknown_angle,
+        f->covariance[turn][turn] += fs_min(step->unknown_angle,
                                             fs_max(FS_MOST_ANGLE - f->covariance[turn][turn], FS_LIT(0.0)));
-        const fs_real variance = fs_min(step->unknown,
+        const fs_real variance = fs_min(step->unknown_velocity,
                                         fs_max(FS_MOST_VELOCITY - f->covariance[speed][speed], FS_LIT(0.0)));
         f->covariance[speed][speed] += variance;
         f->covariance[speed][place] += half_s * variance;

@@ -14,7 +14,7 @@ typedef struct {
     fs_real mag[32][4];
     fs_real baro[32][2];
     fs_real range[32][2];
-    fs_real imu[64][9];
+    fs_real imu[64][10];
     fs_real track[64][11];
     int32_t cursors[5][2];
 } fs_rings;

@@ -11,24 +11,27 @@
 
 /*
  * Add the uncertainty of the sensors that count as wrong, so that the filter learns their error anew.
- * source_checks.py:121
+ * source_checks.py:103
  */
-void fs_add_fault_noise(const fs_real c[28], fs_filter *f, fs_real dt_s);
+void fs_add_fault_noise(const fs_real c[29], fs_filter *f, fs_real dt_s);
 
 /*
  * Return True if the barometer has repeated its altitude for 1 s; its noise changes each measurement.
- * source_checks.py:133
+ * source_checks.py:115
  */
-bool fs_is_stuck(fs_real c[28], fs_real altitude_m, fs_real now_s);
+bool fs_is_stuck(fs_real c[29], fs_real altitude_m, fs_real now_s);
 
-/* Take the barometer's newest innovation, of an altitude measured at measured_s. source_checks.py:83 */
-void fs_take_pressure_innovation(fs_real c[28], const fs_filter *f, fs_real measured_s);
+/* Take the barometer's newest innovation, of an altitude measured at measured_s. source_checks.py:76 */
+void fs_take_pressure_innovation(fs_real c[29], const fs_filter *f, fs_real measured_s, fs_real altitude_m);
 
 /*
  * Compare the changes of height of GNSS and barometer with the vertical velocity of GNSS, over 20 s of flight.
- * source_checks.py:171
+ *
+ * accuracy_m_s is that of the velocity, whose noise adds up.
+ *
+ * source_checks.py:153
  */
-void fs_follow_height_drift(fs_real c[28], const fs_real row[], bool landed);
+void fs_follow_height_drift(fs_real c[29], const fs_real row[], bool flies, fs_real accuracy_m_s);
 
 /*
  * Compare the changes of the position of a GNSS measurement with its velocity, over 20 s.
@@ -37,21 +40,19 @@ void fs_follow_height_drift(fs_real c[28], const fs_real row[], bool landed);
  * that. A jump counts as a change of one accuracy: the gate of the innovation refuses it. The barometer watches the
  * height.
  *
- * source_checks.py:142
+ * source_checks.py:124
  */
-void fs_follow_drift(fs_real c[28], fs_filter *f, const fs_real row[], fs_real eph_m);
+void fs_follow_drift(fs_real c[29], fs_filter *f, const fs_real row[], fs_real eph_m);
+
+/* Take the vertical innovations of GNSS, and decide whether the accelerometer is wrong. source_checks.py:92 */
+void fs_take_gnss_innovations(fs_real c[29], const fs_filter *f, fs_real dt_s, bool has_baro);
 
 /*
- * Take the vertical innovations of GNSS, and decide whether accelerometer or barometer is wrong. source_checks.py:99
+ * Take the horizontal innovations of GNSS velocity, and note when they contradict the prediction. source_checks.py:83
  */
-void fs_take_gnss_innovations(fs_real c[28], fs_filter *f, fs_real dt_s, bool has_baro);
+void fs_take_horizontal_innovations(fs_real c[29], const fs_filter *f, fs_real dt_s);
 
-/*
- * Take the horizontal innovations of GNSS velocity, and note when they contradict the prediction. source_checks.py:90
- */
-void fs_take_horizontal_innovations(fs_real c[28], const fs_filter *f, fs_real dt_s);
-
-/* Return True if the GNSS position drifts from its velocity along an axis. source_checks.py:216 */
-bool fs_position_drifts(const fs_real c[28]);
+/* Return True if the GNSS position drifts from its velocity along an axis. source_checks.py:212 */
+bool fs_position_drifts(const fs_real c[29]);
 
 #endif
