@@ -24,19 +24,19 @@ from flightstack.estimation.kalman import (
     Filter,
 )
 
-CHECKS_SIZE = 29
+CHECKS_SIZE = 30
 """Means of the innovations upwards (3); times until which the accelerometer and the barometer count as wrong; altitude
 of the barometer, and the time since which it is equal; time, position and velocity of the last GNSS measurement (7),
 drift of its position from its velocity (3), fault of each axis (3); drift of the barometer, downwards, from the
 velocity of GNSS; means of the innovations of GNSS velocity along north and east, and the time at which it contradicted
 the prediction last, with the sign of its error (2); time of the last altitude; altitude at the last measurement of
-GNSS, and now; 1 if there was one at that measurement."""
+GNSS, and now; 1 if there was one at that measurement; mean of the drift of GNSS height over 2 s."""
 Checks: TypeAlias = Annotated[FloatArray, CHECKS_SIZE]
 
 _SPEED, _HEIGHT, _PRESSURE, ACCEL_UNTIL_S, BARO_UNTIL_S = 0, 1, 2, 3, 4
 _ALTITUDE, _EQUAL_SINCE_S, _GNSS_S, _PLACE, _MOTION, _DRIFT = 5, 6, 7, 8, 11, 14
 GNSS_FAULT, _BARO_DRIFT, _SIDEWAYS, _ONSET_S, _ALTITUDE_S = 17, 20, 21, 23, 25
-_ALTITUDE_THEN, _ALTITUDE_NOW, _HAD_ALTITUDE = 26, 27, 28
+_ALTITUDE_THEN, _ALTITUDE_NOW, _HAD_ALTITUDE, _HEIGHT_DRIFT = 26, 27, 28, 29
 CONSISTENT, POSITION_DRIFTS, VELOCITY_IS_WRONG = 0.0, 1.0, 2.0
 """Faults of GNSS along an axis."""
 
@@ -58,6 +58,7 @@ WRONG_VELOCITY_M_S = 2.0
 _STUCK_S, _EQUAL_M = 1.0, 1e-9
 _DRIFT_S, _LONGEST_GAP_S, _DRIFT_ACCURACIES, _LEAST_ACCURACY_M = 20.0, 2.0, 4.0, 0.5
 """The least accuracy keeps the errors of the velocity of a receiver with centimetres from counting as a drift."""
+_HEIGHT_MEAN_S = 2.0
 _ONSET_LASTS_S = 40.0
 """Time for which a contradiction of GNSS velocity counts as the start of a drift: that of the slowest one, which
 takes so long to exceed the limit."""
@@ -158,10 +159,11 @@ def follow_height_drift(c: Checks, row: FloatArray, flies: bool, accuracy_m_s: f
     dt_s, altitude_m = row[0] - c[_GNSS_S], c[_ALTITUDE_NOW]
     has_altitude = abs(row[0] - c[_ALTITUDE_S]) < _MISSING_S
     if not flies or c[_GNSS_S] == 0.0 or dt_s > _LONGEST_GAP_S:
-        c[_DRIFT + 2], c[_BARO_DRIFT] = 0.0, 0.0
+        c[_DRIFT + 2], c[_HEIGHT_DRIFT], c[_BARO_DRIFT] = 0.0, 0.0, 0.0
     else:
         kept, moved_m = 1.0 - min(dt_s / _DRIFT_S, 1.0), 0.5 * dt_s * (row[6] + c[_MOTION + 2])
         c[_DRIFT + 2] = kept * c[_DRIFT + 2] + row[3] - c[_PLACE + 2] - moved_m
+        c[_HEIGHT_DRIFT] += min(dt_s / _HEIGHT_MEAN_S, 1.0) * (c[_DRIFT + 2] - c[_HEIGHT_DRIFT])
         change_m = 0.0 if c[_HAD_ALTITUDE] == 0.0 else c[_ALTITUDE_THEN] - altitude_m - moved_m
         change_m = min(max(change_m, -_LARGEST_CHANGE_M), _LARGEST_CHANGE_M)
         c[_BARO_DRIFT] = kept * c[_BARO_DRIFT] + change_m if has_altitude else 0.0
@@ -173,7 +175,7 @@ def follow_height_drift(c: Checks, row: FloatArray, flies: bool, accuracy_m_s: f
 @compiled
 def _judge_height(c: Checks, now_s: float, noise_m: float) -> None:
     """Decide whether barometer or vertical GNSS velocity is wrong, beyond the noise of their drift."""
-    apart_m, side = abs(c[_BARO_DRIFT]), c[_DRIFT + 2] if c[_BARO_DRIFT] > 0.0 else -c[_DRIFT + 2]
+    apart_m, side = abs(c[_BARO_DRIFT]), c[_HEIGHT_DRIFT] if c[_BARO_DRIFT] > 0.0 else -c[_HEIGHT_DRIFT]
     if apart_m < 0.5 * max(_APART_M, noise_m):
         c[GNSS_FAULT + 2] = CONSISTENT
     elif apart_m > max(_APART_M, noise_m) and side < _SIDES * apart_m:

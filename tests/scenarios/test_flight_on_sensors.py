@@ -227,3 +227,14 @@ def test_estimate_stays_true_with_a_faulty_sensor(
 def test_square_on_sensors_is_flown_by_the_loops_in_c() -> None:
     with World(vehicle="x_quad", state="estimated", loops="c") as world:
         assert world.fly("square").completed
+
+
+def test_a_hit_beyond_the_range_of_the_accelerometer_is_no_failsafe() -> None:
+    with World(vehicle="x_quad", state="estimated") as world:
+        world.wait_until_ready()
+        world.takeoff(5.0)
+        world.run_for(8.0)
+        world.fault("sensor:accel:bias=0,0,-200", for_s=0.004)
+        world.run_for(5.0)
+        assert world.texts == ["Armed", "Takeoff detected"]
+        assert abs(world.state.altitude_m - 5.0) < 0.5  # measured 0.1

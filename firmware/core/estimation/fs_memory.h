@@ -38,7 +38,7 @@ typedef struct {
     fs_real yaw_models[5][32];
     fs_real yaw_fix[4];
     fs_real followed[1];
-    fs_real checks[29];
+    fs_real checks[30];
     int32_t agenda[3];
     fs_real pending[10];
     fs_real before_gnss[6];

@@ -34,10 +34,12 @@
 #define FS_MISSING_S FS_LIT(0.5)
 #define FS_LONGEST_GAP_S FS_LIT(2.0)
 #define FS_DRIFT 14
+#define FS_HEIGHT_DRIFT 29
 #define FS_BARO_DRIFT 20
 #define FS_DRIFT_S FS_LIT(20.0)
 #define FS_MOTION 11
 #define FS_PLACE 8
+#define FS_HEIGHT_MEAN_S FS_LIT(2.0)
 #define FS_HAD_ALTITUDE 28
 #define FS_ALTITUDE_THEN 26
 #define FS_LARGEST_CHANGE_M FS_LIT(0.5)
@@ -62,8 +64,8 @@
 #define FS_ACCEL_HOLD_S FS_LIT(1.0)
 #define FS_SIDEWAYS 21
 
-/* source_checks.py:103 */
-void fs_add_fault_noise(const fs_real c[29], fs_filter *f, fs_real dt_s)
+/* source_checks.py:104 */
+void fs_add_fault_noise(const fs_real c[30], fs_filter *f, fs_real dt_s)
 {
     if (f->clock[0] < c[FS_ACCEL_UNTIL_S]) {
         f->covariance[FS_VELOCITY + 2][FS_VELOCITY + 2] += FS_ACCEL_DENSITY * dt_s;
@@ -76,8 +78,8 @@ void fs_add_fault_noise(const fs_real c[29], fs_filter *f, fs_real dt_s)
     }
 }
 
-/* source_checks.py:115 */
-bool fs_is_stuck(fs_real c[29], fs_real altitude_m, fs_real now_s)
+/* source_checks.py:116 */
+bool fs_is_stuck(fs_real c[30], fs_real altitude_m, fs_real now_s)
 {
     if (fs_abs(altitude_m - c[FS_ALTITUDE]) > FS_EQUAL_M) {
         c[FS_ALTITUDE] = altitude_m;
@@ -87,8 +89,8 @@ bool fs_is_stuck(fs_real c[29], fs_real altitude_m, fs_real now_s)
     return equal_s > FS_STUCK_S;
 }
 
-/* Add the newest innovation of a row to its mean, upwards. source_checks.py:67 */
-static void take(fs_real c[29], int32_t at, const fs_filter *f, int32_t row, fs_real sign, fs_real dt_s)
+/* Add the newest innovation of a row to its mean, upwards. source_checks.py:68 */
+static void take(fs_real c[30], int32_t at, const fs_filter *f, int32_t row, fs_real sign, fs_real dt_s)
 {
     /* 0 before the first fusion */
     const fs_real variance = fs_max(f->observations[row][FS_INNOVATION_VARIANCE], FS_LEAST_VARIANCE);
@@ -97,8 +99,8 @@ static void take(fs_real c[29], int32_t at, const fs_filter *f, int32_t row, fs_
     c[at] += fs_min(dt_s / FS_MEAN_S, FS_LIT(1.0)) * (value - c[at]);
 }
 
-/* source_checks.py:76 */
-void fs_take_pressure_innovation(fs_real c[29], const fs_filter *f, fs_real measured_s, fs_real altitude_m)
+/* source_checks.py:77 */
+void fs_take_pressure_innovation(fs_real c[30], const fs_filter *f, fs_real measured_s, fs_real altitude_m)
 {
     take(c, FS_PRESSURE, f, FS_BARO, FS_LIT(1.0), fs_max(FS_LIT(0.0), measured_s - c[FS_ALTITUDE_S]));
     c[FS_ALTITUDE_S] = measured_s;
@@ -106,12 +108,12 @@ void fs_take_pressure_innovation(fs_real c[29], const fs_filter *f, fs_real meas
 }
 
 /*
- * Decide whether barometer or vertical GNSS velocity is wrong, beyond the noise of their drift. source_checks.py:174
+ * Decide whether barometer or vertical GNSS velocity is wrong, beyond the noise of their drift. source_checks.py:176
  */
-static void judge_height(fs_real c[29], fs_real now_s, fs_real noise_m)
+static void judge_height(fs_real c[30], fs_real now_s, fs_real noise_m)
 {
     const fs_real apart_m = fs_abs(c[FS_BARO_DRIFT]);
-    const fs_real side = c[FS_BARO_DRIFT] > FS_LIT(0.0) ? c[FS_DRIFT + 2] : -c[FS_DRIFT + 2];
+    const fs_real side = c[FS_BARO_DRIFT] > FS_LIT(0.0) ? c[FS_HEIGHT_DRIFT] : -c[FS_HEIGHT_DRIFT];
     if (apart_m < FS_LIT(0.5) * fs_max(FS_APART_M, noise_m)) {
         c[FS_GNSS_FAULT + 2] = FS_CONSISTENT;
     } else {
@@ -126,19 +128,21 @@ static void judge_height(fs_real c[29], fs_real now_s, fs_real noise_m)
     }
 }
 
-/* source_checks.py:153 */
-void fs_follow_height_drift(fs_real c[29], const fs_real row[], bool flies, fs_real accuracy_m_s)
+/* source_checks.py:154 */
+void fs_follow_height_drift(fs_real c[30], const fs_real row[], bool flies, fs_real accuracy_m_s)
 {
     const fs_real dt_s = row[0] - c[FS_GNSS_S];
     const fs_real altitude_m = c[FS_ALTITUDE_NOW];
     const bool has_altitude = fs_abs(row[0] - c[FS_ALTITUDE_S]) < FS_MISSING_S;
     if (!flies || c[FS_GNSS_S] == FS_LIT(0.0) || dt_s > FS_LONGEST_GAP_S) {
         c[FS_DRIFT + 2] = FS_LIT(0.0);
+        c[FS_HEIGHT_DRIFT] = FS_LIT(0.0);
         c[FS_BARO_DRIFT] = FS_LIT(0.0);
     } else {
         const fs_real kept = FS_LIT(1.0) - fs_min(dt_s / FS_DRIFT_S, FS_LIT(1.0));
         const fs_real moved_m = FS_LIT(0.5) * dt_s * (row[6] + c[FS_MOTION + 2]);
         c[FS_DRIFT + 2] = kept * c[FS_DRIFT + 2] + row[3] - c[FS_PLACE + 2] - moved_m;
+        c[FS_HEIGHT_DRIFT] += fs_min(dt_s / FS_HEIGHT_MEAN_S, FS_LIT(1.0)) * (c[FS_DRIFT + 2] - c[FS_HEIGHT_DRIFT]);
         fs_real change_m = c[FS_HAD_ALTITUDE] == FS_LIT(0.0) ? FS_LIT(0.0) :
                            c[FS_ALTITUDE_THEN] - altitude_m - moved_m;
         change_m = fs_min(fs_max(change_m, -FS_LARGEST_CHANGE_M), FS_LARGEST_CHANGE_M);
@@ -158,9 +162,9 @@ void fs_follow_height_drift(fs_real c[29], const fs_real row[], bool flies, fs_r
  * not. A wrong velocity has moved position and velocity of the filter by as much as the drift, and has noise from now
  * on.
  *
- * source_checks.py:186
+ * source_checks.py:188
  */
-static void start_fault(fs_real c[29], fs_filter *f, int32_t axis)
+static void start_fault(fs_real c[30], fs_filter *f, int32_t axis)
 {
     const fs_real drift_m = c[FS_DRIFT + axis];
     const fs_real onset_s = c[FS_ONSET_S + axis];
@@ -176,17 +180,17 @@ static void start_fault(fs_real c[29], fs_filter *f, int32_t axis)
 
 /*
  * Let the position become uncertain at the rate of the drift, for the velocity may be wrong instead.
- * source_checks.py:204
+ * source_checks.py:206
  */
-static void doubt_position(const fs_real c[29], fs_filter *f, int32_t axis, fs_real dt_s)
+static void doubt_position(const fs_real c[30], fs_filter *f, int32_t axis, fs_real dt_s)
 {
     const int32_t at = FS_POSITION + axis;
     const fs_real grown_m = fs_sqrt(f->covariance[at][at]) + fs_abs(c[FS_DRIFT + axis]) / FS_DRIFT_S * dt_s;
     f->covariance[at][at] = grown_m * grown_m;
 }
 
-/* source_checks.py:124 */
-void fs_follow_drift(fs_real c[29], fs_filter *f, const fs_real row[], fs_real eph_m)
+/* source_checks.py:125 */
+void fs_follow_drift(fs_real c[30], fs_filter *f, const fs_real row[], fs_real eph_m)
 {
     const fs_real dt_s = row[0] - c[FS_GNSS_S];
     const fs_real accuracy_m = fs_max(eph_m, FS_LEAST_ACCURACY_M);
@@ -220,8 +224,8 @@ void fs_follow_drift(fs_real c[29], fs_filter *f, const fs_real row[], fs_real e
     c[FS_GNSS_S] = row[0];
 }
 
-/* source_checks.py:92 */
-void fs_take_gnss_innovations(fs_real c[29], const fs_filter *f, fs_real dt_s, bool has_baro)
+/* source_checks.py:93 */
+void fs_take_gnss_innovations(fs_real c[30], const fs_filter *f, fs_real dt_s, bool has_baro)
 {
     take(c, FS_SPEED, f, FS_GNSS_VELOCITY + 2, FS_LIT(-1.0), dt_s);
     take(c, FS_HEIGHT, f, FS_GNSS_POSITION + 2, FS_LIT(-1.0), dt_s);
@@ -232,8 +236,8 @@ void fs_take_gnss_innovations(fs_real c[29], const fs_filter *f, fs_real dt_s, b
     }
 }
 
-/* source_checks.py:83 */
-void fs_take_horizontal_innovations(fs_real c[29], const fs_filter *f, fs_real dt_s)
+/* source_checks.py:84 */
+void fs_take_horizontal_innovations(fs_real c[30], const fs_filter *f, fs_real dt_s)
 {
     for (int32_t axis = 0; axis < 2; axis++) {
         take(c, FS_SIDEWAYS + axis, f, FS_GNSS_VELOCITY + axis, FS_LIT(1.0), dt_s);
@@ -243,8 +247,8 @@ void fs_take_horizontal_innovations(fs_real c[29], const fs_filter *f, fs_real d
     }
 }
 
-/* source_checks.py:212 */
-bool fs_position_drifts(const fs_real c[29])
+/* source_checks.py:214 */
+bool fs_position_drifts(const fs_real c[30])
 {
     const fs_real north = c[FS_GNSS_FAULT];
     const fs_real east = c[FS_GNSS_FAULT + 1];
