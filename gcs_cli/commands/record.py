@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import time
 from pathlib import Path
@@ -40,7 +41,8 @@ def record(
     recorder = _Recorder()
     with connect_vehicle(context, link, shares=True, several=True, record=recorder.take) as connection:
         began_s = connection.now_s
-        with _opened(file, overwrite) as tlog:
+        # from the first frame on Ctrl-C ends the recording in order
+        with _opened(file, overwrite) as tlog, contextlib.suppress(KeyboardInterrupt):
             recorder.begin(tlog)
             follow(connection, duration, lambda: tlog.error is not None)
         seconds = connection.now_s - began_s

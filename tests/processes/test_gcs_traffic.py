@@ -14,7 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from gcs_cli.link.tlog import decode_records, encode_record
+from gcs_cli.__main__ import main
+from gcs_cli.link.tlog import TlogFile, decode_records, encode_record
 from tests.support.commands import Ended, gcs
 from tests.support.fake_links import udp_vehicles
 from tests.support.fake_vehicle import ARM, SET_INTERVAL, FakeVehicle
@@ -189,6 +190,18 @@ def test_interrupted_record_ends_in_order(tmp_path: Path, link: str) -> None:
         said, complaint = process.communicate(timeout=LONG_S)
     assert (process.returncode, complaint) == (0, "")
     assert said.endswith(f"recorded in {path}\n")
+
+
+def test_record_interrupted_at_its_first_frame_ends_in_order(
+    tmp_path: Path, link: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(TlogFile, "write", interrupted)
+    path = tmp_path / "flight.tlog"
+    assert main([*link.split(), "record", str(path)]) == 0
+    assert capsys.readouterr().out.endswith(f"recorded in {path}\n")
 
 
 # ------------------------------------------------------------------ shell
