@@ -26,17 +26,23 @@ help: ## Show the targets
 
 setup: $(READY) ## Make the virtual environment with the developers' tools; compile kernels and tests
 
-$(FLY_READY): pyproject.toml
+define MAKE_VENV
 	@test -x $(BIN)/python || $(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "flightstack needs Python 3.11 or newer: run make with PYTHON=/path/to/python3.11" >&2; exit 1; }
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+endef
+
+$(FLY_READY): pyproject.toml
+	$(MAKE_VENV)
 	@echo "Installing flightstack into $(VENV) ..."
 	@$(INSTALL) .
 	@touch $@
 
-$(READY): $(FLY_READY)
-	@echo "Installing the developers' tools into $(VENV) ..."
+$(READY): pyproject.toml
+	$(MAKE_VENV)
+	@echo "Installing flightstack and the developers' tools into $(VENV) ..."
 	@$(INSTALL) '.[dev]'
+	@touch $(FLY_READY)
 	@{ $(BIN)/sim-bridge open-loop --rotors 214,214,214,214 --seconds 0.01 --json >/dev/null && \
 		{ $(BIN)/python -m pytest --collect-only -qq >/dev/null || true; }; } & \
 		$(BIN)/flightstack --check && wait $$!  # bytecode of tests, and of most of what they import

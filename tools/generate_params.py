@@ -30,11 +30,12 @@ HEAD = """\
 Every number that may be tuned, as QGroundControl, MAVSDK, MAVProxy and `gcs param` see it. Names are PX4's wherever
 PX4 has the parameter with the same meaning and unit. A change takes effect at once, gains in the next tick, unless the
 table says "at the next start". Defaults of the loops are those of the vehicle {vehicle} and the gains {gains}; others
-give other defaults, normalised in the same way.
+give other defaults, normalised in the same way. A vehicle file may have defaults of its own for all others
+([`[params]`](files.md#vehicle-file)), as the built-in vehicles have for the noise of their sensors.
 
 The parameters of the estimator (EKF2) exist on a vehicle that flies on its sensors, `--state estimated`.
 
-Values come, each stronger than the one before, from the defaults, the gains file (`--gains`), the parameter file
+Values come, each stronger than the one before, from the defaults, the gains and vehicle files, the parameter file
 (`--params FILE`, of `flightstack` by default `vehicle.params` in its state directory, `runs/state-<instance>`) and the
 command line (`--param NAME=VALUE`, for this run alone). What a ground station sets is saved in the parameter file, in
 QGroundControl's `.params` format. `gcs fly` starts without one, so that a flight depends on its command line alone.

@@ -27,17 +27,17 @@ class EstimatorParams(NamedTuple):
     earth_field_walk: float = estimator_default("earth_field_walk")  # gauss/√s
     body_field_walk: float = estimator_default("body_field_walk")  # gauss/√s
     wind_walk: float = estimator_default("wind_walk")  # m/s/√s
-    baro_walk: float = 0.03  # m/√s
+    baro_walk: float = 0.015  # m/√s
     gyro_range_rad_s: float = estimator_default("gyro_range_rad_s")
     accel_range_m_s2: float = estimator_default("accel_range_m_s2")
     # initial uncertainty
     tilt_rad: float = estimator_default("tilt_rad")
     gyro_bias_rad_s: float = estimator_default("gyro_bias_rad_s")
     accel_bias_m_s2: float = estimator_default("accel_bias_m_s2")
-    earth_field_gauss: float = 0.005
-    field_scale: float = 0.1
+    earth_field_gauss: float = 0.003
+    field_scale: float = 0.02
     """Error of the magnetometer's scale, which the filter counts as an error of the Earth's field along itself."""
-    body_field_gauss: float = 0.01
+    body_field_gauss: float = 0.005
     declination_rad: float = 0.35
     """Error of a declination that is not known."""
     # GNSS
@@ -77,7 +77,7 @@ class EstimatorParams(NamedTuple):
     wind_m_s: float = 5.0
     # at rest
     rest_velocity_noise_m_s: float = 0.02
-    rest_rate_noise_rad_s: float = 0.006
+    rest_rate_noise_rad_s: float = 0.003
     # timing
     delay_s: float = horizon_s(
         estimator_default("period_s"), gnss_delay_s, baro_delay_s, range_delay_s, mag_delay_s

@@ -52,6 +52,8 @@ _CONFIRMATION, _LEAST_SHARE = 0.02, 0.01
 UNKNOWN_M, UNKNOWN_VERTICAL_M, UNKNOWN_M_S = 5.0, 8.0, 0.5
 """Accuracies of a GNSS receiver that states none."""
 _AIR_KG_M3, _DRAG_GATE = 1.225, 5.0
+_HEIGHT_RETURN_S = 1800.0
+"""Time constant with which the change of the vertical error of GNSS since the first fix returns to zero."""
 _AIDED_S = 1.0
 """Time after an accepted GNSS velocity in which the horizontal motion counts as measured."""
 LEAST_COS_TILT = 0.7
@@ -92,16 +94,22 @@ def gnss_bias_share(params: EstimatorParams, axis: int) -> float:
 
 @compiled
 def drift_gnss_bias(f: Filter, row: GnssRow, elapsed_s: float, params: EstimatorParams) -> None:
-    """Propagate the Gauss-Markov process of the GNSS position bias."""
+    """Propagate the Gauss-Markov process of the GNSS position bias.
+
+    The height begins at the ground, so its bias is the error since the first fix. Its mean is not zero but minus the
+    error of that fix, which is not a state: it returns to zero so slowly that the barometer decides for half an hour.
+    """
     eph_m, epv_m = horizontal_accuracy(row), vertical_accuracy(row)
     kept = max(0.0, 1.0 - elapsed_s / params.gnss_bias_s)
     for at in range(GNSS_BIAS, ERROR_STATES):
         spread = gnss_bias_share(params, at - GNSS_BIAS) * (epv_m if at == GNSS_BIAS + 2 else eph_m)
-        f.nominal[at + 1] *= kept
+        return_s = _HEIGHT_RETURN_S if at == GNSS_BIAS + 2 else params.gnss_bias_s
+        left = max(0.0, 1.0 - elapsed_s / return_s)
+        f.nominal[at + 1] *= left
         for j in range(at + 1):
-            f.covariance[j, at] *= kept
+            f.covariance[j, at] *= left
         for j in range(at, ERROR_STATES):
-            f.covariance[at, j] *= kept
+            f.covariance[at, j] *= left
         f.covariance[at, at] += (1.0 - kept * kept) * spread * spread
 
 

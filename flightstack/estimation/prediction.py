@@ -137,6 +137,18 @@ def _turn_variance(angle: Vector3, dt_s: float, params: EstimatorParams) -> floa
 
 
 @compiled
+def _keep_misaligned(p: Covariance, params: EstimatorParams) -> None:
+    """Keep the horizontal biases of the accelerometer as uncertain as the alignment of the gyro leaves them.
+
+    A yaw rate ω measured along an axis that is off by e turns the tilt by e in step with the heading, which gives the
+    same velocity as a bias g e of the accelerometer. No other measurement tells them apart.
+    """
+    bias = params.gravity_m_s2 * params.gyro_scale_error
+    for axis in range(ACCEL_BIAS, ACCEL_BIAS + 2):
+        p[axis, axis] = max(p[axis, axis], bias * bias)
+
+
+@compiled
 def _add_process_noise(
     f: Filter, q: Quaternion, angle: Vector3, dt_s: float, noise: ImuNoise, params: EstimatorParams
 ) -> None:
@@ -155,6 +167,7 @@ def _add_process_noise(
     _add(p, POSITION, 3, 1e-8 * dt_s)
     _add(p, GYRO_BIAS, 3, params.gyro_bias_walk * params.gyro_bias_walk * dt_s)
     _add(p, ACCEL_BIAS, 3, params.accel_bias_walk * params.accel_bias_walk * dt_s)
+    _keep_misaligned(p, params)
     _add(p, EARTH_FIELD, 3, params.earth_field_walk * params.earth_field_walk * dt_s)
     _add(p, BODY_FIELD, 3, params.body_field_walk * params.body_field_walk * dt_s)
     _add(p, WIND, 2, params.wind_walk * params.wind_walk * dt_s)

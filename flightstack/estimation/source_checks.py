@@ -54,7 +54,7 @@ A barometer that is blamed wrongly costs little: GNSS holds the height meanwhile
 _ACCEL_DENSITY, _ACCEL_BIAS_DENSITY, _BARO_DENSITY, _HEIGHT_DENSITY = 1.0, 0.25, 0.25, 0.1
 """Variance per second that a wrong sensor adds to vertical velocity, accelerometer bias, barometer bias and height."""
 WRONG_VELOCITY_M_S = 2.0
-"""Noise of a GNSS velocity that contradicts other sensors; the filter learns the smaller one again."""
+"""Least noise of a GNSS velocity that contradicts other sensors; after the fault the filter learns a smaller one."""
 _STUCK_S, _EQUAL_M = 1.0, 1e-9
 _DRIFT_S, _LONGEST_GAP_S, _DRIFT_ACCURACIES, _LEAST_ACCURACY_M = 20.0, 2.0, 4.0, 0.5
 """The least accuracy keeps the errors of the velocity of a receiver with centimetres from counting as a drift."""

@@ -26,6 +26,7 @@ from flightstack.params.toml_file import (
     read_toml,
     set_value,
 )
+from flightstack.params.vehicle_defaults import Defaults, read_defaults
 from flightstack.params.vehicle_parts import Part, read_parts
 
 BUILT_IN = Path(__file__).parent / "vehicles"
@@ -83,6 +84,8 @@ class Vehicle:
     default_parts: bool = True
     """Add the parts of a typical multirotor that are not in ``parts`` by name."""
     sensors: Sensors = NO_SENSORS
+    default_params: Defaults = ()
+    """Parameters whose default is another one for this vehicle."""
 
     @property
     def weight_n(self) -> float:
@@ -234,6 +237,7 @@ def _vehicle(top: Table) -> Vehicle:
         parts=read_parts(top),
         default_parts=top.flag("default_parts", True),
         sensors=read_sensors(top),
+        default_params=read_defaults(top),
     )
     for table in (top, body, rotor_type):
         table.finish()

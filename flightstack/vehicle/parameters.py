@@ -13,6 +13,8 @@ from flightstack.params.estimator import ESTIMATOR_SPECS
 from flightstack.params.param_file import NOTHING_LOADED, LoadedParams, load_into
 from flightstack.params.spec import ParamSpec
 from flightstack.params.store import ParamStore, apply_assignments
+from flightstack.params.vehicle import load_vehicle
+from flightstack.params.vehicle_defaults import with_defaults
 
 if TYPE_CHECKING:  # a check of the parameters needs no vehicle
     from flightstack.control.backend import ControlBackend
@@ -31,9 +33,10 @@ class Parameters(NamedTuple):
 def declared(config: StackConfig, of_loops: Iterable[ParamSpec]) -> list[ParamSpec]:
     """Return the declarations of all parameters; raise ConfigError if a controller redeclares a name."""
     of_estimator = ESTIMATOR_SPECS.values() if config.state == ESTIMATED else ()
-    specs = {spec.name: spec for spec in (*SPECS.values(), *of_estimator, *identity_specs(config.system_id))}
+    own = with_defaults((*SPECS.values(), *of_estimator), load_vehicle(config.vehicle).default_params)
+    specs = {spec.name: spec for spec in (*own, *identity_specs(config.system_id))}
     for spec in of_loops:
-        if specs.setdefault(spec.name, spec) is not spec:
+        if specs.setdefault(spec.name, spec) is not spec and SPECS.get(spec.name) is not spec:
             problem = f"declares the parameter {spec.name}, which the vehicle has already"
             raise controller_error(config.controller, problem)
     return list(specs.values())
@@ -42,7 +45,7 @@ def declared(config: StackConfig, of_loops: Iterable[ParamSpec]) -> list[ParamSp
 def read_parameters(config: StackConfig, of_loops: Iterable[ParamSpec]) -> Parameters:
     """Read the parameters of a vehicle; ``of_loops`` declares those of its loops. Raise ConfigError.
 
-    In rising precedence: defaults (for the loops from the gains file), the parameter file, and the configuration
+    In rising precedence: defaults, those of gains file and vehicle file, the parameter file, and the configuration
     (``--param``), which is not saved.
     """
     store = ParamStore(declared(config, of_loops))

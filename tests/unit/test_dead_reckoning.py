@@ -49,15 +49,16 @@ def predict(f: Filter, sample: DeltaSample, params: EstimatorParams) -> None:
 
 def still(seconds: float, params: EstimatorParams, gyro_bias: float = 0.0, accel_bias: float = 0.0) -> Filter:
     """Predict a vehicle that stands still, with uncertain biases of these deviations."""
-    vectors = (np.zeros(ERROR_STATES) for _ in range(3))
-    observations = np.zeros((OBSERVATIONS, OBSERVATION_COLUMNS))
+    h, ph, gain = (np.zeros(ERROR_STATES) for _ in range(3))
     f = Filter(
-        np.zeros(NOMINAL_SIZE),
-        np.zeros((ERROR_STATES, ERROR_STATES)),
-        observations,
-        *vectors,
-        np.zeros(2),
-        np.zeros(BEHIND_SIZE),
+        nominal=np.zeros(NOMINAL_SIZE),
+        h=h,
+        ph=ph,
+        gain=gain,
+        clock=np.zeros(2),
+        behind=np.zeros(BEHIND_SIZE),
+        covariance=np.zeros((ERROR_STATES, ERROR_STATES)),
+        observations=np.zeros((OBSERVATIONS, OBSERVATION_COLUMNS)),
     )
     f.nominal[0] = 1.0
     for axis in range(3):

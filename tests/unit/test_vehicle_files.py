@@ -11,7 +11,11 @@ import numpy as np
 import pytest
 
 from flightstack.core.errors import ConfigError
+from flightstack.estimation.estimator_params import EstimatorParams
+from flightstack.params.config import StackConfig
 from flightstack.params.vehicle import BUILT_IN, Vehicle, built_in_vehicles, load_vehicle
+from flightstack.testing import World
+from flightstack.vehicle.parameters import read_parameters
 
 PAPER = (BUILT_IN / "paper_quad.toml").read_text(encoding="utf-8")
 
@@ -231,3 +235,54 @@ def test_files_that_are_not_there(name: str, sentence: str) -> None:
     with pytest.raises(ConfigError) as error:
         load_vehicle(name)
     assert str(error.value) == sentence
+
+
+def with_params(lines: str) -> str:
+    return changed(r"^\[params\]$", f"[params]\n{lines}", count=1)
+
+
+def test_vehicle_file_gives_default_parameters(tmp_path: Path) -> None:
+    vehicle = load_text(tmp_path, with_params("RTL_RETURN_ALT = 20\nMPC_TILTMAX_AIR = 30.0"))
+    own = dict(vehicle.default_params)
+    assert (own["RTL_RETURN_ALT"], own["MPC_TILTMAX_AIR"]) == (20.0, 30.0)
+    config = StackConfig(vehicle=str(tmp_path / "my.toml"), state="truth")
+    with World(vehicle=config.vehicle, state="truth") as world:
+        stack = world.engine.stack
+        assert stack.params.value("RTL_RETURN_ALT") == 20.0
+        assert stack.now.behaviour.max_tilt_deg == 30.0
+        assert stack.loops.get_parameter("MPC_TILTMAX_AIR") == 30.0
+        assert stack.params.set("RTL_RETURN_ALT", 40.0) is None
+        stack.params.reset()
+        assert stack.params.is_default("RTL_RETURN_ALT")
+        assert stack.params.value("RTL_RETURN_ALT") == 20.0
+    given = replace(config, params=("RTL_RETURN_ALT=25",))
+    assert read_parameters(given, ()).store.value("RTL_RETURN_ALT") == 25.0
+
+
+@pytest.mark.parametrize("name", built_in_vehicles())
+def test_estimator_has_the_noise_of_the_vehicle_file(name: str) -> None:
+    own = dict(load_vehicle(name).default_params)
+    with World(vehicle=name, state="estimated") as world:
+        estimation = world.engine.stack.estimation
+        assert estimation is not None
+        params = estimation.estimator.params
+        assert params.mag_noise_gauss == own["EKF2_MAG_NOISE"] != EstimatorParams().mag_noise_gauss
+        assert params.accel_bias_m_s2 == own["EKF2_ABIAS_INIT"] != EstimatorParams().accel_bias_m_s2
+
+
+@pytest.mark.parametrize(
+    ("line", "problem"),
+    [
+        (
+            "RTL_RETURN_AL = 20",
+            "params.RTL_RETURN_AL: is no parameter of guidance, commander or estimator; did you mean",
+        ),
+        ("MC_ROLLRATE_P = 0.1", "params.MC_ROLLRATE_P: is no parameter of guidance, commander or estimator"),
+        ("RTL_RETURN_ALT = -1", "params.RTL_RETURN_ALT: -1 is outside"),
+        ('RTL_RETURN_ALT = "high"', "params.RTL_RETURN_ALT: 'high' is not a number"),
+        ("EKF2_DRAG_CTRL = 0.5", "params.EKF2_DRAG_CTRL: 0.5 is not a whole number"),
+    ],
+)
+def test_bad_default_parameter_raises_config_error(tmp_path: Path, line: str, problem: str) -> None:
+    with pytest.raises(ConfigError, match=re.escape(problem)):
+        load_text(tmp_path, with_params(line))

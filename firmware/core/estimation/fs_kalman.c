@@ -22,7 +22,7 @@
 #define FS_HOLDS_HORIZONTAL FS_LIT(2.0)
 #define FS_FUSED_S 3
 
-/* kalman.py:197 */
+/* kalman.py:201 */
 void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
 {
     for (int32_t i = at; i < at + count; i++) {
@@ -36,7 +36,7 @@ void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real var
     }
 }
 
-/* kalman.py:86 */
+/* kalman.py:89 */
 void fs_clear(fs_real x[27])
 {
     for (int32_t i = 0; i < 27; i++) {
@@ -44,7 +44,7 @@ void fs_clear(fs_real x[27])
     }
 }
 
-/* Write P h' to ph and return h P h'. kalman.py:99 */
+/* Write P h' to ph and return h P h'. kalman.py:102 */
 static fs_real project(fs_filter *f)
 {
     fs_clear(f->ph);
@@ -69,10 +69,11 @@ static fs_real project(fs_filter *f)
 /*
  * Move the noise variance r towards that of the accepted innovation; the first ones count for more.
  *
+ * Each of these has twice its share of a mean: the noise stated at the start is forgotten with their number's square.
  * Half the squared difference of two successive innovations has the variance of white noise, and an error of the
  * model, which both have, does not count. A slow sensor has the whole variance, as its correlation is counted apart.
  *
- * kalman.py:139
+ * kalman.py:142
  */
 static void adapt_noise(fs_real o[25][9], int32_t row, fs_real r, fs_real projected, fs_real last,
                         const fs_noise *noise)
@@ -82,7 +83,7 @@ static void adapt_noise(fs_real o[25][9], int32_t row, fs_real r, fs_real projec
     fs_real share = FS_ADAPTATION;
     fs_real square = innovation * innovation;
     if (noise->is_slow == FS_LIT(0.0) && o[row][FS_FUSED] > FS_LIT(1.0)) {
-        share = fs_max(share, FS_LIT(1.0) / (o[row][FS_FUSED] + FS_PRIOR));
+        share = fs_max(share, FS_LIT(2.0) / (o[row][FS_FUSED] + FS_PRIOR));
         square = FS_LIT(0.5) * (innovation - last) * (innovation - last);
     }
     const fs_real estimate = square - projected;
@@ -97,7 +98,7 @@ static void adapt_noise(fs_real o[25][9], int32_t row, fs_real r, fs_real projec
  * Joseph's form with such a gain subtracts P h' h P / variance from the covariance, except between two states that
  * both keep their values: one product for each element instead of two.
  *
- * kalman.py:116
+ * kalman.py:119
  */
 static void correct(fs_filter *f, fs_real innovation)
 {
@@ -126,7 +127,7 @@ static void correct(fs_filter *f, fs_real innovation)
     fs_write_nominal(f->nominal, &corrected);
 }
 
-/* kalman.py:157 */
+/* kalman.py:161 */
 bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *noise, fs_real holds)
 {
     const fs_real least = noise->least * noise->least;
@@ -177,7 +178,7 @@ bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *nois
     return true;
 }
 
-/* kalman.py:208 */
+/* kalman.py:212 */
 fs_real fs_deviation(const fs_filter *f, int32_t at, int32_t count)
 {
     fs_real total = FS_LIT(0.0);

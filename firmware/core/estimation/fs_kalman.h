@@ -11,13 +11,13 @@
 /* The filter's arrays, all written in place. */
 typedef struct {
     fs_real nominal[28];
-    fs_real covariance[27][27];
-    fs_real observations[25][9];
     fs_real h[27];
     fs_real ph[27];
     fs_real gain[27];
     fs_real clock[2];
     fs_real behind[7];
+    fs_real covariance[27][27];
+    fs_real observations[25][9];
 } fs_filter;
 
 /* Range of a measurement's noise [1sigma]. The filter estimates the noise within it from its innovations. */
@@ -29,10 +29,10 @@ typedef struct {
     fs_real is_slow;
 } fs_noise;
 
-/* Make count states from at independent of all others, each with variance. kalman.py:197 */
+/* Make count states from at independent of all others, each with variance. kalman.py:201 */
 void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real variance);
 
-/* Set every item to zero. kalman.py:86 */
+/* Set every item to zero. kalman.py:89 */
 void fs_clear(fs_real x[27]);
 
 /*
@@ -41,11 +41,11 @@ void fs_clear(fs_real x[27]);
  * With holds above zero, tilt, velocity, position and accelerometer bias keep their values and their uncertainty (a
  * Schmidt-Kalman update); with HOLDS_HORIZONTAL, horizontal velocity and position.
  *
- * kalman.py:157
+ * kalman.py:161
  */
 bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *noise, fs_real holds);
 
-/* Return the root of the summed variances of count states from at. kalman.py:208 */
+/* Return the root of the summed variances of count states from at. kalman.py:212 */
 fs_real fs_deviation(const fs_filter *f, int32_t at, int32_t count);
 
 #endif

@@ -13,17 +13,8 @@
 
 /* Parameters, state and waiting measurements of an estimator. */
 typedef struct {
-    fs_estimator_params params;
-    fs_filter filter;
-    fs_rings rings;
-    fs_real means[5][11];
-    fs_real sums[64];
-    fs_real alignment[9];
     fs_real output[11];
     fs_real state[13];
-    fs_real earth[4];
-    fs_real field[3];
-    fs_real rate_filter[9];
     fs_real last_imu_s[1];
     fs_real imu_gap[2];
     fs_real last_gnss_s[1];
@@ -34,17 +25,26 @@ typedef struct {
     fs_real rest_s[1];
     fs_real drag_s[1];
     int32_t flags[9];
-    fs_real resets[19];
-    fs_real yaw_models[5][32];
     fs_real yaw_fix[4];
     fs_real followed[1];
-    fs_real checks[30];
     int32_t agenda[3];
     fs_real pending[10];
+    fs_filter filter;
+    fs_estimator_params params;
+    fs_real sums[64];
+    fs_real means[5][11];
+    fs_real checks[30];
+    fs_real alignment[9];
+    fs_real resets[19];
+    fs_real rate_filter[9];
+    fs_real earth[4];
+    fs_real field[3];
     fs_real before_gnss[6];
+    fs_real yaw_models[5][32];
+    fs_rings rings;
 } fs_estimator_memory;
 
-/* Set what is not zero at the start in a memory of zeros that has its parameters. memory.py:108 */
+/* Set what is not zero at the start in a memory of zeros that has its parameters. memory.py:111 */
 void fs_start_memory(fs_estimator_memory *memory);
 
 #endif

@@ -76,7 +76,7 @@ fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion)
     };
 }
 
-/* prediction.py:165 */
+/* prediction.py:178 */
 void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_params *params)
 {
     const fs_nominal n = fs_read_nominal(f->nominal);
@@ -133,7 +133,23 @@ static void add_body_noise(fs_real p[27][27], int32_t at, const fs_vector3 *axis
     p[at + 2][at + 2] += variance * axis->z * axis->z;
 }
 
-/* prediction.py:140 */
+/*
+ * Keep the horizontal biases of the accelerometer as uncertain as the alignment of the gyro leaves them.
+ *
+ * A yaw rate omega measured along an axis that is off by e turns the tilt by e in step with the heading, which gives
+ * the same velocity as a bias g e of the accelerometer. No other measurement tells them apart.
+ *
+ * prediction.py:140
+ */
+static void keep_misaligned(fs_real p[27][27], const fs_estimator_params *params)
+{
+    const fs_real bias = params->gravity_m_s2 * params->gyro_scale_error;
+    for (int32_t axis = 12; axis < FS_ACCEL_BIAS + 2; axis++) {
+        p[axis][axis] = fs_max(p[axis][axis], bias * bias);
+    }
+}
+
+/* prediction.py:152 */
 static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vector3 *angle, fs_real dt_s,
                               const fs_imu_noise *noise, const fs_estimator_params *params)
 {
@@ -155,13 +171,14 @@ static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vec
     add(f->covariance, FS_POSITION, 3, FS_LIT(1e-08) * dt_s);
     add(f->covariance, FS_GYRO_BIAS, 3, params->gyro_bias_walk * params->gyro_bias_walk * dt_s);
     add(f->covariance, FS_ACCEL_BIAS, 3, params->accel_bias_walk * params->accel_bias_walk * dt_s);
+    keep_misaligned(f->covariance, params);
     add(f->covariance, FS_EARTH_FIELD, 3, params->earth_field_walk * params->earth_field_walk * dt_s);
     add(f->covariance, FS_BODY_FIELD, 3, params->body_field_walk * params->body_field_walk * dt_s);
     add(f->covariance, FS_WIND, 2, params->wind_walk * params->wind_walk * dt_s);
     add(f->covariance, FS_BARO_BIAS, 1, params->baro_walk * params->baro_walk * dt_s);
 }
 
-/* prediction.py:181 */
+/* prediction.py:194 */
 void fs_predict_errors(fs_filter *f, const fs_imu_noise *noise, const fs_estimator_params *params)
 {
     const fs_real dt_s = f->behind[0];
@@ -184,7 +201,7 @@ void fs_predict_errors(fs_filter *f, const fs_imu_noise *noise, const fs_estimat
     }
 }
 
-/* prediction.py:196 */
+/* prediction.py:209 */
 void fs_add_unknown(fs_filter *f, const fs_delta_sample *step)
 {
     const fs_real half_s = FS_LIT(0.5) * step->dt_s;
