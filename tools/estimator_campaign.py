@@ -9,9 +9,13 @@ Innovations are averaged over a flight.
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import math
+import os
 from collections.abc import Callable, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -161,13 +165,18 @@ def judged(values: FloatArray, freedom: int) -> Judgement:
     return Judgement(float(np.mean(values)), float(low), float(high))
 
 
-def campaign(flights: int, first_seed: int) -> dict[str, dict[str, Judgement | float]]:
-    """Fly ``flights`` flights, of all kinds by turns; return the judgements by kind, and of all."""
+def campaign(
+    flights: int, first_seed: int, workers: int | None = None
+) -> dict[str, dict[str, Judgement | float]]:
+    """Fly ``flights`` flights, of all kinds by turns; return the judgements by kind, and of all.
+
+    They are flown by ``workers`` processes, with the same result for any number of these.
+    """
     found: dict[str, list[tuple[dict[str, float], dict[str, float]]]] = {kind: [] for kind in KINDS}
-    kinds = list(KINDS)
-    for number in range(flights):
-        kind = kinds[number % len(kinds)]
-        found[kind].append(fly(kind, first_seed + number))
+    kinds = [kind for kind, _ in zip(itertools.cycle(KINDS), range(flights), strict=False)]
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+        for kind, flight in zip(kinds, pool.map(fly, kinds, itertools.count(first_seed)), strict=True):
+            found[kind].append(flight)
     found["all"] = [flight for kind in KINDS for flight in found[kind]]
     result: dict[str, dict[str, Judgement | float]] = {}
     for kind, rows in found.items():
@@ -186,9 +195,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--flights", type=int, default=12)
     parser.add_argument("--seed", type=int, default=1000, help="seed of the first flight")
+    parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
-    result = campaign(options.flights, options.seed)
+    result = campaign(options.flights, options.seed, options.workers)
     if options.json:
         print(json.dumps(result))
         return
