@@ -38,7 +38,8 @@ $(FLY_READY): pyproject.toml
 	@$(INSTALL) .
 	@touch $@
 
-$(READY): pyproject.toml
+# after that of flying, if both are asked for
+$(READY): pyproject.toml | $(if $(filter fly,$(MAKECMDGOALS)),$(FLY_READY))
 	$(MAKE_VENV)
 	@echo "Installing flightstack and the developers' tools into $(VENV) ..."
 	@$(INSTALL) '.[dev]'

@@ -52,8 +52,9 @@ _CONFIRMATION, _LEAST_SHARE = 0.02, 0.01
 UNKNOWN_M, UNKNOWN_VERTICAL_M, UNKNOWN_M_S = 5.0, 8.0, 0.5
 """Accuracies of a GNSS receiver that states none."""
 _AIR_KG_M3, _DRAG_GATE = 1.225, 5.0
-_HEIGHT_RETURN_S = 1800.0
-"""Time constant with which the change of the vertical error of GNSS since the first fix returns to zero."""
+_HEIGHT_RETURN_S, _BARO_LOST_S = 1800.0, 5.0
+"""Time constant with which the change of the vertical error of GNSS since the first fix returns to zero, and age of the
+last pressure altitude above which it does so faster."""
 _AIDED_S = 1.0
 """Time after an accepted GNSS velocity in which the horizontal motion counts as measured."""
 LEAST_COS_TILT = 0.7
@@ -98,12 +99,14 @@ def drift_gnss_bias(f: Filter, row: GnssRow, elapsed_s: float, params: Estimator
 
     The height begins at the ground, so its bias is the error since the first fix. Its mean is not zero but minus the
     error of that fix, which is not a state: it returns to zero so slowly that the barometer decides for half an hour.
+    Without a barometer it returns as fast as the others, for GNSS velocity alone drifts more.
     """
     eph_m, epv_m = horizontal_accuracy(row), vertical_accuracy(row)
     kept = max(0.0, 1.0 - elapsed_s / params.gnss_bias_s)
+    has_baro = f.clock[0] - f.observations[BARO, FUSED_S] < _BARO_LOST_S
     for at in range(GNSS_BIAS, ERROR_STATES):
         spread = gnss_bias_share(params, at - GNSS_BIAS) * (epv_m if at == GNSS_BIAS + 2 else eph_m)
-        return_s = _HEIGHT_RETURN_S if at == GNSS_BIAS + 2 else params.gnss_bias_s
+        return_s = _HEIGHT_RETURN_S if has_baro and at == GNSS_BIAS + 2 else params.gnss_bias_s
         left = max(0.0, 1.0 - elapsed_s / return_s)
         f.nominal[at + 1] *= left
         for j in range(at + 1):

@@ -197,7 +197,7 @@ def take_velocity(m: MemoryRecord, f: Filter, row: FloatArray) -> None:
     fix[YAW_UPDATES] += 1.0
     fix[YAW_TURN] = mean_turn(models, attitude)
     fix[YAW_VARIANCE] = variance_of(models, attitude, fix[YAW_TURN])
-    if fix[YAW_VARIANCE] > _CONVERGED_RAD * _CONVERGED_RAD and not _is_far_off(m):
+    if fix[YAW_VARIANCE] > _CONVERGED_RAD * _CONVERGED_RAD:
         return
     if flags[HAS_YAW] == 0:
         _reset_to_models(m, f, row)
@@ -207,39 +207,17 @@ def take_velocity(m: MemoryRecord, f: Filter, row: FloatArray) -> None:
 
 
 @compiled
-def _is_certain(fix: FloatArray) -> bool:
-    """Return True if the turn to the models' yaw is beyond their uncertainty."""
-    certain: bool = fix[YAW_TURN] * fix[YAW_TURN] > _CERTAIN_SQUARE * fix[YAW_VARIANCE]
-    return certain
-
-
-@compiled
-def _is_refused(m: MemoryRecord) -> bool:
-    """Return True if horizontal GNSS velocities are refused."""
-    refused: bool = max(m["refused_s"][0], m["refused_s"][1]) > _REFUSED_S
-    return refused
-
-
-@compiled
-def _is_far_off(m: MemoryRecord) -> bool:
-    """Return True if a known yaw is so wrong that models which have not converged are better.
-
-    It turns the vehicle's corrections away from the setpoint, and GNSS velocities are refused: seconds cost metres.
-    """
-    return m["flags"][HAS_YAW] == 1 and _is_refused(m) and _is_certain(m["yaw_fix"])
-
-
-@compiled
 def _is_wrong(m: MemoryRecord, time_s: float) -> bool:
     """Return True if the models have contradicted the yaw for a second, or do while GNSS velocities are refused."""
-    fix = m["yaw_fix"]
+    fix, refused = m["yaw_fix"], m["refused_s"]
     differs = abs(fix[YAW_TURN]) > _WRONG_YAW_RAD
-    if not (differs and _is_certain(fix)):
+    if not (differs and fix[YAW_TURN] * fix[YAW_TURN] > _CERTAIN_SQUARE * fix[YAW_VARIANCE]):
         fix[YAW_WRONG_S] = 0.0
     elif fix[YAW_WRONG_S] == 0.0:
         fix[YAW_WRONG_S] = time_s
     lasts: bool = fix[YAW_WRONG_S] > 0.0 and time_s - fix[YAW_WRONG_S] > _REFUSED_S
-    return lasts or (differs and _is_refused(m))
+    is_refused: bool = max(refused[0], refused[1]) > _REFUSED_S
+    return lasts or (differs and is_refused)
 
 
 @compiled

@@ -57,8 +57,8 @@ ESTIMATOR_PARAMS = (
     # initial uncertainty
     _param("EKF2_ANGERR_INIT", 0.05, 0.0, 0.5, "rad", "Initial uncertainty of tilt", "tilt_rad"),
     _param("EKF2_GBIAS_INIT", 0.02, 0.0, 0.2, "rad/s", "Initial uncertainty of the gyro bias", "gyro_bias_rad_s"),
-    _param("EKF2_ABIAS_INIT", 0.05, 0.0, 0.5, "m/s^2", "Initial uncertainty of the accelerometer bias",
-           "accel_bias_m_s2"),
+    _param("EKF2_ABIAS_INIT", 0.05, 0.0, 0.5, "m/s^2", "Initial uncertainty of the accelerometer bias; along x and y"
+           " it stays above 0.034, the gyro's alignment", "accel_bias_m_s2"),
     # GNSS
     _param("EKF2_GPS_DELAY", 110.0, 0.0, 300.0, "ms", "Delay of GNSS measurements", "gnss_delay_s", _MS, 1),
     _param("EKF2_GPS_V_NOISE", 0.05, 0.01, 5.0, "m/s", "Least noise of GNSS velocity", "gnss_velocity_noise_m_s"),

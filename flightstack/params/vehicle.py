@@ -15,6 +15,7 @@ from flightstack.core.contract import MAX_ROTORS, FloatArray
 from flightstack.core.errors import ConfigError
 from flightstack.core.linear_algebra import pseudo_inverse
 from flightstack.params.battery import Battery, read_battery
+from flightstack.params.behaviour import SPECS, Behaviour
 from flightstack.params.sensors import NO_SENSORS, Sensors, read_sensors
 from flightstack.params.toml_file import (
     Table,
@@ -86,6 +87,14 @@ class Vehicle:
     sensors: Sensors = NO_SENSORS
     default_params: Defaults = ()
     """Parameters whose default is another one for this vehicle."""
+
+    @property
+    def behaviour(self) -> Behaviour:
+        """Return the parameters of guidance and commander, with this vehicle's defaults."""
+        behaviour = Behaviour()
+        for name, value in self.default_params:
+            behaviour = behaviour.updated(name, value) if name in SPECS else behaviour
+        return behaviour
 
     @property
     def weight_n(self) -> float:
@@ -209,6 +218,8 @@ _RATIO = "rotor_type.thrust_to_weight"
 
 def _set_numbers(file: Path, values: dict[str, Any], numbers: Mapping[str, float]) -> None:
     for path, number in numbers.items():
+        if path.startswith("params."):
+            raise ConfigError(file, path, "is no number of the vehicle: set the parameter itself")
         try:
             set_value(values, path, number)
         except KeyError as error:

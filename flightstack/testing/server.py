@@ -15,7 +15,8 @@ from types import TracebackType
 from typing import NoReturn
 
 from flightstack.core.port_numbers import api_client_port, ground_station_port
-from flightstack.params.behaviour import SPECS
+from flightstack.params.behaviour import SPECS, Behaviour
+from flightstack.params.vehicle import load_vehicle
 from flightstack.process.command_line import own_program
 from flightstack.testing.instances import ServerError, free_instance
 from flightstack.testing.setup import Setup
@@ -207,6 +208,7 @@ def fly_options(setup: Setup, instance: int, speed: float) -> FlyOptions:
     def numbers(values: Sequence[float]) -> str | None:
         return ",".join(repr(float(value)) for value in values) if any(values) else None
 
+    timeouts = client_timeouts(speed, load_vehicle(setup.vehicle).behaviour)
     return FlyOptions(
         vehicle=setup.vehicle,
         controller=setup.controller,
@@ -231,21 +233,23 @@ def fly_options(setup: Setup, instance: int, speed: float) -> FlyOptions:
         ideal_rotors=setup.ideal_rotors,
         inner_hz=setup.inner_hz,
         outer_hz=setup.outer_hz,
-        param=[f"{name}={value!r}" for name, value in (client_timeouts(speed) | dict(setup.params)).items()],
+        param=[f"{name}={value!r}" for name, value in (timeouts | dict(setup.params)).items()],
     )
 
 
-def client_timeouts(speed: float) -> dict[str, float]:
+def client_timeouts(speed: float, behaviour: Behaviour | None = None) -> dict[str, float]:
     """Return the loss timeouts that give a client on the wall clock the same time at any speed.
 
     The vehicle counts simulated time: at 5 times real time, the timeout of setpoints, 1 s, is 0.2 s of wall time.
+    ``behaviour`` has the timeouts in real time, by default those of the declarations.
 
     >>> client_timeouts(5.0)
     {'COM_DL_LOSS_T': 50, 'COM_OF_LOSS_T': 5.0, 'COM_RC_LOSS_T': 2.5}
     """
     found: dict[str, float] = {}
+    defaults = (Behaviour() if behaviour is None else behaviour).by_name()
     for name in _LOSS_TIMEOUTS:
         spec = SPECS[name]
-        value = min(spec.default * max(speed, 1.0), spec.high)
+        value = min(defaults[name] * max(speed, 1.0), spec.high)
         found[name] = int(value) if spec.is_integer else value
     return found

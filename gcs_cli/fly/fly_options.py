@@ -8,7 +8,7 @@ from pathlib import Path
 from flightstack.core.geodesy import GeoPoint
 from flightstack.core.port_numbers import system_id, vehicle_api_port, vehicle_ground_port
 from flightstack.firmware.choice import FREE, parse_loops
-from flightstack.params.behaviour import SPECS, Behaviour
+from flightstack.params.behaviour import SPECS
 from flightstack.params.config import DEFAULT_HOME, StackConfig, parse_home
 from flightstack.params.gains_file import hidden_gains
 from flightstack.params.store import read_assignment
@@ -75,7 +75,7 @@ def longest_flight_s(options: FlyOptions, plan: Plan) -> float:
         return options.limit_s
     values = {} if options.params is None else load_parameters(options.params)
     values.update(map(read_assignment, options.param or ()))
-    behaviour = Behaviour()
+    behaviour = load_vehicle(options.vehicle).behaviour
     for name in SPECS.keys() & values.keys():
         behaviour = behaviour.updated(name, values[name])
     return flight_limit_s(plan.items, home_of(options, plan), behaviour)

@@ -270,9 +270,6 @@ STREAMS: dict[str, Callable[[], Events]] = {
     "magnetometer turned, velocity refused": lambda: _with_params(
         _turned_field(_LONG(), 1.0), gnss_velocity_gate=0.3
     ),
-    "magnetometer reversed, velocity refused": lambda: _with_params(
-        _turned_field(_LONG(), np.pi), gnss_velocity_gate=0.02
-    ),
     "magnetometer late": lambda: _without(flown(), MAG_RING, end_s=2.5),
     "no barometer": lambda: _without(flown(), BARO_RING),
     "no GNSS": lambda: _without(flown(), GNSS_RING),

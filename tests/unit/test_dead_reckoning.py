@@ -28,7 +28,15 @@ from flightstack.estimation.error_state import (
     VELOCITY,
 )
 from flightstack.estimation.estimator_params import EstimatorParams
-from flightstack.estimation.kalman import BEHIND_SIZE, OBSERVATION_COLUMNS, OBSERVATIONS, Filter
+from flightstack.estimation.fusion import drift_gnss_bias
+from flightstack.estimation.kalman import (
+    BARO,
+    BEHIND_SIZE,
+    FUSED_S,
+    OBSERVATION_COLUMNS,
+    OBSERVATIONS,
+    Filter,
+)
 from flightstack.estimation.prediction import DeltaSample, ImuNoise
 from tests.support.generated_c import in_python
 
@@ -112,3 +120,15 @@ def test_state_moves_by_a_bias_as_the_covariance_says() -> None:
     assert f.nominal[8] == pytest.approx(GRAVITY * bias * t**3 / 6.0, rel=0.01)
     deviation = math.sqrt(variances(still(t, QUIET, bias))[2])
     assert f.nominal[8] == pytest.approx(deviation, rel=0.01)
+
+
+@pytest.mark.parametrize(("baro_s", "kept"), [(100.0, math.exp(-60.0 / 1800.0)), (90.0, math.exp(-1.0))])
+def test_height_error_of_gnss_returns_slowly_with_a_barometer_only(baro_s: float, kept: float) -> None:
+    f = still(0.1, EstimatorParams())
+    f.clock[0], f.observations[BARO, FUSED_S] = 100.0, baro_s
+    f.nominal[27], f.nominal[26] = 1.0, 1.0
+    row = np.array([100.0, *[0.0] * 6, 1.0, 1.0, 0.1])
+    for _ in range(600):
+        drift_gnss_bias(f, row, 0.1, EstimatorParams())
+    assert f.nominal[27] == pytest.approx(kept, rel=0.01)
+    assert f.nominal[26] == pytest.approx(math.exp(-1.0), rel=0.01)  # horizontal

@@ -13,10 +13,22 @@ import pytest
 from flightstack.core.errors import ConfigError
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.params.config import StackConfig
-from flightstack.params.vehicle import BUILT_IN, Vehicle, built_in_vehicles, load_vehicle
+from flightstack.params.vehicle import (
+    BUILT_IN,
+    Vehicle,
+    built_in_vehicles,
+    load_vehicle,
+    load_vehicle_with,
+)
+from flightstack.plan import load_plan
 from flightstack.testing import World
+from flightstack.testing.server import fly_options
+from flightstack.testing.setup import Setup
 from flightstack.vehicle.parameters import read_parameters
+from gcs_cli.fly.fly_flags import FlyOptions
+from gcs_cli.fly.fly_options import longest_flight_s
 
+MISSIONS = Path(__file__).parents[2] / "missions"
 PAPER = (BUILT_IN / "paper_quad.toml").read_text(encoding="utf-8")
 
 
@@ -286,3 +298,17 @@ def test_estimator_has_the_noise_of_the_vehicle_file(name: str) -> None:
 def test_bad_default_parameter_raises_config_error(tmp_path: Path, line: str, problem: str) -> None:
     with pytest.raises(ConfigError, match=re.escape(problem)):
         load_text(tmp_path, with_params(line))
+
+
+def test_limit_of_a_flight_and_timeouts_follow_the_vehicle_file(tmp_path: Path) -> None:
+    load_text(tmp_path, with_params("MPC_XY_CRUISE = 0.5\nCOM_OF_LOSS_T = 4.0"))
+    file, plan = str(tmp_path / "my.toml"), load_plan(MISSIONS / "square.plan")
+    options = [FlyOptions(MISSIONS / "square.plan", vehicle=vehicle) for vehicle in (file, "paper_quad")]
+    slow, usual = (longest_flight_s(chosen, plan) for chosen in options)
+    assert slow > 2.0 * usual
+    assert f"COM_OF_LOSS_T={8.0!r}" in (fly_options(Setup(vehicle=file), 0, 2.0).param or ())
+
+
+def test_default_parameter_is_no_number_of_the_vehicle() -> None:
+    with pytest.raises(ConfigError, match=r"params.RTL_RETURN_ALT: is no number of the vehicle"):
+        load_vehicle_with("x_quad", {"params.RTL_RETURN_ALT": 12.0})

@@ -27,6 +27,7 @@
 #define FS_UNKNOWN_M_S FS_LIT(0.5)
 #define FS_UNKNOWN_VERTICAL_M FS_LIT(8.0)
 #define FS_UNKNOWN_M FS_LIT(5.0)
+#define FS_BARO_LOST_S FS_LIT(5.0)
 #define FS_GNSS_BIAS 24
 #define FS_HEIGHT_RETURN_S FS_LIT(1800.0)
 #define FS_VELOCITY_IS_WRONG FS_LIT(2.0)
@@ -39,7 +40,7 @@
 #define FS_GNSS_POSITION 3
 #define FS_REFUSED 7
 
-/* fusion.py:193 */
+/* fusion.py:196 */
 void fs_fuse_field_axis(fs_filter *f, int32_t axis, const fs_vector3 *measured, const fs_estimator_params *params)
 {
     const fs_real largest = params->mag_largest_noise_gauss;
@@ -71,7 +72,7 @@ void fs_fuse_field_axis(fs_filter *f, int32_t axis, const fs_vector3 *measured, 
     (void)fs_fuse(f, FS_MAG + axis, innovation, &noise, FS_LIT(1.0) - params->mag_corrects_tilt);
 }
 
-/* fusion.py:213 */
+/* fusion.py:216 */
 void fs_fuse_field(fs_filter *f, const fs_vector3 *measured, const fs_estimator_params *params)
 {
     for (int32_t axis = 0; axis < 3; axis++) {
@@ -79,7 +80,7 @@ void fs_fuse_field(fs_filter *f, const fs_vector3 *measured, const fs_estimator_
     }
 }
 
-/* fusion.py:245 */
+/* fusion.py:248 */
 void fs_fuse_rest_velocity(fs_filter *f, int32_t axis, const fs_estimator_params *params)
 {
     const fs_real velocity = params->rest_velocity_noise_m_s;
@@ -89,7 +90,7 @@ void fs_fuse_rest_velocity(fs_filter *f, int32_t axis, const fs_estimator_params
     (void)fs_fuse(f, FS_REST_VELOCITY + axis, -f->nominal[4 + axis], &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:255 */
+/* fusion.py:258 */
 void fs_fuse_rest_rate(fs_filter *f, int32_t axis, const fs_vector3 *rate_rad_s, fs_real variance,
                        const fs_estimator_params *params)
 {
@@ -101,7 +102,7 @@ void fs_fuse_rest_rate(fs_filter *f, int32_t axis, const fs_vector3 *rate_rad_s,
     (void)fs_fuse(f, FS_REST_RATE + axis, value - f->nominal[10 + axis], &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:271 */
+/* fusion.py:274 */
 void fs_fuse_hold(fs_filter *f, int32_t axis, fs_real held_m, const fs_estimator_params *params)
 {
     const fs_noise noise = {
@@ -116,7 +117,7 @@ void fs_fuse_hold(fs_filter *f, int32_t axis, fs_real held_m, const fs_estimator
     (void)fs_fuse(f, FS_HOLD_POSITION + axis, held_m - f->nominal[7 + axis], &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:220 */
+/* fusion.py:223 */
 void fs_fuse_drag(fs_filter *f, int32_t axis, const fs_vector3 *force, const fs_estimator_params *params)
 {
     const fs_real deviation = fs_sqrt(params->drag_variance);
@@ -143,7 +144,7 @@ void fs_fuse_drag(fs_filter *f, int32_t axis, const fs_vector3 *force, const fs_
     (void)fs_fuse(f, FS_DRAG + axis, innovation, &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:159 */
+/* fusion.py:162 */
 void fs_fuse_baro(fs_filter *f, fs_real altitude_m, fs_real age_s, const fs_estimator_params *params)
 {
     const bool is_aided = f->clock[0] - f->observations[FS_GNSS_VELOCITY][FS_FUSED_S] < FS_AIDED_S;
@@ -161,7 +162,7 @@ void fs_fuse_baro(fs_filter *f, fs_real altitude_m, fs_real age_s, const fs_esti
     (void)fs_fuse(f, FS_BARO, altitude_m - predicted_m, &noise, is_aided ? FS_LIT(0.0) : FS_HOLDS_HORIZONTAL);
 }
 
-/* fusion.py:175 */
+/* fusion.py:178 */
 fs_real fs_cos_tilt_of(const fs_filter *f)
 {
     const fs_real x = f->nominal[1];
@@ -170,7 +171,7 @@ fs_real fs_cos_tilt_of(const fs_filter *f)
     return cosine;
 }
 
-/* fusion.py:183 */
+/* fusion.py:186 */
 void fs_fuse_range(fs_filter *f, fs_real vertical_m, fs_real ground_m, fs_real age_s,
                    const fs_estimator_params *params)
 {
@@ -187,46 +188,47 @@ void fs_fuse_range(fs_filter *f, fs_real vertical_m, fs_real ground_m, fs_real a
     (void)fs_fuse(f, FS_RANGE, vertical_m - height_m, &noise, FS_LIT(0.0));
 }
 
-/* Return an accuracy that a receiver states; unknown if it states none. Zero is an ideal receiver's. fusion.py:66 */
+/* Return an accuracy that a receiver states; unknown if it states none. Zero is an ideal receiver's. fusion.py:67 */
 static fs_real stated(fs_real accuracy, fs_real unknown)
 {
     return fs_is_finite(accuracy) && accuracy >= FS_LIT(0.0) ? accuracy : unknown;
 }
 
-/* fusion.py:84 */
+/* fusion.py:85 */
 fs_real fs_speed_accuracy(const fs_real row[10])
 {
     return stated(row[9], FS_UNKNOWN_M_S);
 }
 
-/* fusion.py:78 */
+/* fusion.py:79 */
 fs_real fs_vertical_accuracy(const fs_real row[10])
 {
     return stated(row[8], FS_UNKNOWN_VERTICAL_M);
 }
 
-/* fusion.py:72 */
+/* fusion.py:73 */
 fs_real fs_horizontal_accuracy(const fs_real row[10])
 {
     return stated(row[7], FS_UNKNOWN_M);
 }
 
-/* fusion.py:90 */
+/* fusion.py:91 */
 fs_real fs_gnss_bias_share(const fs_estimator_params *params, int32_t axis)
 {
     return params->gnss_bias_share * (axis == 2 ? fs_sqrt(FS_LIT(2.0)) : FS_LIT(1.0));
 }
 
-/* fusion.py:96 */
+/* fusion.py:97 */
 void fs_drift_gnss_bias(fs_filter *f, const fs_real row[10], fs_real elapsed_s, const fs_estimator_params *params)
 {
     const fs_real eph_m = fs_horizontal_accuracy(row);
     const fs_real epv_m = fs_vertical_accuracy(row);
     const fs_real kept = fs_max(FS_LIT(0.0), FS_LIT(1.0) - elapsed_s / params->gnss_bias_s);
+    const bool has_baro = f->clock[0] - f->observations[FS_BARO][FS_FUSED_S] < FS_BARO_LOST_S;
     for (int32_t at = 24; at < 27; at++) {
         const fs_real spread = fs_gnss_bias_share(params, at - FS_GNSS_BIAS) *
                                (at == FS_GNSS_BIAS + 2 ? epv_m : eph_m);
-        const fs_real return_s = at == FS_GNSS_BIAS + 2 ? FS_HEIGHT_RETURN_S : params->gnss_bias_s;
+        const fs_real return_s = has_baro && at == FS_GNSS_BIAS + 2 ? FS_HEIGHT_RETURN_S : params->gnss_bias_s;
         const fs_real left = fs_max(FS_LIT(0.0), FS_LIT(1.0) - elapsed_s / return_s);
         f->nominal[at + 1] *= left;
         for (int32_t j = 0; j < at + 1; j++) {
@@ -244,7 +246,7 @@ void fs_drift_gnss_bias(fs_filter *f, const fs_real row[10], fs_real elapsed_s, 
  *
  * Fast motion and vibration look like noise of the IMU, but do not add up to an error of the velocity.
  *
- * fusion.py:117
+ * fusion.py:120
  */
 static void confirm_imu_noise(fs_filter *f, int32_t row)
 {
@@ -254,7 +256,7 @@ static void confirm_imu_noise(fs_filter *f, int32_t row)
                                 FS_LEAST_SHARE), FS_LIT(1.0));
 }
 
-/* fusion.py:128 */
+/* fusion.py:131 */
 void fs_fuse_gnss_velocity(fs_filter *f, const fs_real row[10], int32_t axis, fs_real fault,
                            const fs_estimator_params *params)
 {
@@ -276,7 +278,7 @@ void fs_fuse_gnss_velocity(fs_filter *f, const fs_real row[10], int32_t axis, fs
     }
 }
 
-/* fusion.py:141 */
+/* fusion.py:144 */
 void fs_fuse_gnss_position(fs_filter *f, const fs_real row[10], fs_real age_s, int32_t axis, fs_real fault,
                            const fs_estimator_params *params)
 {

@@ -35,11 +35,11 @@
 #define FS_YAW_TURN 0
 #define FS_YAW_VARIANCE 1
 #define FS_CONVERGED_RAD FS_LIT(0.262)
-#define FS_REFUSED_S FS_LIT(1.0)
-#define FS_CERTAIN_SQUARE FS_LIT(16.0)
 #define FS_YAW_WRONG_S 3
 #define FS_ATTITUDE 0
 #define FS_WRONG_YAW_RAD FS_LIT(0.436)
+#define FS_CERTAIN_SQUARE FS_LIT(16.0)
+#define FS_REFUSED_S FS_LIT(1.0)
 
 /* yaw_sources.py:177 */
 void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_sample *step)
@@ -201,33 +201,7 @@ int32_t fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[],
     return axis < 2 ? axis + 1 : 0;
 }
 
-/* Return True if horizontal GNSS velocities are refused. yaw_sources.py:217 */
-static bool is_refused(const fs_estimator_memory *m)
-{
-    const bool refused = fs_max(m->refused_s[0], m->refused_s[1]) > FS_REFUSED_S;
-    return refused;
-}
-
-/* Return True if the turn to the models' yaw is beyond their uncertainty. yaw_sources.py:210 */
-static bool is_certain(const fs_real fix[])
-{
-    const bool certain = fix[FS_YAW_TURN] * fix[FS_YAW_TURN] > FS_CERTAIN_SQUARE * fix[FS_YAW_VARIANCE];
-    return certain;
-}
-
-/*
- * Return True if a known yaw is so wrong that models which have not converged are better.
- *
- * It turns the vehicle's corrections away from the setpoint, and GNSS velocities are refused: seconds cost metres.
- *
- * yaw_sources.py:224
- */
-static bool is_far_off(const fs_estimator_memory *m)
-{
-    return m->flags[FS_HAS_YAW] == 1 && is_refused(m) && is_certain(m->yaw_fix);
-}
-
-/* Take tilt and yaw from the models, velocity and position from GNSS. yaw_sources.py:246 */
+/* Take tilt and yaw from the models, velocity and position from GNSS. yaw_sources.py:224 */
 static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 {
     m->yaw_fix[FS_YAW_WRONG_S] = FS_LIT(0.0);
@@ -258,12 +232,13 @@ static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real 
 
 /*
  * Return True if the models have contradicted the yaw for a second, or do while GNSS velocities are refused.
- * yaw_sources.py:233
+ * yaw_sources.py:210
  */
 static bool is_wrong(fs_estimator_memory *m, fs_real time_s)
 {
     const bool differs = fs_abs(m->yaw_fix[FS_YAW_TURN]) > FS_WRONG_YAW_RAD;
-    if (!(differs && is_certain(m->yaw_fix))) {
+    if (!(differs && m->yaw_fix[FS_YAW_TURN] * m->yaw_fix[FS_YAW_TURN] > FS_CERTAIN_SQUARE *
+          m->yaw_fix[FS_YAW_VARIANCE])) {
         m->yaw_fix[FS_YAW_WRONG_S] = FS_LIT(0.0);
     } else {
         if (m->yaw_fix[FS_YAW_WRONG_S] == FS_LIT(0.0)) {
@@ -271,7 +246,8 @@ static bool is_wrong(fs_estimator_memory *m, fs_real time_s)
         }
     }
     const bool lasts = m->yaw_fix[FS_YAW_WRONG_S] > FS_LIT(0.0) && time_s - m->yaw_fix[FS_YAW_WRONG_S] > FS_REFUSED_S;
-    return lasts || (differs && is_refused(m));
+    const bool is_refused = fs_max(m->refused_s[0], m->refused_s[1]) > FS_REFUSED_S;
+    return lasts || (differs && is_refused);
 }
 
 /* yaw_sources.py:186 */
@@ -293,7 +269,7 @@ void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
     m->yaw_fix[FS_YAW_TURN] = fs_mean_turn((const fs_real(*)[32])m->yaw_models, &attitude);
     m->yaw_fix[FS_YAW_VARIANCE] = fs_variance_of((const fs_real(*)[32])m->yaw_models, &attitude,
                                                  m->yaw_fix[FS_YAW_TURN]);
-    if (m->yaw_fix[FS_YAW_VARIANCE] > FS_CONVERGED_RAD * FS_CONVERGED_RAD && !is_far_off(m)) {
+    if (m->yaw_fix[FS_YAW_VARIANCE] > FS_CONVERGED_RAD * FS_CONVERGED_RAD) {
         return;
     }
     if (m->flags[FS_HAS_YAW] == 0) {
