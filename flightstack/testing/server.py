@@ -14,6 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import NoReturn
 
+from flightstack.core.errors import ConfigError
 from flightstack.core.port_numbers import api_client_port, ground_station_port
 from flightstack.params.behaviour import SPECS, Behaviour
 from flightstack.params.vehicle import load_vehicle
@@ -208,7 +209,7 @@ def fly_options(setup: Setup, instance: int, speed: float) -> FlyOptions:
     def numbers(values: Sequence[float]) -> str | None:
         return ",".join(repr(float(value)) for value in values) if any(values) else None
 
-    timeouts = client_timeouts(speed, load_vehicle(setup.vehicle).behaviour)
+    timeouts = client_timeouts(speed, _behaviour_of(setup.vehicle))
     return FlyOptions(
         vehicle=setup.vehicle,
         controller=setup.controller,
@@ -235,6 +236,14 @@ def fly_options(setup: Setup, instance: int, speed: float) -> FlyOptions:
         outer_hz=setup.outer_hz,
         param=[f"{name}={value!r}" for name, value in (timeouts | dict(setup.params)).items()],
     )
+
+
+def _behaviour_of(vehicle: str) -> Behaviour:
+    """Return the vehicle's default parameters; the general ones for a bad file, which the simulator reports."""
+    try:
+        return load_vehicle(vehicle).behaviour
+    except ConfigError:
+        return Behaviour()
 
 
 def client_timeouts(speed: float, behaviour: Behaviour | None = None) -> dict[str, float]:
