@@ -43,3 +43,11 @@ def test_programs_of_a_killed_test_process_end() -> None:
         client.kill()
     assert select.select([program], [], [], 60.0)[0]
     os.close(program)
+
+
+def test_a_signal_to_a_program_whose_end_is_not_reported_yet_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    program = Program("sim_bridge", ["--version"])
+    program.communicate(timeout=60)
+    monkeypatch.setattr(program, "poll", lambda: None)  # its process is gone, the server has not said so
+    program.kill()
+    assert program.returncode == 0
