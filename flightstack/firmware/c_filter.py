@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from flightstack.core.contract import FloatArray, Record, RecordArray
+from flightstack.core.contract import FloatArray, RecordArray
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.memory import MEMORY, EstimatorMemory
-from flightstack.firmware.generator.types import INT, Array, Scalar, has_arrays
+from flightstack.firmware.generator.types import INT, Array, Table, has_arrays
 from flightstack.firmware.generator.types import Record as RecordType
 from flightstack.firmware.sources import c_files, files, firmware_root
 from flightstack.firmware.toolchain.build import EXACT, cached, host_compiler, includes
@@ -33,12 +34,13 @@ def c_layout(kind: type, real: str) -> np.dtype[np.void]:
     for name, inner in RecordType(kind).fields.items():
         if isinstance(inner, Array):
             fields.append((name, "i4" if inner.item is INT else real, inner.shape))
-        elif has_arrays(inner):
-            assert isinstance(inner, RecordType)
-            fields.append((name, c_layout(inner.kind, real)))
+        elif isinstance(inner, Table):
+            fields.append((name, c_layout(inner.record.kind, real), inner.size))
+        elif isinstance(inner, RecordType):
+            is_row = not has_arrays(inner)
+            fields.append((name, real, len(inner.fields)) if is_row else (name, c_layout(inner.kind, real)))
         else:
-            assert not isinstance(inner, Scalar)
-            fields.append((name, real, (len(inner.fields),)))  # type: ignore[union-attr]
+            fields.append((name, "i4" if inner is INT else real))
     return np.dtype(fields, align=True)
 
 
@@ -94,28 +96,29 @@ class CFilter:
     def read(self) -> RecordArray:
         """Return the memory as the estimator in Python has it, shape (1,)."""
         made = np.zeros(1, MEMORY)
-        copy_memory(self.memory[0], made[0])
+        copy_memory(self.memory, made)
         return made
 
     def write(self, memory: RecordArray) -> None:
         """Take over the memory of an estimator in Python."""
-        for name, values in _leaves(self.memory[0]):
-            values[...] = memory[0][name]
+        for held, shown in _pairs(self.memory, memory):
+            held[...] = shown
 
 
-def copy_memory(held: Record, shown: Record) -> None:
-    """Copy a memory in C to one in Python's layout."""
-    for name, values in _leaves(held):
-        shown[name] = values
+def copy_memory(held: RecordArray, shown: RecordArray) -> None:
+    """Copy a memory in C, shape (1,), to one in Python's layout."""
+    for values, place in _pairs(held, shown):
+        place[...] = values
 
 
-def _leaves(record: Record) -> list[tuple[str, Any]]:
-    """Return names and arrays of a record and of the records in it."""
-    found: list[tuple[str, Any]] = []
-    for name in record.dtype.names:
-        inner = record[name]
-        found += _leaves(inner) if inner.dtype.names else [(name, inner)]
-    return found
+def _pairs(held: RecordArray, shown: RecordArray) -> Iterator[tuple[Any, Any]]:
+    """Yield each array of numbers in records of C, and that of Python, in which the fields of parts stand themselves."""
+    for name in held.dtype.names or ():
+        inner = held[name]
+        if inner.dtype.names is None:
+            yield inner, shown[name]
+        else:
+            yield from _pairs(inner, shown[name] if name in (shown.dtype.names or ()) else shown)
 
 
 def _library(real: str) -> ctypes.CDLL:

@@ -33,6 +33,7 @@ from tests.firmware.core_support import run_tool
 from tests.parity import generated_laws as laws
 from tests.parity.generated_filter import FILTERS, AttitudeFilter, FilterNoise
 from tests.parity.generated_laws import LAWS
+from tests.parity.generated_records import RECORDS
 from tests.support.generated_c import WARNINGS, compile_program, in_python
 from tests.support.plugin_site import example_module
 from tests.support.rotor_sets import ring
@@ -57,7 +58,7 @@ OWN: dict[str, Callable[..., Any]] = {
     "logarithm": portable_math.log,
     "distance": portable_math.distance,
 }
-EVERY = {**OWN, **LAWS, **FILTERS, "LQR": example_module().step}
+EVERY = {**OWN, **LAWS, **FILTERS, **RECORDS, "LQR": example_module().step}
 
 
 @compiled
@@ -177,7 +178,7 @@ def test_difference_in_the_last_bit_is_found(built: Built) -> None:
 
 
 @pytest.mark.skipif(not NIGHTLY, reason="compiles each law with Numba")
-@pytest.mark.parametrize("name", [*LAWS, *FILTERS, "LQR", "trajectory"])
+@pytest.mark.parametrize("name", [*LAWS, *FILTERS, *RECORDS, "LQR", "trajectory"])
 def test_generated_law_has_the_bits_of_numba(name: str, built: Built) -> None:
     function = built.functions[name]
     vectors = Vectors(9, edges=0.0 if name == "trajectory" else 0.02)  # compiled, math.floor of NaN is -2**63

@@ -62,6 +62,9 @@ class Part(NamedTuple):
 class Kept(NamedTuple):
     part: Part
     z: Annotated[FloatArray, 2]
+    count: int
+    inner: Annotated[Record, Part]
+    parts: Annotated[RecordArray, Part, 2]
 
 @compiled
 def law(x: float, n: int, flag: bool, v: Vector3, a: Annotated[FloatArray, 3], box: Box, counts: Counts,
@@ -101,6 +104,16 @@ REFUSED = {
     "return v[0]": "index of a NamedTuple",
     "return kept['missing'][0]": "index of a record",
     "return many[1]['z'][0]": "index of a record",
+    "return kept['part']['y'][0]": "index of a NamedTuple",
+    "return kept.z[0]": "attribute",
+    "return kept['inner'].y[0]": "attribute",
+    "return kept['parts'][-1]['y'][0]": "index",
+    "return kept['parts'][x]['y'][0]": "index",
+    "kept['count'] = x\nreturn x": "values of different types",
+    "kept['inner'] = kept['parts'][0]\nreturn x": "array value",
+    "part = kept['inner']\npart = kept['parts'][0]\nreturn x": "array value",
+    "part = kept['inner'] if flag else kept['parts'][0]\nreturn x": "array value",
+    "y, z = kept['inner']\nreturn x": "tuple",
     "part = Part(kept['z'])\nreturn x": "NamedTuple of arrays",
     "return a[x]": "index",
     "return a[-1]": "index",

@@ -21,6 +21,7 @@ from flightstack.firmware.generator.types import (
     Several,
     c_type,
     has_arrays,
+    is_numpy,
     is_record,
 )
 from flightstack.firmware.generator.values import PRODUCT, SUM, Form, Value, as_real
@@ -99,7 +100,11 @@ class Assignments:
                 self._put(element, part)
             return
         value = self.expressions.value(source)
-        if not isinstance(value.type, Record) or len(value.type.fields) != len(target.elts):
+        if (
+            not isinstance(value.type, Record)
+            or is_numpy(value.type)
+            or len(value.type.fields) != len(target.elts)
+        ):
             raise self.function.refusal(source, "tuple", "unpacking of a value that is no tuple")
         fields = list(value.type.fields)
         if value.form is Form.MADE:
@@ -191,7 +196,8 @@ class Assignments:
                 writer.line(f"const {kind} *{variable.name} = {pointer};")
             return
         if has_arrays(value.type):
-            raise self.function.refusal(node, "array value", "copy of a NamedTuple with arrays")
+            kind_of = "record" if is_numpy(value.type) else "NamedTuple with arrays"
+            raise self.function.refusal(node, "array value", f"copy of a {kind_of}")
         head = f"{'const ' if variable.is_stable else ''}{kind} " if is_new else ""
         writer.store(f"{head}{variable.name} = ", value)
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.lib.recfunctions import structured_to_unstructured
 
 from flightstack.core.contract import MAX_ROTORS, FloatArray
+from flightstack.core.record_types import dtype_of
 from flightstack.firmware.generator.law import Function
 from flightstack.firmware.generator.types import (
     BOOL,
@@ -19,7 +21,9 @@ from flightstack.firmware.generator.types import (
     ROTORS,
     Array,
     Record,
+    Scalar,
     Several,
+    Table,
     Type,
     has_rotors,
 )
@@ -44,6 +48,8 @@ def _layout(kind: Type) -> Any:
         for size in reversed(kind.shape):
             made = made * (MAX_ROTORS if size == ROTORS else int(size))
         return made
+    if isinstance(kind, Table):
+        return _layout(kind.record) * kind.size
     if isinstance(kind, Record):
         fields = [(f"_{name}", _layout(inner)) for name, inner in kind.fields.items()]
         head = [("rotors", ctypes.c_int32)] if has_rotors(kind) else []
@@ -51,30 +57,45 @@ def _layout(kind: Type) -> Any:
     return {REAL: ctypes.c_double, INT: ctypes.c_int32, BOOL: ctypes.c_bool, NOTHING: None}[kind]  # type: ignore[index]
 
 
+def _fields(kind: Record, value: Any) -> Iterator[tuple[str, Type, Any]]:
+    """Yield name, type and value of the fields of a NamedTuple, or of a record of NumPy."""
+    values = [value[name] for name in kind.fields] if kind.is_numpy else value
+    for (name, inner), item in zip(kind.fields.items(), values, strict=True):
+        yield name, inner, item
+
+
 def _fill(kind: Type, place: Any, value: Any) -> None:
     """Write the fields of a structure, or the items of an array."""
-    if isinstance(kind, Array):
+    if isinstance(kind, Array | Table):
+        inner = kind.record if isinstance(kind, Table) else Array(kind.shape[1:], kind.item)
         for at, item in enumerate(value):
-            if len(kind.shape) > 1:
-                _fill(Array(kind.shape[1:], kind.item), place[at], item)
+            if isinstance(inner, Record) or inner.shape:
+                _fill(inner, place[at], item)
             else:
                 place[at] = item
         return
     assert isinstance(kind, Record)
-    for (name, inner), item in zip(kind.fields.items(), value, strict=True):
-        if isinstance(inner, Record | Array):
-            _fill(inner, getattr(place, f"_{name}"), item)
+    for name, field, item in _fields(kind, value):
+        if isinstance(field, Record | Array | Table):
+            _fill(field, getattr(place, f"_{name}"), item)
         else:
             setattr(place, f"_{name}", item)
 
 
 def _read_back(kind: Type, place: Any, value: Any) -> None:
-    """Write C's arrays to Python's."""
+    """Write C's arrays and records to Python's."""
     if isinstance(kind, Array):
         value[...] = np.ctypeslib.as_array(place)[tuple(slice(0, size) for size in value.shape)]
+    if isinstance(kind, Table):
+        for at, item in enumerate(value):
+            _read_back(kind.record, place[at], item)
     if isinstance(kind, Record):
-        for (name, inner), item in zip(kind.fields.items(), value, strict=True):
-            _read_back(inner, getattr(place, f"_{name}"), item)
+        for name, inner, item in _fields(kind, value):
+            made = getattr(place, f"_{name}")
+            if kind.is_numpy and isinstance(inner, Scalar):
+                value[name] = made
+            else:
+                _read_back(inner, made, item)
 
 
 def _flat(kind: Type, value: Any) -> list[float]:
@@ -132,10 +153,9 @@ class Vectors:
     def value(self, kind: Type) -> Any:
         """Return a value: NumPy's floats, so that divisions by zero do not raise."""
         if isinstance(kind, Record):
-            return kind.kind(*(self.value(inner) for inner in kind.fields.values()))
-        if isinstance(kind, Array):
-            sizes = [ROTOR_COUNT if size == ROTORS else int(size) for size in kind.shape]
-            return np.array([self.value(kind.item) for _ in range(math.prod(sizes))]).reshape(sizes)
+            return self._record(kind)
+        if isinstance(kind, Array | Table):
+            return self._array(kind)
         if kind is INT:
             return int(self._random.integers(-3, 4))
         if kind is BOOL:
@@ -143,6 +163,16 @@ class Vectors:
         if self._random.random() < self._edges:
             return np.float64(self._random.choice(EDGES))
         return np.float64(self._random.normal() * self._random.choice([1e-3, 1.0, 1.0, 30.0]))
+
+    def _array(self, kind: Array | Table) -> Any:
+        if isinstance(kind, Table):
+            return np.array([self._record(kind.record) for _ in range(kind.size)])
+        sizes = [ROTOR_COUNT if size == ROTORS else int(size) for size in kind.shape]
+        return np.array([self.value(kind.item) for _ in range(math.prod(sizes))]).reshape(sizes)
+
+    def _record(self, kind: Record) -> Any:
+        values = tuple(self.value(inner) for inner in kind.fields.values())
+        return np.array([values], dtype_of(kind.kind))[0] if kind.is_numpy else kind.kind(*values)
 
     def arguments(self, function: Function) -> list[Any]:
         """Return arguments of a function."""
@@ -170,12 +200,14 @@ def _outcome(function: Callable[..., Any], values: Sequence[Any]) -> FloatArray:
 def _copied(value: Any) -> Any:
     if isinstance(value, tuple):
         return type(value)(*(_copied(item) for item in value))
-    return value.copy() if isinstance(value, np.ndarray) else value
+    return value.copy() if isinstance(value, np.ndarray | np.void) else value
 
 
 def _arrays(value: Any) -> list[FloatArray]:
     if isinstance(value, tuple):
         return [array for item in value for array in _arrays(item)]
+    if isinstance(value, np.ndarray | np.void) and value.dtype.names:
+        return [structured_to_unstructured(np.asarray(value))]
     return [value] if isinstance(value, np.ndarray) else []
 
 

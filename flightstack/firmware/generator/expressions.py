@@ -24,6 +24,7 @@ from flightstack.firmware.generator.types import (
     Array,
     Record,
     Single,
+    Table,
     c_type,
     has_arrays,
 )
@@ -176,7 +177,8 @@ class Expressions:
         owner = self.value(node.value)
         if isinstance(owner.type, Array) and node.attr == "size" and len(owner.type.shape) == 1:
             return self.writer.size_of(owner) or self.size(node, owner.type.shape[0])
-        if not isinstance(owner.type, Record) or node.attr not in owner.type.fields:
+        is_tuple = isinstance(owner.type, Record) and not owner.type.is_numpy
+        if not is_tuple or node.attr not in owner.type.fields:  # type: ignore[union-attr]
             raise self.function.refusal(node, "attribute", f"attribute .{node.attr}")
         return self.field(owner, node.attr)
 
@@ -205,7 +207,7 @@ class Expressions:
             if isinstance(array.type, Array) and axis in range(len(array.type.shape)):
                 return self.size(node, array.type.shape[axis])
         array = self.value(shape)
-        if isinstance(array.type, Record | Single):
+        if isinstance(array.type, Record | Single | Table):
             return self.records.item(node, array)
         if not isinstance(array.type, Array):
             raise self.function.refusal(node, "index", "index of a number")

@@ -24,6 +24,7 @@ from flightstack.firmware.generator.types import (
     Record,
     Several,
     Single,
+    Table,
     Type,
     annotated,
     prefix_of,
@@ -187,7 +188,7 @@ def _type(function: Function, node: ast.AST, annotation: ast.expr | None) -> Typ
 
 def _check_fields(kind: Type) -> None:
     """Raise TypeError if a field of a record is outside the subset."""
-    if isinstance(kind, Record | Single):
+    if isinstance(kind, Record | Single | Table):
         record = kind if isinstance(kind, Record) else kind.record
         for inner in record.fields.values():
             _check_fields(inner)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from flightstack.core.array_items import as_tuple
 from flightstack.firmware.generator.law import Function
-from flightstack.firmware.generator.types import Record, Single
+from flightstack.firmware.generator.types import INT, Record, Single, Table
 from flightstack.firmware.generator.values import Value
 
 if TYPE_CHECKING:
@@ -25,14 +25,16 @@ class Records:
         self.function, self.expressions = function, expressions
 
     def item(self, node: ast.Subscript, record: Value) -> Value:
-        """Return a field of a NumPy record, or the record of an array of one."""
+        """Return a field of a NumPy record, or a record of an array."""
+        if isinstance(record.type, Table):
+            return self._element(node, record, record.type)
         key = self.expressions.constant(node.slice)
         if isinstance(record.type, Single):
             if key != 0 or not isinstance(key, int):
                 raise self.function.refusal(node, "index of a record")
             return replace(record, type=record.type.record)
         assert isinstance(record.type, Record)
-        if not isinstance(key, str):
+        if not isinstance(key, str) or not record.type.is_numpy:
             raise self.function.refusal(node, "index of a NamedTuple")
         part = record.type.part_with(key)
         if part is not None:
@@ -40,6 +42,13 @@ class Records:
         if key not in record.type.fields:
             raise self.function.refusal(node, "index of a record", f"field {key} of a record")
         return self.expressions.field(record, key)
+
+    def _element(self, node: ast.Subscript, table: Value, kind: Table) -> Value:
+        index = self.expressions.value(node.slice)
+        is_negative = isinstance(index.literal, int) and index.literal < 0
+        if index.type is not INT or is_negative:
+            raise self.function.refusal(node, "index", "negative index" if is_negative else "")
+        return Value(kind.record, f"{table.text}[{index.text}]", root=table.root)
 
     def row(self, node: ast.Call) -> Value | None:
         """Return the field of a record that ``Params(*as_tuple(record["params"], SIZE))`` reads; else None."""

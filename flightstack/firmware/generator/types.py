@@ -36,9 +36,10 @@ REAL, INT, BOOL, WHOLE, NOTHING = Scalar.REAL, Scalar.INT, Scalar.BOOL, Scalar.W
 
 @dataclass(frozen=True)
 class Record:
-    """A NamedTuple."""
+    """A NamedTuple, or the record of NumPy that it declares, whose fields are written in place."""
 
     kind: type
+    is_numpy: bool = False
 
     @property
     def fields(self) -> dict[str, Type]:
@@ -47,10 +48,10 @@ class Record:
 
     def part_with(self, name: str) -> str | None:
         """Return the field with the part of a NumPy record that has the field ``name``, or None."""
-        parts = (
-            part for part, inner in self.fields.items() if isinstance(inner, Record) and has_arrays(inner)
-        )
-        return next((part for part in parts if name in _fields(self.fields[part].kind)), None)  # type: ignore[union-attr]
+        for part, inner in self.fields.items():
+            if has_arrays(inner) and not is_numpy(inner) and name in inner.fields:  # type: ignore[union-attr]
+                return part
+        return None
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,14 @@ class Single:
     """A NumPy array of one record."""
 
     record: Record
+
+
+@dataclass(frozen=True)
+class Table:
+    """A NumPy array of records, a field of a structure."""
+
+    record: Record
+    size: int
 
 
 @dataclass(frozen=True)
@@ -75,7 +84,7 @@ class Array:
     item: Scalar = Scalar.REAL
 
 
-Type: TypeAlias = Scalar | Record | Single | Several | Array
+Type: TypeAlias = Scalar | Record | Single | Table | Several | Array
 
 
 @functools.cache
@@ -92,6 +101,11 @@ def is_record(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields")
 
 
+def is_numpy(kind: Type) -> bool:
+    """Return True for a record of NumPy."""
+    return isinstance(kind, Record) and kind.is_numpy
+
+
 def has_rotors(kind: Type) -> bool:
     """Return True for a record with arrays of one item per rotor: its structure has their number."""
     return isinstance(kind, Record) and any(
@@ -100,9 +114,10 @@ def has_rotors(kind: Type) -> bool:
 
 
 def has_arrays(kind: Type) -> bool:
-    """Return True for a record with an array, or with a record that has one."""
-    return isinstance(kind, Record) and any(
-        isinstance(field, Array) or has_arrays(field) for field in kind.fields.values()
+    """Return True for a record with an array, or with a record that has one: it is written in place."""
+    return is_numpy(kind) or (
+        isinstance(kind, Record)
+        and any(isinstance(field, Array | Table) or has_arrays(field) for field in kind.fields.values())
     )
 
 
@@ -123,7 +138,7 @@ def c_type(kind: Type) -> str:
         return c_type(kind.item)
     if kind is WHOLE:
         return REAL.value
-    if isinstance(kind, Single):
+    if isinstance(kind, Single | Table):
         kind = kind.record
     return record_name(kind.kind) if isinstance(kind, Record) else kind.value  # type: ignore[union-attr]
 
@@ -158,11 +173,14 @@ def _item(base: Any, names: Mapping[str, Any]) -> Scalar | None:
 
 
 def _annotated_type(value: Any, names: Mapping[str, Any]) -> Type | None:
-    """Return the type of ``Annotated[FloatArray, N]``, or of a NumPy record: ``Annotated[Record, Kind]``; else None."""
+    """Return the type of ``Annotated[FloatArray, N]``, or of NumPy records: ``Annotated[Record, Kind]``; else None."""
     base, *shape = get_args(value)
-    if len(shape) == 1 and is_record(shape[0]):
-        record = Record(shape[0])
-        return record if base is contract.Record else Single(record)
+    if shape and is_record(shape[0]):
+        record, *sizes = Record(shape[0], is_numpy=True), *shape[1:]
+        if not sizes:
+            return record if base is contract.Record else Single(record)
+        is_size = len(sizes) == 1 and type(sizes[0]) is int and sizes[0] > 0
+        return Table(record, sizes[0]) if is_size and base is not contract.Record else None
     item = _item(base, names)
     is_shape = all(size == ROTORS or (isinstance(size, int) and size > 0) for size in shape)
     return Array(tuple(shape), item) if item is not None and is_shape else None

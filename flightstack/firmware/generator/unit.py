@@ -19,6 +19,7 @@ from flightstack.firmware.generator.types import (
     Record,
     Several,
     Single,
+    Table,
     Type,
     c_size,
     c_type,
@@ -272,7 +273,8 @@ def structure(kind: type, name: str = "") -> list[str]:
     if has_rotors(record):
         lines.append("    int32_t rotors;")
     for field, inner in record.fields.items():
-        sizes = "".join(f"[{c_size(size)}]" for size in inner.shape) if isinstance(inner, Array) else ""
+        shape = inner.shape if isinstance(inner, Array) else (inner.size,) if isinstance(inner, Table) else ()
+        sizes = "".join(f"[{c_size(size)}]" for size in shape)
         lines.append(f"    {c_type(inner)} {identifier(field)}{sizes};")
     return [*lines, f"}} {name or record_name(kind)};"]
 
@@ -280,7 +282,7 @@ def structure(kind: type, name: str = "") -> list[str]:
 def _parts(kind: Type) -> list[type]:
     if isinstance(kind, Record):
         return [*(part for inner in kind.fields.values() for part in _parts(inner)), kind.kind]
-    if isinstance(kind, Single):
+    if isinstance(kind, Single | Table):
         return _parts(kind.record)
     if isinstance(kind, Several):
         return [part for inner in kind.items for part in _parts(inner)]

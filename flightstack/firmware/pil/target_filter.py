@@ -57,7 +57,7 @@ class HostFilter:
 
     def refresh(self) -> None:
         """Copy the whole memory."""
-        copy_memory(self._filter.memory[0], self.memory[0])
+        copy_memory(self._filter.memory, self.memory)
 
     def _show(self) -> None:
         for shown, held in self._current:
@@ -122,7 +122,7 @@ class TargetFilter:
         pages = range(0, len(self._words), WORDS)
         for at in range(0, len(pages), PAGES):
             self._loops.run_operation(ReadWords(self._next, pages[at : at + PAGES], self._words))
-        copy_memory(self._held[0], self._record)
+        copy_memory(self._held, self.memory)
 
     def _send(self) -> None:
         events, self._waiting = self._waiting, []
