@@ -6,7 +6,6 @@
 #define ROW 10U
 #define STATE 13U
 #define RESETS 19U
-#define FLAGS 9U
 #define EARTH 4U
 #define KNOWN 4U      /* place of the flag behind the Earth's field */
 #define VALUES_AT 2U  /* of parameters, behind the first index and their number */
@@ -18,6 +17,11 @@ typedef union {
     fs_estimator_params fields;
     fs_real values[sizeof(fs_estimator_params) / sizeof(fs_real)];
 } params_view;
+
+typedef union {
+    fs_flags fields;
+    int32_t values[sizeof(fs_flags) / sizeof(int32_t)];
+} flags_view;
 
 /* The members of the memory are floats and integers of 32 bits, so that it can be read and cleared as words. */
 typedef union {
@@ -90,6 +94,20 @@ static void tell(fs_pil_estimate *estimate)
     }
 }
 
+/* Flags of the memory in their order, the first one in bit 0. */
+static uint32_t flags(void)
+{
+    flags_view view;
+    uint32_t bits = 0UL;
+    uint16_t i;
+
+    view.fields = memory->flags;
+    for (i = 0U; i < (uint16_t)(sizeof view.values / sizeof view.values[0]); i++) {
+        bits |= (uint32_t)((view.values[i] != 0) ? 1UL : 0UL) << i;
+    }
+    return bits;
+}
+
 /* Number of values of a measurement; 0 for another kind of event. */
 static int32_t size_of(uint32_t kind)
 {
@@ -132,9 +150,9 @@ uint16_t fs_sensing_take(const fs_pil_sense *event, fs_pil_estimate *estimate)
         break;
     case FS_SENSE_LANDED:
         if (row[0] > HALF) {
-            memory->flags[FS_LANDED] = 1;
+            memory->flags.landed = 1;
         } else {
-            memory->flags[FS_LANDED] = 0;
+            memory->flags.landed = 0;
         }
         break;
     case FS_SENSE_PARAMS:
@@ -154,9 +172,7 @@ uint16_t fs_sensing_take(const fs_pil_sense *event, fs_pil_estimate *estimate)
         }
         break;
     }
-    for (i = 0U; i < FLAGS; i++) {
-        estimate->flags |= (uint32_t)((memory->flags[i] != 0) ? 1UL : 0UL) << i;
-    }
+    estimate->flags = flags();
     return is_valid;
 }
 

@@ -18,9 +18,7 @@ from flightstack.estimation.imu_input import mean_force, mean_rate, noise_of, re
 from flightstack.estimation.kalman import Filter
 from flightstack.estimation.memory import (
     AXIS,
-    FIELD_IS_NEW,
     FUSED_ANY,
-    LANDED,
     NOTHING,
     SOURCE,
     MemoryRecord,
@@ -155,8 +153,8 @@ def _begin(m: MemoryRecord, f: Filter, r: Rings, horizon_s: float, params: Estim
 def _is_covariance_due(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorParams) -> bool:
     """Return True if a measurement may be fused in the step at hand, or the covariance is behind by the most."""
     now_s = f.clock[0]
-    rests = m["flags"][LANDED] == 1 and now_s - m["rest_s"][0] >= _REST_PERIOD_S
-    is_asked = rests or m["flags"][FIELD_IS_NEW] == 1
+    rests = m["flags"]["landed"] == 1 and now_s - m["rest_s"][0] >= _REST_PERIOD_S
+    is_asked = rests or m["flags"]["field_is_new"] == 1
     if f.behind[0] > _BEHIND_S or is_asked or params.drag_is_fused > 0.0 or not is_velocity_measured(f):
         return True
     return (
@@ -264,7 +262,7 @@ def _next_row(r: Rings, ring: int, size: int, oldest: FloatArray, now_s: float, 
 @compiled
 def _stands(m: MemoryRecord, params: EstimatorParams) -> bool:
     """Return True if the vehicle is on the ground and nothing moves it."""
-    if m["flags"][LANDED] == 0:
+    if m["flags"]["landed"] == 0:
         return False
     rate, force = mean_rate(m["sums"]), mean_force(m["sums"])
     bias = read_vector(m["nominal"], 10)
@@ -297,7 +295,7 @@ def _drag(m: MemoryRecord, f: Filter, r: Rings, axis: int, params: EstimatorPara
     """Fuse drag in flight while the velocity over ground is measured, twenty times a second."""
     if axis == 0:
         waits = f.clock[0] - m["drag_s"][0] < _DRAG_PERIOD_S
-        if params.drag_is_fused == 0.0 or m["flags"][LANDED] == 1 or waits or not is_velocity_measured(f):
+        if params.drag_is_fused == 0.0 or m["flags"]["landed"] == 1 or waits or not is_velocity_measured(f):
             return NOTHING
         m["drag_s"][0] = f.clock[0]
     step = read_step(r.imu[slot_of(r, IMU_RING, IMU_ROWS, 0)])

@@ -22,13 +22,8 @@ from flightstack.estimation.imu_input import (
 from flightstack.estimation.imu_track import IMU_SIZE
 from flightstack.estimation.kalman import Filter
 from flightstack.estimation.memory import (
-    ALIGNED,
-    FIELD_IS_NEW,
     GAP_S,
     GAPS,
-    HAS_MAG,
-    HAS_YAW,
-    LANDED,
     MemoryArray,
     MemoryRecord,
     filter_of,
@@ -83,7 +78,7 @@ def push_kernel(memory: MemoryArray, ring: int, row: FloatArray) -> None:
             slot = push(r, GNSS_RING, GNSS_ROWS)
             write_row(r.gnss[slot], row)
         return
-    if ring == MAG_RING and m["flags"][ALIGNED] == 0:
+    if ring == MAG_RING and m["flags"]["aligned"] == 0:
         for i in range(3):
             m["alignment"][3 + i] += row[1 + i]
         m["alignment"][7] += 1.0
@@ -128,7 +123,7 @@ def imu_kernel(memory: MemoryArray, sample: FloatArray) -> None:
     gyro, accel = read_vector(sample, 2), read_vector(sample, 5)
     add_sample(sums, gyro, accel, dt_s)
     note_clipping(sums, gyro, accel, params)
-    if m["flags"][ALIGNED] == 0:
+    if m["flags"]["aligned"] == 0:
         _collect(m, accel, time_s, dt_s, params)
         return
     gyro_bias = read_vector(f.nominal, 10)
@@ -173,10 +168,10 @@ def _write_state(m: MemoryRecord, rates: Vector3) -> None:
 def field_kernel(memory: MemoryArray) -> None:
     """Correct the filter with the Earth's field in ``earth``: on the ground at once, in flight in its next step."""
     m = memory[0]
-    if m["flags"][ALIGNED] == 0:  # the alignment uses the field as it is
+    if m["flags"]["aligned"] == 0:  # the alignment uses the field as it is
         return
-    m["flags"][FIELD_IS_NEW] = 1
-    if m["flags"][LANDED] == 1:
+    m["flags"]["field_is_new"] = 1
+    if m["flags"]["landed"] == 1:
         params = EstimatorParams(*as_tuple(m["params"], PARAMS_SIZE))
         take_field_at_rest(m, filter_of(m), rings_of(m), params)
 
@@ -214,10 +209,10 @@ def _collect(m: MemoryRecord, accel: Vector3, time_s: float, dt_s: float, params
     f.clock[0] = time_s
     take_step(m["sums"], time_s)
     write_motion(m["output"], time_s, motion_of(read_nominal(f.nominal)))
-    m["flags"][ALIGNED] = 1
+    m["flags"]["aligned"] = 1
     for ring in range(MAG_RING, IMU_RING):
         m["cursors"][ring, 1] = 0  # older than the state; the fields are in its yaw
     if sums[7] > 0.0:
-        m["flags"][HAS_MAG], m["flags"][HAS_YAW] = 1, 1
+        m["flags"]["has_mag"], m["flags"]["has_yaw"] = 1, 1
         for i in range(3):
             m["field"][i] = sums[3 + i] / sums[7]

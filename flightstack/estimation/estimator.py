@@ -15,7 +15,6 @@ from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits
 from flightstack.estimation.filter_core import FilterCore, PythonCore
 from flightstack.estimation.fusion import GNSS_SIZE, UNKNOWN_M, UNKNOWN_M_S, UNKNOWN_VERTICAL_M
 from flightstack.estimation.imu_track import IMU_SIZE
-from flightstack.estimation.memory import ALIGNED
 from flightstack.estimation.rings import BARO_RING, GNSS_RING, MAG_RING, RANGE_RING
 from flightstack.estimation.sensor_samples import (
     BaroSample,
@@ -47,10 +46,11 @@ class Estimator:
         self.params = params or EstimatorParams()
         self.limits = limits or GnssLimits()
         self.core.start(self.params)
-        record: Any = self.memory[0]
         self.frame: LocalFrame | None = None
-        self._state = record["state"]
-        self._flags = record["flags"].data  # a number of an array takes four times as long to read
+        self._state: FloatArray = self.memory["state"][0]
+        self._aligned = self.memory["flags"][
+            "aligned"
+        ].data  # a number of an array takes four times as long to read
         self._imu = np.zeros(IMU_SIZE)
         self._gnss = np.zeros(GNSS_SIZE)
         self._mag = np.zeros(4)
@@ -72,7 +72,7 @@ class Estimator:
     @property
     def aligned(self) -> bool:
         """True if the filter has an attitude."""
-        return bool(self._flags[ALIGNED])
+        return bool(self._aligned[0])
 
     def set_landed(self, landed: bool) -> None:
         """Tell the filter whether the vehicle stands on the ground."""

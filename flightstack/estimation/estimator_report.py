@@ -29,16 +29,11 @@ from flightstack.estimation.kalman import (
     TEST_RATIO,
 )
 from flightstack.estimation.memory import (
-    ALIGNED,
-    HAS_BARO,
-    HAS_GNSS,
-    HAS_RANGE,
-    LANDED,
-    MAG_FAULT,
     POSITION_RESET,
     RESET_CHANGE,
     VELOCITY_RESET,
     YAW_RESET,
+    Flags,
 )
 from flightstack.mavlink.dialect import mavlink
 
@@ -188,10 +183,10 @@ def estimator_report(memory: Record, time_s: float, imu_has_failed: bool) -> Est
     """
     rows = [_observation(row) for row in memory["observations"].tolist()]
     variances = tuple(np.diagonal(memory["covariance"]).tolist())
-    now_s, flags = time_s - float(memory["params"][_DELAY]), memory["flags"].tolist()
+    now_s, flags = time_s - float(memory["params"][_DELAY]), Flags(*memory["flags"].tolist())
     velocity, position = rows[GNSS_VELOCITY : GNSS_VELOCITY + 3], rows[GNSS_POSITION : GNSS_POSITION + 3]
     field, height = rows[MAG : MAG + 3], rows[BARO]
-    range_finder = rows[RANGE] if flags[HAS_RANGE] else None
+    range_finder = rows[RANGE] if flags.has_range else None
     control = _control(now_s, flags, rows, variances)
     rejected = _rejected(velocity, position, height, field, range_finder)
     solution = _solution(now_s, flags, rows, control, rejected)
@@ -247,29 +242,27 @@ def _is_recent(rows: Sequence[Observation], now_s: float, limit_s: float) -> boo
     return latest_s > 0.0 and now_s - latest_s < limit_s
 
 
-def _control(
-    now_s: float, flags: Sequence[int], rows: Sequence[Observation], variances: Sequence[float]
-) -> int:
-    if not flags[ALIGNED]:
+def _control(now_s: float, flags: Flags, rows: Sequence[Observation], variances: Sequence[float]) -> int:
+    if not flags.aligned:
         return 0
 
     def fused(at: int, count: int = 1) -> bool:
         return _is_recent(rows[at : at + count], now_s, AIDED_S)
 
-    has_gnss = bool(flags[HAS_GNSS])
-    at_rest = bool(flags[LANDED]) and fused(REST_VELOCITY, 3)
+    has_gnss = bool(flags.has_gnss)
+    at_rest = bool(flags.landed) and fused(REST_VELOCITY, 3)
     has_position, has_velocity = has_gnss and fused(GNSS_POSITION, 2), has_gnss and fused(GNSS_VELOCITY, 2)
     is_true = (
         (ControlFlags.TILT_ALIGN, max(variances[ATTITUDE : ATTITUDE + 2]) < _TILT_RAD * _TILT_RAD),
         (ControlFlags.YAW_ALIGN, variances[ATTITUDE + 2] < _YAW_RAD * _YAW_RAD),
         (ControlFlags.GNSS_POSITION, has_position),
         (ControlFlags.MAG_3D, fused(MAG, 3)),
-        (ControlFlags.IN_AIR, not flags[LANDED]),
+        (ControlFlags.IN_AIR, not flags.landed),
         (ControlFlags.WIND, max(variances[WIND : WIND + 2]) < _WIND_VARIANCE),
-        (ControlFlags.BARO_HEIGHT, bool(flags[HAS_BARO]) and fused(BARO)),
-        (ControlFlags.RANGE_HEIGHT, bool(flags[HAS_RANGE]) and fused(RANGE)),
+        (ControlFlags.BARO_HEIGHT, bool(flags.has_baro) and fused(BARO)),
+        (ControlFlags.RANGE_HEIGHT, bool(flags.has_range) and fused(RANGE)),
         (ControlFlags.GNSS_HEIGHT, has_gnss and fused(GNSS_POSITION + 2)),
-        (ControlFlags.MAG_FAULT, bool(flags[MAG_FAULT])),
+        (ControlFlags.MAG_FAULT, bool(flags.mag_fault)),
         (ControlFlags.VEHICLE_AT_REST, at_rest),
         (ControlFlags.INERTIAL_DEAD_RECKONING, not (has_position or has_velocity or at_rest)),
         (ControlFlags.FAKE_POSITION, fused(HOLD_POSITION, 2)),
@@ -309,14 +302,14 @@ _FIELD_REJECTIONS = RejectionFlags.MAG_X | RejectionFlags.MAG_Y | RejectionFlags
 
 def _solution(
     now_s: float,
-    flags: Sequence[int],
+    flags: Flags,
     rows: Sequence[Observation],
     control: int,
     rejected: int,
 ) -> int:
-    if not flags[ALIGNED]:
+    if not flags.aligned:
         return 0
-    has_gnss = bool(flags[HAS_GNSS])
+    has_gnss = bool(flags.has_gnss)
     gnss = [*rows[GNSS_VELOCITY : GNSS_VELOCITY + 2], *rows[GNSS_POSITION : GNSS_POSITION + 2]]
     at_rest = bool(control & ControlFlags.VEHICLE_AT_REST)
     horizontal = has_gnss and (at_rest or _is_recent(gnss, now_s, DEAD_RECKONING_S))

@@ -12,7 +12,7 @@ from flightstack.core.contract import FloatArray, RecordArray
 from flightstack.estimation.delayed_filter import field_kernel, imu_kernel, push_kernel
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.imu_track import IMU_SIZE
-from flightstack.estimation.memory import LANDED, MEMORY, start_memory
+from flightstack.estimation.memory import MEMORY, start_memory
 from flightstack.estimation.rings import MAG_RING
 
 EARTH_SIZE = 4
@@ -53,7 +53,7 @@ class PythonCore:
     def __init__(self) -> None:
         self.memory: RecordArray = np.zeros(1, MEMORY)
         self._record: Any = self.memory[0]
-        self._flags = self._record["flags"].data
+        self._landed = self.memory["flags"]["landed"].data
         self.imu = partial(direct(imu_kernel, self.memory, np.zeros(IMU_SIZE)), self.memory)
         self.push = partial(direct(push_kernel, self.memory, MAG_RING, np.zeros(4)), self.memory)
 
@@ -69,7 +69,7 @@ class PythonCore:
 
     def set_landed(self, landed: bool) -> None:
         """Set whether the vehicle stands on the ground."""
-        self._flags[LANDED] = landed
+        self._landed[0] = landed
 
     def set_earth(self, earth: FloatArray, is_known: bool) -> None:
         """Set the Earth's field, shape (4,); correct the state with it if ``is_known``."""

@@ -8,7 +8,7 @@ from typing import Annotated, NamedTuple, TypeAlias
 import numpy as np
 
 from flightstack.core.compiled import compiled, direct
-from flightstack.core.contract import FloatArray, RecordArray
+from flightstack.core.contract import FloatArray, Record, RecordArray
 from flightstack.estimation.error_state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY
 from flightstack.estimation.kalman import (
     BARO,
@@ -19,7 +19,7 @@ from flightstack.estimation.kalman import (
     TEST_RATIO,
     Observations,
 )
-from flightstack.estimation.memory import ALIGNED, LANDED, MemoryArray
+from flightstack.estimation.memory import MemoryArray
 from flightstack.estimation.sensor_feed import NewestSamples
 from flightstack.estimation.sensor_samples import BaroSample, GnssFix
 
@@ -184,7 +184,8 @@ class HealthMonitor:
     def __init__(self, memory: RecordArray) -> None:
         """``memory`` is the estimator's, shape (1,)."""
         self._memory = memory
-        self._flags, self._state = memory["flags"][0], memory["state"][0]
+        self._flags: Record = memory["flags"][0]
+        self._state: FloatArray = memory["state"][0]
         self._summary = np.zeros(_SUMMARY_SIZE)
         self._accuracy = Accuracy()
         self._pressure = PressureTrack()
@@ -201,7 +202,7 @@ class HealthMonitor:
         self._accuracy = accuracy_step(self._accuracy, horizontal_m, limit_m, time_s)
         fix_age_s, imu = _fix_age_s(samples, time_s), samples.imu
         return EstimateHealth(
-            bool(self._flags[ALIGNED]),
+            bool(self._flags["aligned"]),
             has_origin,
             math.inf if imu is None else time_s - imu.time_s,
             samples.imu_track.repeats >= STUCK_SAMPLES,
@@ -218,7 +219,7 @@ class HealthMonitor:
     def _baro_is_stuck(self, baro: BaroSample | None, time_s: float) -> bool:
         if baro is None:
             return False
-        landed, height_m = bool(self._flags[LANDED]), -float(self._state[2])
+        landed, height_m = bool(self._flags["landed"]), -float(self._state[2])
         if baro is not self._baro:  # the health may be newer than the pressure
             self._pressure = pressure_step(self._pressure, baro.pressure_hpa, landed, height_m, time_s)
         self._baro = baro

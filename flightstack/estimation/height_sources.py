@@ -8,7 +8,7 @@ from flightstack.estimation.error_state import BARO_BIAS, ERROR_STATES, POSITION
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.fusion import LEAST_COS_TILT, cos_tilt_of, fuse_baro, fuse_range
 from flightstack.estimation.kalman import BARO, FUSED_S, GNSS_VELOCITY, RANGE, Filter
-from flightstack.estimation.memory import HAS_BARO, HAS_RANGE, LANDED, MemoryRecord
+from flightstack.estimation.memory import MemoryRecord
 from flightstack.estimation.resets import reset_position
 from flightstack.estimation.source_checks import is_stuck, take_pressure_innovation
 
@@ -25,16 +25,16 @@ def take_baro(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorPara
     """
     c = m["checks"]
     has_stopped = False
-    if m["flags"][LANDED] == 0:
+    if m["flags"]["landed"] == 0:
         has_stopped = is_stuck(c, row[1], row[0])
     if has_stopped:
-        m["flags"][HAS_BARO] = 0
+        m["flags"]["has_baro"] = 0
         return
     last_s = f.observations[BARO, FUSED_S]
     speed_s = f.observations[GNSS_VELOCITY + 2, FUSED_S]
     if f.clock[0] - last_s > params.reset_s and f.clock[0] - speed_s < _AIDED_S:
-        m["flags"][HAS_BARO] = 0
-    if m["flags"][HAS_BARO] == 0:
+        m["flags"]["has_baro"] = 0
+    if m["flags"]["has_baro"] == 0:
         _start_baro(m, f, row[1], params)
     fuse_baro(f, row[1], f.clock[0] - row[0], params)
     take_pressure_innovation(c, f, row[0], row[1])
@@ -53,7 +53,7 @@ def _start_baro(m: MemoryRecord, f: Filter, altitude_m: float, params: Estimator
     for j in range(BARO_BIAS + 1, ERROR_STATES):
         p[BARO_BIAS, j] = p[at, j]
     p[BARO_BIAS, BARO_BIAS] = p[POSITION + 2, POSITION + 2] + params.baro_noise_m * params.baro_noise_m
-    m["flags"][HAS_BARO] = 1
+    m["flags"]["has_baro"] = 1
 
 
 @compiled
@@ -62,12 +62,12 @@ def take_range(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorPar
     cos_tilt = cos_tilt_of(f)
     if cos_tilt < LEAST_COS_TILT:
         return
-    if m["flags"][HAS_RANGE] == 1 and f.clock[0] - f.observations[RANGE, FUSED_S] > _RANGE_LOST_S:
-        m["flags"][HAS_RANGE] = 0
+    if m["flags"]["has_range"] == 1 and f.clock[0] - f.observations[RANGE, FUSED_S] > _RANGE_LOST_S:
+        m["flags"]["has_range"] = 0
     age_s = f.clock[0] - row[0]
-    if m["flags"][HAS_RANGE] == 0:
+    if m["flags"]["has_range"] == 0:
         m["ground_m"][0] = f.nominal[9] - age_s * f.nominal[6] + row[1] * cos_tilt
-        m["flags"][HAS_RANGE] = 1
+        m["flags"]["has_range"] = 1
     fuse_range(f, row[1] * cos_tilt, m["ground_m"][0], age_s, params)
 
 
@@ -75,4 +75,4 @@ def take_range(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorPar
 def reset_height(m: MemoryRecord, f: Filter, row: FloatArray) -> None:
     """Set the height to that of GNSS; barometer and range finder start again from it."""
     reset_position(m, f, row, 2, 1)
-    m["flags"][HAS_BARO], m["flags"][HAS_RANGE] = 0, 0
+    m["flags"]["has_baro"], m["flags"]["has_range"] = 0, 0

@@ -20,27 +20,11 @@ from flightstack.estimation.rings import MEAN_SIZE, RINGS, TRACK_COLUMNS, Rings
 from flightstack.estimation.source_checks import Checks
 from flightstack.estimation.yaw_estimator import Models
 
-ALIGNED, LANDED, HAS_BARO, HAS_GNSS, HAS_RANGE, HAS_MAG, HAS_YAW, MAG_FAULT, FIELD_IS_NEW, FLAGS = (
-    0,
-    1,
-    2,
-    3,
-    4,
-    5,
-    6,
-    7,
-    8,
-    9,
-)
-"""``HAS_YAW``: the yaw is known, from the magnetometer or from GNSS velocity. ``MAG_FAULT``: GNSS velocity has
-disproved the yaw of the magnetometer, which is not used any more. ``FIELD_IS_NEW``: the filter has not yet been
-corrected with the Earth's field."""
 SOURCE, AXIS, FUSED_ANY, AGENDA_SIZE = 0, 1, 2, 3
 """The open step: the source that is at work, 0 if no step is open; its next axis; 1 if a measurement was fused."""
 NOTHING = -1
 """Returned by a source without a measurement that is due; else it returns its next axis, 0 after the last one."""
 Agenda: TypeAlias = "Annotated[np.ndarray[tuple[int], np.dtype[np.int64]], AGENDA_SIZE]"
-Flags: TypeAlias = "Annotated[np.ndarray[tuple[int], np.dtype[np.int64]], FLAGS]"
 POSITION_RESET, VELOCITY_RESET, YAW_RESET, RESETS = 0, 8, 16, 19
 RESET_CHANGE, RESET_SUM, RESET_S, YAW_RESET_SUM = 1, 4, 7, 18
 """Of each kind: the number of its resets, their change in the last step with one, the sum of all changes, and the time
@@ -50,6 +34,23 @@ GAP_S, GAPS = 0, 1
 YAW_TURN, YAW_VARIANCE, YAW_UPDATES, YAW_WRONG_S = 0, 1, 2, 3
 """Columns of ``yaw_fix``: turn from the filter's yaw to that of GNSS velocity [rad], its variance, updates, and the
 time since which they contradict each other, 0 if they do not."""
+
+
+class Flags(NamedTuple):
+    """What the estimator knows, 1 if it is true."""
+
+    aligned: int
+    landed: int
+    has_baro: int
+    has_gnss: int
+    has_range: int
+    has_mag: int
+    has_yaw: int
+    """The yaw is known, from the magnetometer or from GNSS velocity."""
+    mag_fault: int
+    """GNSS velocity has disproved the yaw of the magnetometer, which is not used any more."""
+    field_is_new: int
+    """The filter has not yet been corrected with the Earth's field."""
 
 
 class EstimatorMemory(NamedTuple):
@@ -75,7 +76,7 @@ class EstimatorMemory(NamedTuple):
     """Time of the last fusion at rest."""
     drag_s: Annotated[FloatArray, 1]
     """Time of the last fusion of drag."""
-    flags: Flags
+    flags: Annotated[Record, Flags]
     yaw_fix: Annotated[FloatArray, 4]
     followed: Annotated[FloatArray, 1]
     """Number of resets that the output has followed."""

@@ -27,7 +27,7 @@ from flightstack.estimation.kalman import (
     deviation,
     reset_variance,
 )
-from flightstack.estimation.memory import HAS_BARO, HAS_GNSS, HAS_YAW, LANDED, NOTHING, MemoryRecord
+from flightstack.estimation.memory import NOTHING, MemoryRecord
 from flightstack.estimation.resets import count_correction, reset_position, reset_velocity
 from flightstack.estimation.source_checks import (
     GNSS_FAULT,
@@ -58,7 +58,7 @@ def take_gnss(m: MemoryRecord, f: Filter, row: FloatArray, stage: int, params: E
 
     Without a known yaw only the vertical parts count. The last one resets what was refused too long.
     """
-    first = 0 if m["flags"][HAS_YAW] == 1 else 2
+    first = 0 if m["flags"]["has_yaw"] == 1 else 2
     at: int = stage
     if stage == 0:
         _begin_gnss(m, f, row, params)
@@ -77,7 +77,7 @@ def take_gnss(m: MemoryRecord, f: Filter, row: FloatArray, stage: int, params: E
 @compiled
 def _begin_gnss(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorParams) -> None:
     """Propagate what belongs to GNSS to the time of the measurement, and note the state before it."""
-    if m["flags"][HAS_GNSS] == 0:
+    if m["flags"]["has_gnss"] == 0:
         _start_gnss(m, f, row, params)
     before = m["before_gnss"]
     before[_ELAPSED_S] = max(0.0, row[0] - m["last_gnss_s"][0])
@@ -85,7 +85,7 @@ def _begin_gnss(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorPa
     for axis in range(2):
         before[_BEFORE + axis], before[_BEFORE + 2 + axis] = f.nominal[7 + axis], f.nominal[4 + axis]
     m["last_gnss_s"][0] = row[0]
-    follow_height_drift(m["checks"], row, m["flags"][LANDED] == 0, speed_accuracy(row))
+    follow_height_drift(m["checks"], row, m["flags"]["landed"] == 0, speed_accuracy(row))
     follow_drift(m["checks"], f, row, horizontal_accuracy(row))
     drift_gnss_bias(f, row, before[_ELAPSED_S], params)
 
@@ -95,8 +95,8 @@ def _end_gnss(m: MemoryRecord, f: Filter, row: FloatArray, first: int, params: E
     """Judge the measurement by its innovations, and reset what was refused too long."""
     before, c = m["before_gnss"], m["checks"]
     elapsed_s = before[_ELAPSED_S]
-    if m["flags"][LANDED] == 0:
-        take_gnss_innovations(c, f, elapsed_s, m["flags"][HAS_BARO] == 1)
+    if m["flags"]["landed"] == 0:
+        take_gnss_innovations(c, f, elapsed_s, m["flags"]["has_baro"] == 1)
         if first == 0:
             take_horizontal_innovations(c, f, elapsed_s)
     dx, dy = f.nominal[7] - before[_BEFORE], f.nominal[8] - before[_BEFORE + 1]
@@ -154,7 +154,7 @@ def _start_gnss(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorPa
             reset_variance(p, GNSS_BIAS + axis, 1, slow)
             p[at, GNSS_BIAS + axis] = -slow
     m["last_gnss_s"][0] = row[0]
-    m["flags"][HAS_GNSS] = 1
+    m["flags"]["has_gnss"] = 1
 
 
 @compiled
@@ -168,7 +168,7 @@ def is_velocity_measured(f: Filter) -> bool:
 def is_platform_at_rest(m: MemoryRecord, f: Filter) -> bool:
     """Return False if GNSS measures that what the vehicle stands on moves, as a boat does."""
     north, east = m["gnss_speed_m_s"][0], m["gnss_speed_m_s"][1]
-    is_measured = m["flags"][HAS_GNSS] == 1 and f.clock[0] - m["last_gnss_s"][0] < _GNSS_LOST_S
+    is_measured = m["flags"]["has_gnss"] == 1 and f.clock[0] - m["last_gnss_s"][0] < _GNSS_LOST_S
     return not is_measured or math.sqrt(north * north + east * east) < _MOVES_M_S
 
 
@@ -177,7 +177,7 @@ def hold_position(m: MemoryRecord, f: Filter, axis: int, params: EstimatorParams
     """Hold the horizontal position while the velocity is not measured, north before east; return the next axis."""
     hold, now_s = m["hold"], f.clock[0]
     if axis == 0:
-        is_used = m["flags"][HAS_GNSS] == 1 and m["flags"][HAS_YAW] == 1
+        is_used = m["flags"]["has_gnss"] == 1 and m["flags"]["has_yaw"] == 1
         if is_velocity_measured(f) or (is_used and deviation(f, VELOCITY, 2) < params.hold_velocity_m_s):
             hold[2] = 0.0
             return NOTHING

@@ -19,12 +19,6 @@ from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.fusion import fuse_field_axis, speed_accuracy
 from flightstack.estimation.kalman import DECLINATION, KNOWN_FIELD, Filter, Noise, clear, fuse, reset_variance
 from flightstack.estimation.memory import (
-    FIELD_IS_NEW,
-    HAS_GNSS,
-    HAS_MAG,
-    HAS_YAW,
-    LANDED,
-    MAG_FAULT,
     NOTHING,
     YAW_TURN,
     YAW_UPDATES,
@@ -67,7 +61,7 @@ def take_field(m: MemoryRecord, f: Filter, row: FloatArray, axis: int, params: E
     The first field after the alignment gives the yaw if that is unknown.
     """
     field = read_vector(row, 1)
-    if m["flags"][MAG_FAULT] == 1:
+    if m["flags"]["mag_fault"] == 1:
         return 0
     if axis == 0:
         _start_field(m, f, field, params)
@@ -80,12 +74,12 @@ def _start_field(m: MemoryRecord, f: Filter, field: Vector3, params: EstimatorPa
     """Note the field; set the states of the field, and an unknown yaw, by the first one."""
     earth = m["earth"]
     m["field"][0], m["field"][1], m["field"][2] = field.x, field.y, field.z
-    if m["flags"][HAS_MAG] == 0:
-        m["flags"][HAS_MAG] = 1
-        if m["flags"][HAS_YAW] == 0:
+    if m["flags"]["has_mag"] == 0:
+        m["flags"]["has_mag"] = 1
+        if m["flags"]["has_yaw"] == 0:
             turn_rad = align_yaw(f, field, read_vector(earth, 0), earth[3], params)
             count_yaw_reset(m, turn_rad)
-            m["flags"][HAS_YAW] = 1
+            m["flags"]["has_yaw"] = 1
         else:
             level = rotate(read_nominal(f.nominal).attitude, field)
             set_field(f, level, read_vector(earth, 0), earth[3], params)
@@ -100,10 +94,10 @@ def take_earth_field(m: MemoryRecord, f: Filter, stage: int, params: EstimatorPa
     """
     flags = m["flags"]
     if stage == 0:
-        if flags[FIELD_IS_NEW] == 0:
+        if flags["field_is_new"] == 0:
             return NOTHING
-        if flags[HAS_MAG] == 0 or flags[MAG_FAULT] == 1:
-            flags[FIELD_IS_NEW] = 0
+        if flags["has_mag"] == 0 or flags["mag_fault"] == 1:
+            flags["field_is_new"] = 0
             return NOTHING
         return _begin_earth_field(m, f, params)
     if stage >= _FIELD_STAGE:
@@ -136,7 +130,7 @@ def _begin_earth_field(m: MemoryRecord, f: Filter, params: EstimatorParams) -> i
     pending[0], pending[1], pending[2], pending[3] = q.w, q.x, q.y, q.z
     was_rad = atan2(held.y, held.x)
     change_rad = wrap_pi(atan2(known.y, known.x) - was_rad)
-    if m["flags"][LANDED] == 1 or abs(change_rad) > _LARGEST_TURN_RAD:
+    if m["flags"]["landed"] == 1 or abs(change_rad) > _LARGEST_TURN_RAD:
         turn_to_field(f, read_vector(m["field"], 0), known, m["earth"][3], params)
         return _FIELD_STAGE
     _fuse_declination(f, was_rad, change_rad)
@@ -146,7 +140,7 @@ def _begin_earth_field(m: MemoryRecord, f: Filter, params: EstimatorParams) -> i
 @compiled
 def _count_turn(m: MemoryRecord, f: Filter) -> None:
     """Count the turn since the attitude in ``pending`` as a reset of the yaw; the field is not new any more."""
-    m["flags"][FIELD_IS_NEW] = 0
+    m["flags"]["field_is_new"] = 0
     before = m["pending"]
     turn_rad = turn_between(
         Quaternion(before[0], before[1], before[2], before[3]), read_nominal(f.nominal).attitude
@@ -186,7 +180,7 @@ def predict_yaw(m: MemoryRecord, f: Filter, step: DeltaSample) -> None:
 def take_velocity(m: MemoryRecord, f: Filter, row: FloatArray) -> None:
     """Weigh the models with a GNSS velocity; reset the yaw if it is unknown, or wrong."""
     models, fix, flags = m["yaw_models"], m["yaw_fix"], m["flags"]
-    if flags[LANDED] == 1 or flags[HAS_GNSS] == 0:
+    if flags["landed"] == 1 or flags["has_gnss"] == 0:
         fix[YAW_UPDATES] = 0.0
         return
     attitude, noise_m_s = read_nominal(f.nominal).attitude, max(speed_accuracy(row), 0.1)
@@ -199,10 +193,10 @@ def take_velocity(m: MemoryRecord, f: Filter, row: FloatArray) -> None:
     fix[YAW_VARIANCE] = variance_of(models, attitude, fix[YAW_TURN])
     if fix[YAW_VARIANCE] > _CONVERGED_RAD * _CONVERGED_RAD:
         return
-    if flags[HAS_YAW] == 0:
+    if flags["has_yaw"] == 0:
         _reset_to_models(m, f, row)
     elif _is_wrong(m, row[0]):
-        flags[MAG_FAULT] = flags[HAS_MAG]
+        flags["mag_fault"] = flags["has_mag"]
         _reset_to_models(m, f, row)
 
 
@@ -233,6 +227,6 @@ def _reset_to_models(m: MemoryRecord, f: Filter, row: FloatArray) -> None:
         reset_variance(f.covariance, ATTITUDE + axis, 1, tilt_variance(models, best, axis))
     reset_variance(f.covariance, ATTITUDE + 2, 1, m["yaw_fix"][YAW_VARIANCE])
     count_yaw_reset(m, turn_between(before, q))
-    m["flags"][HAS_YAW] = 1
+    m["flags"]["has_yaw"] = 1
     reset_velocity(m, f, row, 0, 2)
     reset_position(m, f, row, 0, 2)

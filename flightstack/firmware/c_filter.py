@@ -112,7 +112,7 @@ def copy_memory(held: RecordArray, shown: RecordArray) -> None:
 
 
 def _pairs(held: RecordArray, shown: RecordArray) -> Iterator[tuple[Any, Any]]:
-    """Yield each array of numbers in records of C, and that of Python, in which the fields of parts stand themselves."""
+    """Yield the arrays of numbers in records of C, and those of Python, where the fields of a part stand themselves."""
     for name in held.dtype.names or ():
         inner = held[name]
         if inner.dtype.names is None:

@@ -19,7 +19,7 @@ from flightstack.estimation.delayed_filter import imu_kernel
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.filter_core import PythonCore
 from flightstack.estimation.imu_track import RECORD_SIZE, take_wire
-from flightstack.estimation.memory import ALIGNED, FLAGS, POSITION_RESET, RESETS, VELOCITY_RESET, YAW_RESET
+from flightstack.estimation.memory import POSITION_RESET, RESETS, VELOCITY_RESET, YAW_RESET
 from flightstack.flight_log.flight_log import DEFAULT_CAPACITY, Trace
 from flightstack.flight_log.sensor_topics import IMU_GROUP
 from flightstack.process.assembly import Stack
@@ -92,8 +92,10 @@ def _estimates(stack: Stack) -> list[_Arguments]:
     found: list[_Arguments] = []
     for number, estimator in enumerate(_estimators(stack)):
         record = estimator.memory[0]
-        found.append((number, record["state"], record["flags"][ALIGNED:], record["resets"], _RESET_COUNTS))
-    nothing = np.zeros(STATE_SIZE), np.zeros(FLAGS, np.int64), np.zeros(RESETS)
+        found.append(
+            (number, record["state"], estimator.memory["flags"]["aligned"], record["resets"], _RESET_COUNTS)
+        )
+    nothing = np.zeros(STATE_SIZE), np.zeros(1, np.int64), np.zeros(RESETS)
     return found or [(0, *nothing, _RESET_COUNTS)]
 
 

@@ -21,7 +21,6 @@ from flightstack.estimation.health import NO_HEALTH
 from flightstack.estimation.imu_track import SingleArray
 from flightstack.estimation.lanes import Lanes
 from flightstack.estimation.memory import (
-    MAG_FAULT,
     POSITION_RESET,
     RESET_SUM,
     VELOCITY_RESET,
@@ -110,10 +109,10 @@ class Estimation:
         self._mag_has_failed = self._baro_has_failed = self._spare_has_failed = False
 
     def _read_selected(self) -> None:
-        """Read resets and flags of the selected estimator from now on."""
+        """Read resets and the fault of the magnetometer of the selected estimator from now on."""
         # as memory: a number of an array takes four times as long to read
         self._resets = self.estimator.memory["resets"][0].data
-        self._flags = self.estimator.memory["flags"][0].data
+        self._mag_fault = self.estimator.memory["flags"]["mag_fault"].data
 
     @property
     def estimator(self) -> Estimator:
@@ -271,7 +270,7 @@ class Estimation:
         if has_failed and not had_failed and now.has_state and since_change_s > _TOLD_S:
             users.journal.say(Severity.WARNING, "A spare inertial sensor has failed")
         users.failsafes.take_health(self.health)
-        if self._flags[MAG_FAULT] and not self._mag_has_failed:
+        if self._mag_fault[0] and not self._mag_has_failed:
             self._mag_has_failed = True
             users.journal.say(Severity.WARNING, "Compass disagrees with GNSS and is no longer used")
         self._tell_of_barometer()

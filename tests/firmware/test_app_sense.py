@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flightstack.estimation.estimator_params import EstimatorParams
-from flightstack.estimation.memory import ALIGNED, EstimatorMemory
+from flightstack.estimation.memory import EstimatorMemory
 from flightstack.estimation.rings import BARO_RING, GNSS_RING, MAG_RING
 from flightstack.firmware.c_filter import c_layout
 from flightstack.firmware.pil.sensing import CLEAR, EARTH, IMU, LANDED, PARAMS, READ, START
@@ -64,11 +64,11 @@ def test_flight_through_the_application_has_the_bits_of_the_filter(target: Targe
             continue
         assert (answer.event, answer.status) == (number, 0)
         number += 1
-        flags = here.memory["flags"][0]
+        flags = here.memory["flags"].view(np.int64).tolist()
         if kind == IMU:
             assert answer.state == here.memory["state"][0].tolist()
             assert answer.resets == here.memory["resets"][0].tolist()
-            moved += bool(flags[ALIGNED])
+            moved += bool(here.memory["flags"]["aligned"][0])
         if kind in (IMU, FIELD_EVENT):
             assert answer.flags == sum(int(bit != 0) << at for at, bit in enumerate(flags))
     assert moved > 500

@@ -18,7 +18,7 @@ NEVER = {
     "for (int32_t count = 0; count < 9; count++) {": "the last source ends the step",
     "for (int32_t count = 0; count < 256; count++) {": "a step, and all steps that wait, have fewer parts",
     "for (int32_t count_2 = 0; count_2 < 8; count_2++) {": "the Earth's field has fewer stages",
-    "if (m->flags[FS_LANDED] == 1 || m->flags[FS_HAS_GNSS] == 0) {": "a velocity comes with a position",
+    "if (flags->landed == 1 || flags->has_gnss == 0) {": "a velocity comes with a position",
 }
 """Branches that no stream can take, and the reasons."""
 

@@ -13,7 +13,6 @@ from pyulog import ULog
 from flightstack.core.contract import Quaternion
 from flightstack.core.errors import ConfigError
 from flightstack.estimation.error_state import WIND, turn_between
-from flightstack.estimation.memory import MAG_FAULT
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params import vehicle
 from flightstack.testing import World
@@ -92,7 +91,7 @@ def test_magnetometer_turned_at_boot_is_replaced_by_gnss_velocity() -> None:
         world.takeoff(8.0)
         world.run_for(16.0)  # 9 to 13 s with four seeds
         estimator, truth = world.engine.stack.estimation.estimator, world.engine.simulator.frame.state
-        assert estimator.memory["flags"][0, MAG_FAULT] == 1
+        assert estimator.memory["flags"][0]["mag_fault"] == 1
         assert sum("Compass disagrees with GNSS" in text for text in world.texts) == 1
         error = turn_between(Quaternion(*truth[6:10].tolist()), estimator.state().attitude)
         assert abs(math.degrees(error)) < 8.0  # measured 2; 50 if the filter follows alone

@@ -17,7 +17,6 @@ from flightstack.estimation import filter_core
 from flightstack.estimation.delayed_filter import field_kernel, imu_kernel, push_kernel
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.health import health_kernel
-from flightstack.estimation.memory import LANDED
 from flightstack.firmware.c_filter import CFilter
 from flightstack.testing import quiet_ticks
 
@@ -68,8 +67,8 @@ class _Recorder:
         if not np.array_equal(record["params"], self._params):
             self._params = record["params"].copy()
             self._events.append(Event(PARAMS, self._params))
-        if record["flags"][LANDED] != self._landed:
-            self._landed = int(record["flags"][LANDED])
+        if record["flags"]["landed"] != self._landed:
+            self._landed = int(record["flags"]["landed"])
             self._events.append(Event(LANDING, np.array([float(self._landed)])))
         if not np.array_equal(record["earth"], self._earth, equal_nan=True):
             self._earth = record["earth"].copy()
@@ -104,7 +103,7 @@ class InPython:
         elif kind in FIELDS:
             record[FIELDS[kind]] = row
         elif kind == LANDING:
-            record["flags"][LANDED] = int(row[0])
+            record["flags"]["landed"] = int(row[0])
         else:
             push_kernel(memory, kind, row.copy())
 
@@ -144,6 +143,6 @@ class InC:
         elif kind in FIELDS:
             record[FIELDS[kind]] = row
         elif kind == LANDING:
-            record["flags"][LANDED] = int(row[0])
+            record["flags"]["landed"] = int(row[0])
         else:
             self.filter.push(kind, row)

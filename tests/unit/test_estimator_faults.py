@@ -19,8 +19,6 @@ from flightstack.estimation.kalman import FUSED, FUSED_S, GNSS_POSITION, GNSS_VE
 from flightstack.estimation.memory import (
     GAP_S,
     GAPS,
-    HAS_YAW,
-    MAG_FAULT,
     POSITION_RESET,
     RESET_CHANGE,
     RESET_SUM,
@@ -124,7 +122,7 @@ def test_earth_field_known_in_flight_keeps_the_yaw_of_gnss_velocity() -> None:
 
 def test_magnetometer_that_starts_late_gives_the_yaw() -> None:
     estimator = fly(12.0, Faults(mag_from_s=3.0))
-    assert estimator.memory["flags"][0, HAS_YAW] == 1
+    assert estimator.memory["flags"][0]["has_yaw"] == 1
     assert abs(yaw_error_deg(estimator, 12.0)) < 3.0
     assert estimator.memory["observations"][0, MAG, REFUSED] == 0.0
     assert resets(estimator, YAW_RESET) == 1.0
@@ -135,7 +133,7 @@ def test_magnetometer_that_starts_late_gives_the_yaw() -> None:
 
 def test_yaw_without_magnetometer_comes_from_gnss_velocity() -> None:
     estimator = fly(30.0, Faults(has_mag=False))
-    assert estimator.memory["flags"][0, HAS_YAW] == 1
+    assert estimator.memory["flags"][0]["has_yaw"] == 1
     assert abs(yaw_error_deg(estimator, 30.0)) < 5.0
     assert np.abs(estimator.state().velocity_ned_m_s - flown.velocity(30.0)).max() < 0.3
     assert resets(estimator, YAW_RESET) == 1.0
@@ -143,21 +141,21 @@ def test_yaw_without_magnetometer_comes_from_gnss_velocity() -> None:
 
 def test_yaw_without_magnetometer_stays_unknown_at_rest() -> None:
     estimator = fly(flown.STANDS_S, Faults(has_mag=False))
-    assert estimator.memory["flags"][0, HAS_YAW] == 0
+    assert estimator.memory["flags"][0]["has_yaw"] == 0
     assert math.degrees(estimator.deviations()[2]) > 90.0
 
 
 @pytest.mark.parametrize("turned_deg", [90.0, 180.0])
 def test_turned_magnetometer_is_disproved_by_gnss_velocity(turned_deg: float) -> None:
     estimator = fly(40.0, Faults(mag_turned_rad=math.radians(turned_deg)))
-    assert estimator.memory["flags"][0, MAG_FAULT] == 1
+    assert estimator.memory["flags"][0]["mag_fault"] == 1
     assert abs(yaw_error_deg(estimator, 40.0)) < 5.0
     assert np.abs(estimator.state().velocity_ned_m_s - flown.velocity(40.0)).max() < 0.3
 
 
 def test_good_magnetometer_is_not_suspected() -> None:
     estimator = fly(30.0, Faults())
-    assert estimator.memory["flags"][0, MAG_FAULT] == 0
+    assert estimator.memory["flags"][0]["mag_fault"] == 0
     assert resets(estimator, YAW_RESET) == 0.0
 
 

@@ -15,7 +15,6 @@ from pyulog import ULog
 from flightstack.core.contract import FloatArray
 from flightstack.core.geodesy import LocalFrame
 from flightstack.estimation.estimator import Estimator
-from flightstack.estimation.memory import MAG_FAULT
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples
 from flightstack.estimation.sensor_samples import BaroSample, RangeSample
@@ -48,7 +47,7 @@ def topics(sensed: Sensed) -> dict[str, Any]:
 @pytest.mark.parametrize("fault", [0, 1])
 def test_fault_of_the_magnetometer_is_a_flag_in_the_log(fault: int) -> None:
     memory = sensed_after(SECONDS)[1].memory.copy()
-    memory["flags"][0, MAG_FAULT] = fault
+    memory["flags"][0]["mag_fault"] = fault
     found = topics(Sensed(memory[0], sensed_after(SECONDS)[0].samples))
     assert found["estimator_status_flags"]["cs_mag_fault"][0] == fault
     assert int(found["estimator_status"]["control_mode_flags"][0]) >> 18 & 1 == fault  # PX4's bit

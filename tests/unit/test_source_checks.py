@@ -24,7 +24,6 @@ from flightstack.estimation.kalman import (
     REFUSED,
     TEST_RATIO,
 )
-from flightstack.estimation.memory import HAS_BARO
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, ImuSample, MagSample
 from flightstack.estimation.source_checks import (
     ACCEL_UNTIL_S,
@@ -248,7 +247,7 @@ def blamed(estimator: Estimator) -> set[str]:
     signs = {
         "accelerometer": now_s < checks[ACCEL_UNTIL_S],
         "barometer drifts": now_s < checks[BARO_UNTIL_S],
-        "barometer is stuck": memory["flags"][HAS_BARO] == 0,
+        "barometer is stuck": memory["flags"]["has_baro"] == 0,
         "climb of GNSS": checks[GNSS_FAULT + 2] == VELOCITY_IS_WRONG,
         "position of GNSS": POSITION_DRIFTS in faults,
         "velocity of GNSS": VELOCITY_IS_WRONG in faults,

@@ -22,9 +22,7 @@
 #define FS_IDLE 0
 #define FS_IMU_RING 4
 #define FS_IMU_ROWS 64
-#define FS_LANDED 1
 #define FS_REST_PERIOD_S FS_LIT(0.1)
-#define FS_FIELD_IS_NEW 8
 #define FS_BEHIND_S FS_LIT(0.035)
 #define FS_MAG_RING 1
 #define FS_MAG_ROWS 32
@@ -56,14 +54,14 @@
 
 /*
  * Return True if a measurement may be fused in the step at hand, or the covariance is behind by the most.
- * agenda.py:155
+ * agenda.py:153
  */
 static bool is_covariance_due(const fs_estimator_memory *m, const fs_filter *f, const fs_rings *r,
                               const fs_estimator_params *params)
 {
     const fs_real now_s = f->clock[0];
-    const bool rests = m->flags[FS_LANDED] == 1 && now_s - m->rest_s[0] >= FS_REST_PERIOD_S;
-    const bool is_asked = rests || m->flags[FS_FIELD_IS_NEW] == 1;
+    const bool rests = m->flags.landed == 1 && now_s - m->rest_s[0] >= FS_REST_PERIOD_S;
+    const bool is_asked = rests || m->flags.field_is_new == 1;
     if (f->behind[0] > FS_BEHIND_S || is_asked || params->drag_is_fused > FS_LIT(0.0) ||
         !fs_is_velocity_measured(f)) {
         return true;
@@ -74,7 +72,7 @@ static bool is_covariance_due(const fs_estimator_memory *m, const fs_filter *f, 
            fs_is_due(r, FS_GNSS_RING, r->gnss[fs_slot_of(r, FS_GNSS_RING, FS_GNSS_ROWS, 0)][0], now_s);
 }
 
-/* Predict a step that is not later than the horizon; return False if there is none. agenda.py:135 */
+/* Predict a step that is not later than the horizon; return False if there is none. agenda.py:133 */
 static bool begin(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, fs_real horizon_s,
                   const fs_estimator_params *params)
 {
@@ -100,10 +98,10 @@ static bool begin(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, fs_re
     return true;
 }
 
-/* Return True if the vehicle is on the ground and nothing moves it. agenda.py:265 */
+/* Return True if the vehicle is on the ground and nothing moves it. agenda.py:263 */
 static bool stands(const fs_estimator_memory *m, const fs_estimator_params *params)
 {
-    if (m->flags[FS_LANDED] == 0) {
+    if (m->flags.landed == 0) {
         return false;
     }
     const fs_vector3 rate = fs_mean_rate(m->sums);
@@ -114,7 +112,7 @@ static bool stands(const fs_estimator_memory *m, const fs_estimator_params *para
     return fs_abs(off) < FS_STILL_FORCE_M_S2 && largest < FS_STILL_RATE_RAD_S;
 }
 
-/* Fuse rest ten times a second: three axes of the velocity, three of the rate. agenda.py:277 */
+/* Fuse rest ten times a second: three axes of the velocity, three of the rate. agenda.py:275 */
 static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t stage,
                     const fs_estimator_params *params)
 {
@@ -141,14 +139,13 @@ static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int
     return axis < 5 ? axis + 1 : 0;
 }
 
-/* Fuse drag in flight while the velocity over ground is measured, twenty times a second. agenda.py:296 */
+/* Fuse drag in flight while the velocity over ground is measured, twenty times a second. agenda.py:294 */
 static int32_t drag(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t axis,
                     const fs_estimator_params *params)
 {
     if (axis == 0) {
         const bool waits = f->clock[0] - m->drag_s[0] < FS_DRAG_PERIOD_S;
-        if (params->drag_is_fused == FS_LIT(0.0) || m->flags[FS_LANDED] == 1 || waits ||
-            !fs_is_velocity_measured(f)) {
+        if (params->drag_is_fused == FS_LIT(0.0) || m->flags.landed == 1 || waits || !fs_is_velocity_measured(f)) {
             return FS_NOTHING;
         }
         m->drag_s[0] = f->clock[0];
@@ -159,7 +156,7 @@ static int32_t drag(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int
     return 1 - axis;
 }
 
-/* Move the oldest row of a ring to row; return False if none is due. agenda.py:255 */
+/* Move the oldest row of a ring to row; return False if none is due. agenda.py:253 */
 static bool next_row(fs_rings *r, int32_t ring, int32_t size, const fs_real oldest[], int32_t oldest_size,
                      fs_real now_s, fs_real row[])
 {
@@ -171,7 +168,7 @@ static bool next_row(fs_rings *r, int32_t ring, int32_t size, const fs_real olde
     return true;
 }
 
-/* Move the oldest row of a source that is due to pending; drop those that are too late. agenda.py:228 */
+/* Move the oldest row of a source that is due to pending; drop those that are too late. agenda.py:226 */
 static bool take_row(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, int32_t source)
 {
     const fs_real now_s = f->clock[0];
@@ -206,7 +203,7 @@ static bool take_row(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, in
     return false;
 }
 
-/* Fuse the next scalar of a sensor whose rows wait. agenda.py:207 */
+/* Fuse the next scalar of a sensor whose rows wait. agenda.py:205 */
 static int32_t measured(fs_estimator_memory *m, fs_filter *f, fs_rings *r, int32_t source, int32_t axis,
                         const fs_estimator_params *params)
 {
@@ -236,7 +233,7 @@ static int32_t measured(fs_estimator_memory *m, fs_filter *f, fs_rings *r, int32
     return following;
 }
 
-/* Fuse the next scalar of the source at hand. agenda.py:190 */
+/* Fuse the next scalar of the source at hand. agenda.py:188 */
 static int32_t part(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_estimator_params *params)
 {
     const int32_t source = m->agenda[FS_SOURCE];
@@ -259,7 +256,7 @@ static int32_t part(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_
     return measured(m, f, r, source, axis, params);
 }
 
-/* Move the output by a share of its difference to the filter. agenda.py:183 */
+/* Move the output by a share of its difference to the filter. agenda.py:181 */
 static void move_output(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, fs_real share,
                         const fs_estimator_params *params)
 {
@@ -269,7 +266,7 @@ static void move_output(fs_estimator_memory *m, const fs_filter *f, fs_rings *r,
     fs_follow(r, m->output, &motion_of, share, params->gravity_m_s2);
 }
 
-/* Move the output as the filter has moved, and close the step. agenda.py:171 */
+/* Move the output as the filter has moved, and close the step. agenda.py:169 */
 static void finish(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, const fs_estimator_params *params)
 {
     const fs_real dt_s = r->imu[fs_slot_of(r, FS_IMU_RING, FS_IMU_ROWS, 0)][1];
@@ -283,7 +280,7 @@ static void finish(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, cons
     m->agenda[FS_SOURCE] = FS_IDLE;
 }
 
-/* agenda.py:96 */
+/* agenda.py:94 */
 bool fs_work(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_s, const fs_estimator_params *params)
 {
     if (m->agenda[FS_SOURCE] == FS_IDLE) {
@@ -310,7 +307,7 @@ bool fs_work(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_
     return true;
 }
 
-/* agenda.py:120 */
+/* agenda.py:118 */
 void fs_take_field_at_rest(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_estimator_params *params)
 {
     for (int32_t count = 0; count < 256; count++) {

@@ -22,7 +22,6 @@
 #define FS_GNSS_ROWS 8
 #define FS_GNSS_SPARE_ROWS 2
 #define FS_MAG_RING 1
-#define FS_ALIGNED 0
 #define FS_MAG_ROWS 32
 #define FS_BARO_RING 2
 #define FS_BARO_ROWS 32
@@ -33,15 +32,11 @@
 #define FS_LONGEST_GAP_S FS_LIT(1.0)
 #define FS_ALIGNMENT_S FS_LIT(0.4)
 #define FS_WAIT_FOR_MAG_S FS_LIT(2.0)
-#define FS_HAS_MAG 5
-#define FS_HAS_YAW 6
 #define FS_IMU_RING 4
 #define FS_IMU_ROWS 64
 #define FS_BACKLOG_S FS_LIT(0.03)
-#define FS_FIELD_IS_NEW 8
-#define FS_LANDED 1
 
-/* delayed_filter.py:69 */
+/* delayed_filter.py:64 */
 void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], int32_t row_size)
 {
     for (int32_t i = 0; i < row_size; i++) {
@@ -61,7 +56,7 @@ void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], in
         }
         return;
     }
-    if (ring == FS_MAG_RING && m->flags[FS_ALIGNED] == 0) {
+    if (ring == FS_MAG_RING && m->flags.aligned == 0) {
         for (int32_t i = 0; i < 3; i++) {
             m->alignment[3 + i] += row[1 + i];
         }
@@ -87,7 +82,7 @@ void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], in
 
 /*
  * Return the time that a sample has to cover: its own, or longer after a gap; zero for one that came too late.
- * delayed_filter.py:185
+ * delayed_filter.py:180
  */
 static fs_real real_step(fs_estimator_memory *m, fs_real time_s, fs_real dt_s)
 {
@@ -107,7 +102,7 @@ static fs_real real_step(fs_estimator_memory *m, fs_real time_s, fs_real dt_s)
     return covered_s;
 }
 
-/* Add a sample to the alignment; align when it is long enough. delayed_filter.py:202 */
+/* Add a sample to the alignment; align when it is long enough. delayed_filter.py:197 */
 static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real time_s, fs_real dt_s,
                     const fs_estimator_params *params)
 {
@@ -127,13 +122,13 @@ static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real tim
     const fs_nominal read_nominal = fs_read_nominal(f->nominal);
     const fs_motion motion_of = fs_motion_of(&read_nominal);
     fs_write_motion(m->output, time_s, &motion_of);
-    m->flags[FS_ALIGNED] = 1;
+    m->flags.aligned = 1;
     for (int32_t ring = 1; ring < 4; ring++) {
         m->rings.cursors[ring][1] = 0; /* older than the state; the fields are in its yaw */
     }
     if (m->alignment[7] > FS_LIT(0.0)) {
-        m->flags[FS_HAS_MAG] = 1;
-        m->flags[FS_HAS_YAW] = 1;
+        m->flags.has_mag = 1;
+        m->flags.has_yaw = 1;
         for (int32_t i = 0; i < 3; i++) {
             m->field[i] = m->alignment[3 + i] / m->alignment[7];
         }
@@ -142,7 +137,7 @@ static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real tim
 
 /*
  * Return True if the filter is so far behind the horizon that a sample does more than a part of its work.
- * delayed_filter.py:155
+ * delayed_filter.py:150
  */
 static bool is_behind(const fs_rings *r, fs_real horizon_s)
 {
@@ -150,7 +145,7 @@ static bool is_behind(const fs_rings *r, fs_real horizon_s)
     return r->cursors[FS_IMU_RING][1] > 0 && oldest_s < horizon_s - FS_BACKLOG_S;
 }
 
-/* Do a part of the filter's work, and all of it while it is behind horizon_s. delayed_filter.py:104 */
+/* Do a part of the filter's work, and all of it while it is behind horizon_s. delayed_filter.py:99 */
 static void work_up_to(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_s,
                        const fs_estimator_params *params)
 {
@@ -162,7 +157,7 @@ static void work_up_to(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_rea
     }
 }
 
-/* Write the output in the order of VehicleState. delayed_filter.py:162 */
+/* Write the output in the order of VehicleState. delayed_filter.py:157 */
 static void write_state(fs_estimator_memory *m, const fs_vector3 *rates)
 {
     for (int32_t i = 0; i < 3; i++) {
@@ -177,7 +172,7 @@ static void write_state(fs_estimator_memory *m, const fs_vector3 *rates)
     fs_write_vector(m->state, 10, rates);
 }
 
-/* delayed_filter.py:113 */
+/* delayed_filter.py:108 */
 void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
 {
     for (int32_t i = 0; i < 8; i++) {
@@ -198,7 +193,7 @@ void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
     const fs_vector3 accel = fs_read_vector(sample, 5);
     fs_add_sample(m->sums, &gyro, &accel, dt_s);
     fs_note_clipping(m->sums, &gyro, &accel, params);
-    if (m->flags[FS_ALIGNED] == 0) {
+    if (m->flags.aligned == 0) {
         collect(m, &accel, time_s, dt_s, params);
         return;
     }
@@ -231,15 +226,15 @@ void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
     write_state(m, &less_bias);
 }
 
-/* delayed_filter.py:173 */
+/* delayed_filter.py:168 */
 void fs_field_kernel(fs_estimator_memory *memory)
 {
     fs_estimator_memory *m = memory;
-    if (m->flags[FS_ALIGNED] == 0) { /* the alignment uses the field as it is */
+    if (m->flags.aligned == 0) { /* the alignment uses the field as it is */
         return;
     }
-    m->flags[FS_FIELD_IS_NEW] = 1;
-    if (m->flags[FS_LANDED] == 1) {
+    m->flags.field_is_new = 1;
+    if (m->flags.landed == 1) {
         const fs_estimator_params *params = &m->params;
         fs_take_field_at_rest(m, &m->filter, &m->rings, params);
     }

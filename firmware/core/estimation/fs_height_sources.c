@@ -10,8 +10,6 @@
 #include "fs_resets.h"
 #include "fs_source_checks.h"
 
-#define FS_LANDED 1
-#define FS_HAS_BARO 2
 #define FS_BARO 6
 #define FS_FUSED_S 3
 #define FS_GNSS_VELOCITY 0
@@ -19,7 +17,6 @@
 #define FS_POSITION 6
 #define FS_BARO_BIAS 23
 #define FS_LEAST_COS_TILT FS_LIT(0.7)
-#define FS_HAS_RANGE 4
 #define FS_RANGE 10
 #define FS_RANGE_LOST_S FS_LIT(1.0)
 
@@ -39,26 +36,26 @@ static void start_baro(fs_estimator_memory *m, fs_filter *f, fs_real altitude_m,
     }
     f->covariance[FS_BARO_BIAS][FS_BARO_BIAS] = f->covariance[FS_POSITION + 2][FS_POSITION + 2] +
                                                 params->baro_noise_m * params->baro_noise_m;
-    m->flags[FS_HAS_BARO] = 1;
+    m->flags.has_baro = 1;
 }
 
 /* height_sources.py:21 */
 void fs_take_baro(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params)
 {
     bool has_stopped = false;
-    if (m->flags[FS_LANDED] == 0) {
+    if (m->flags.landed == 0) {
         has_stopped = fs_is_stuck(m->checks, row[1], row[0]);
     }
     if (has_stopped) {
-        m->flags[FS_HAS_BARO] = 0;
+        m->flags.has_baro = 0;
         return;
     }
     const fs_real last_s = f->observations[FS_BARO][FS_FUSED_S];
     const fs_real speed_s = f->observations[FS_GNSS_VELOCITY + 2][FS_FUSED_S];
     if (f->clock[0] - last_s > params->reset_s && f->clock[0] - speed_s < FS_AIDED_S) {
-        m->flags[FS_HAS_BARO] = 0;
+        m->flags.has_baro = 0;
     }
-    if (m->flags[FS_HAS_BARO] == 0) {
+    if (m->flags.has_baro == 0) {
         start_baro(m, f, row[1], params);
     }
     fs_fuse_baro(f, row[1], f->clock[0] - row[0], params);
@@ -72,13 +69,13 @@ void fs_take_range(fs_estimator_memory *m, fs_filter *f, const fs_real row[], co
     if (cos_tilt < FS_LEAST_COS_TILT) {
         return;
     }
-    if (m->flags[FS_HAS_RANGE] == 1 && f->clock[0] - f->observations[FS_RANGE][FS_FUSED_S] > FS_RANGE_LOST_S) {
-        m->flags[FS_HAS_RANGE] = 0;
+    if (m->flags.has_range == 1 && f->clock[0] - f->observations[FS_RANGE][FS_FUSED_S] > FS_RANGE_LOST_S) {
+        m->flags.has_range = 0;
     }
     const fs_real age_s = f->clock[0] - row[0];
-    if (m->flags[FS_HAS_RANGE] == 0) {
+    if (m->flags.has_range == 0) {
         m->ground_m[0] = f->nominal[9] - age_s * f->nominal[6] + row[1] * cos_tilt;
-        m->flags[FS_HAS_RANGE] = 1;
+        m->flags.has_range = 1;
     }
     fs_fuse_range(f, row[1] * cos_tilt, m->ground_m[0], age_s, params);
 }
@@ -87,6 +84,6 @@ void fs_take_range(fs_estimator_memory *m, fs_filter *f, const fs_real row[], co
 void fs_reset_height(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 {
     fs_reset_position(m, f, row, 2, 1);
-    m->flags[FS_HAS_BARO] = 0;
-    m->flags[FS_HAS_RANGE] = 0;
+    m->flags.has_baro = 0;
+    m->flags.has_range = 0;
 }

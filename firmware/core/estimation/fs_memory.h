@@ -11,6 +11,19 @@
 #include "fs_rings.h"
 #include "fs_types.h"
 
+/* What the estimator knows, 1 if it is true. */
+typedef struct {
+    int32_t aligned;
+    int32_t landed;
+    int32_t has_baro;
+    int32_t has_gnss;
+    int32_t has_range;
+    int32_t has_mag;
+    int32_t has_yaw;
+    int32_t mag_fault;
+    int32_t field_is_new;
+} fs_flags;
+
 /* Parameters, state and waiting measurements of an estimator. */
 typedef struct {
     fs_real output[11];
@@ -24,7 +37,7 @@ typedef struct {
     fs_real hold[3];
     fs_real rest_s[1];
     fs_real drag_s[1];
-    int32_t flags[9];
+    fs_flags flags;
     fs_real yaw_fix[4];
     fs_real followed[1];
     int32_t agenda[3];
@@ -44,7 +57,7 @@ typedef struct {
     fs_rings rings;
 } fs_estimator_memory;
 
-/* Set what is not zero at the start in a memory of zeros that has its parameters. memory.py:111 */
+/* Set what is not zero at the start in a memory of zeros that has its parameters. memory.py:112 */
 void fs_start_memory(fs_estimator_memory *memory);
 
 #endif

@@ -15,9 +15,7 @@
 #define FS_GNSS_VELOCITY 0
 #define FS_FUSED_S 3
 #define FS_GNSS_LOST_S FS_LIT(1.0)
-#define FS_HAS_GNSS 3
 #define FS_MOVES_M_S FS_LIT(0.15)
-#define FS_HAS_YAW 6
 #define FS_VELOCITY 3
 #define FS_NOTHING -1
 #define FS_HOLD_PERIOD_S FS_LIT(0.2)
@@ -27,10 +25,8 @@
 #define FS_GNSS_POSITION 3
 #define FS_OUTAGE_S 1
 #define FS_BEFORE 2
-#define FS_LANDED 1
 #define FS_GNSS_FAULT 17
 #define FS_YAW_STAGE 6
-#define FS_HAS_BARO 2
 #define FS_COUNTED_M FS_LIT(0.5)
 #define FS_LONGEST_INTERVAL_S FS_LIT(2.5)
 #define FS_SPEED_SMOOTHING_S FS_LIT(2.0)
@@ -47,7 +43,7 @@ bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f)
 {
     const fs_real north = m->gnss_speed_m_s[0];
     const fs_real east = m->gnss_speed_m_s[1];
-    const bool is_measured = m->flags[FS_HAS_GNSS] == 1 && f->clock[0] - m->last_gnss_s[0] < FS_GNSS_LOST_S;
+    const bool is_measured = m->flags.has_gnss == 1 && f->clock[0] - m->last_gnss_s[0] < FS_GNSS_LOST_S;
     return !is_measured || fs_sqrt(north * north + east * east) < FS_MOVES_M_S;
 }
 
@@ -56,7 +52,7 @@ int32_t fs_hold_position(fs_estimator_memory *m, fs_filter *f, int32_t axis, con
 {
     const fs_real now_s = f->clock[0];
     if (axis == 0) {
-        const bool is_used = m->flags[FS_HAS_GNSS] == 1 && m->flags[FS_HAS_YAW] == 1;
+        const bool is_used = m->flags.has_gnss == 1 && m->flags.has_yaw == 1;
         if (fs_is_velocity_measured(f) || (is_used && fs_deviation(f, FS_VELOCITY, 2) < params->hold_velocity_m_s)) {
             m->hold[2] = FS_LIT(0.0);
             return FS_NOTHING;
@@ -99,7 +95,7 @@ static void start_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[]
         }
     }
     m->last_gnss_s[0] = row[0];
-    m->flags[FS_HAS_GNSS] = 1;
+    m->flags.has_gnss = 1;
 }
 
 /*
@@ -107,7 +103,7 @@ static void start_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[]
  */
 static void begin_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params)
 {
-    if (m->flags[FS_HAS_GNSS] == 0) {
+    if (m->flags.has_gnss == 0) {
         start_gnss(m, f, row, params);
     }
     m->before_gnss[FS_ELAPSED_S] = fs_max(FS_LIT(0.0), row[0] - m->last_gnss_s[0]);
@@ -119,7 +115,7 @@ static void begin_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[]
         m->before_gnss[FS_BEFORE + 2 + axis] = value_2;
     }
     m->last_gnss_s[0] = row[0];
-    fs_follow_height_drift(m->checks, row, m->flags[FS_LANDED] == 0, fs_speed_accuracy(row));
+    fs_follow_height_drift(m->checks, row, m->flags.landed == 0, fs_speed_accuracy(row));
     fs_follow_drift(m->checks, f, row, fs_horizontal_accuracy(row));
     fs_drift_gnss_bias(f, row, m->before_gnss[FS_ELAPSED_S], params);
 }
@@ -149,8 +145,8 @@ static void end_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], 
                      const fs_estimator_params *params)
 {
     const fs_real elapsed_s = m->before_gnss[FS_ELAPSED_S];
-    if (m->flags[FS_LANDED] == 0) {
-        fs_take_gnss_innovations(m->checks, f, elapsed_s, m->flags[FS_HAS_BARO] == 1);
+    if (m->flags.landed == 0) {
+        fs_take_gnss_innovations(m->checks, f, elapsed_s, m->flags.has_baro == 1);
         if (first == 0) {
             fs_take_horizontal_innovations(m->checks, f, elapsed_s);
         }
@@ -187,7 +183,7 @@ static void end_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], 
 int32_t fs_take_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t stage,
                      const fs_estimator_params *params)
 {
-    const int32_t first = m->flags[FS_HAS_YAW] == 1 ? 0 : 2;
+    const int32_t first = m->flags.has_yaw == 1 ? 0 : 2;
     int32_t at = stage;
     if (stage == 0) {
         begin_gnss(m, f, row, params);

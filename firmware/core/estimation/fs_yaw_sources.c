@@ -18,11 +18,7 @@
 #include "fs_yaw_estimator.h"
 
 #define FS_YAW_UPDATES 2
-#define FS_FIELD_IS_NEW 8
 #define FS_NOTHING -1
-#define FS_HAS_MAG 5
-#define FS_MAG_FAULT 7
-#define FS_LANDED 1
 #define FS_LARGEST_TURN_RAD FS_LIT(0.5)
 #define FS_FIELD_STAGE 4
 #define FS_EARTH_FIELD 15
@@ -30,8 +26,6 @@
 #define FS_DECLINATION 22
 #define FS_KNOWN_FIELD 19
 #define FS_COUNTED_TURN_RAD FS_LIT(0.01)
-#define FS_HAS_YAW 6
-#define FS_HAS_GNSS 3
 #define FS_YAW_TURN 0
 #define FS_YAW_VARIANCE 1
 #define FS_CONVERGED_RAD FS_LIT(0.262)
@@ -41,7 +35,7 @@
 #define FS_CERTAIN_SQUARE FS_LIT(16.0)
 #define FS_REFUSED_S FS_LIT(1.0)
 
-/* yaw_sources.py:177 */
+/* yaw_sources.py:171 */
 void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_sample *step)
 {
     if (m->yaw_fix[FS_YAW_UPDATES] > FS_LIT(0.0)) {
@@ -55,7 +49,7 @@ void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_s
 
 /*
  * Turn the Earth's field by a change of the declination; the yaw follows as far as it depends on it.
- * yaw_sources.py:159
+ * yaw_sources.py:153
  */
 static void fuse_declination(fs_filter *f, fs_real was_rad, fs_real change_rad)
 {
@@ -83,7 +77,7 @@ static void fuse_declination(fs_filter *f, fs_real was_rad, fs_real change_rad)
     f->nominal[17] = along * sine + across * cosine;
 }
 
-/* Align the yaw again, or fuse the declination; return the next stage. yaw_sources.py:131 */
+/* Align the yaw again, or fuse the declination; return the next stage. yaw_sources.py:125 */
 static int32_t begin_earth_field(fs_estimator_memory *m, fs_filter *f, const fs_estimator_params *params)
 {
     const fs_vector3 known = fs_read_vector(m->earth, 0);
@@ -96,7 +90,7 @@ static int32_t begin_earth_field(fs_estimator_memory *m, fs_filter *f, const fs_
     m->pending[3] = q->z;
     const fs_real was_rad = fs_atan2(held->y, held->x);
     const fs_real change_rad = fs_wrap_pi(fs_atan2(known.y, known.x) - was_rad);
-    if (m->flags[FS_LANDED] == 1 || fs_abs(change_rad) > FS_LARGEST_TURN_RAD) {
+    if (m->flags.landed == 1 || fs_abs(change_rad) > FS_LARGEST_TURN_RAD) {
         const fs_vector3 read_vector = fs_read_vector(m->field, 0);
         (void)fs_turn_to_field(f, &read_vector, &known, m->earth[3], params);
         return FS_FIELD_STAGE;
@@ -105,7 +99,7 @@ static int32_t begin_earth_field(fs_estimator_memory *m, fs_filter *f, const fs_
     return 1;
 }
 
-/* Fuse a component of the Earth's field. yaw_sources.py:120 */
+/* Fuse a component of the Earth's field. yaw_sources.py:114 */
 static void fuse_known_field(const fs_estimator_memory *m, fs_filter *f, int32_t axis,
                              const fs_estimator_params *params)
 {
@@ -119,11 +113,11 @@ static void fuse_known_field(const fs_estimator_memory *m, fs_filter *f, int32_t
 
 /*
  * Count the turn since the attitude in pending as a reset of the yaw; the field is not new any more.
- * yaw_sources.py:147
+ * yaw_sources.py:141
  */
 static void count_turn(fs_estimator_memory *m, const fs_filter *f)
 {
-    m->flags[FS_FIELD_IS_NEW] = 0;
+    m->flags.field_is_new = 0;
     const fs_nominal read_nominal = fs_read_nominal(f->nominal);
     const fs_quaternion before_2 = {
         .w = m->pending[0],
@@ -137,15 +131,16 @@ static void count_turn(fs_estimator_memory *m, const fs_filter *f)
     }
 }
 
-/* yaw_sources.py:95 */
+/* yaw_sources.py:89 */
 int32_t fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, int32_t stage, const fs_estimator_params *params)
 {
+    fs_flags *flags = &m->flags;
     if (stage == 0) {
-        if (m->flags[FS_FIELD_IS_NEW] == 0) {
+        if (flags->field_is_new == 0) {
             return FS_NOTHING;
         }
-        if (m->flags[FS_HAS_MAG] == 0 || m->flags[FS_MAG_FAULT] == 1) {
-            m->flags[FS_FIELD_IS_NEW] = 0;
+        if (flags->has_mag == 0 || flags->mag_fault == 1) {
+            flags->field_is_new = 0;
             return FS_NOTHING;
         }
         return begin_earth_field(m, f, params);
@@ -163,20 +158,20 @@ int32_t fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, int32_t stage,
     return stage + 1;
 }
 
-/* Note the field; set the states of the field, and an unknown yaw, by the first one. yaw_sources.py:79 */
+/* Note the field; set the states of the field, and an unknown yaw, by the first one. yaw_sources.py:73 */
 static void start_field(fs_estimator_memory *m, fs_filter *f, const fs_vector3 *field,
                         const fs_estimator_params *params)
 {
     m->field[0] = field->x;
     m->field[1] = field->y;
     m->field[2] = field->z;
-    if (m->flags[FS_HAS_MAG] == 0) {
-        m->flags[FS_HAS_MAG] = 1;
-        if (m->flags[FS_HAS_YAW] == 0) {
+    if (m->flags.has_mag == 0) {
+        m->flags.has_mag = 1;
+        if (m->flags.has_yaw == 0) {
             const fs_vector3 read_vector = fs_read_vector(m->earth, 0);
             const fs_real turn_rad = fs_align_yaw(f, field, &read_vector, m->earth[3], params);
             fs_count_yaw_reset(m, turn_rad);
-            m->flags[FS_HAS_YAW] = 1;
+            m->flags.has_yaw = 1;
         } else {
             const fs_nominal read_nominal = fs_read_nominal(f->nominal);
             const fs_vector3 level = fs_rotate(&read_nominal.attitude, field);
@@ -186,12 +181,12 @@ static void start_field(fs_estimator_memory *m, fs_filter *f, const fs_vector3 *
     }
 }
 
-/* yaw_sources.py:64 */
+/* yaw_sources.py:58 */
 int32_t fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t axis,
                       const fs_estimator_params *params)
 {
     const fs_vector3 field = fs_read_vector(row, 1);
-    if (m->flags[FS_MAG_FAULT] == 1) {
+    if (m->flags.mag_fault == 1) {
         return 0;
     }
     if (axis == 0) {
@@ -201,7 +196,7 @@ int32_t fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[],
     return axis < 2 ? axis + 1 : 0;
 }
 
-/* Take tilt and yaw from the models, velocity and position from GNSS. yaw_sources.py:224 */
+/* Take tilt and yaw from the models, velocity and position from GNSS. yaw_sources.py:218 */
 static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 {
     m->yaw_fix[FS_YAW_WRONG_S] = FS_LIT(0.0);
@@ -225,14 +220,14 @@ static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real 
     }
     fs_reset_variance(f->covariance, FS_ATTITUDE + 2, 1, m->yaw_fix[FS_YAW_VARIANCE]);
     fs_count_yaw_reset(m, fs_turn_between(&before, &q));
-    m->flags[FS_HAS_YAW] = 1;
+    m->flags.has_yaw = 1;
     fs_reset_velocity(m, f, row, 0, 2);
     fs_reset_position(m, f, row, 0, 2);
 }
 
 /*
  * Return True if the models have contradicted the yaw for a second, or do while GNSS velocities are refused.
- * yaw_sources.py:210
+ * yaw_sources.py:204
  */
 static bool is_wrong(fs_estimator_memory *m, fs_real time_s)
 {
@@ -250,10 +245,11 @@ static bool is_wrong(fs_estimator_memory *m, fs_real time_s)
     return lasts || (differs && is_refused);
 }
 
-/* yaw_sources.py:186 */
+/* yaw_sources.py:180 */
 void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 {
-    if (m->flags[FS_LANDED] == 1 || m->flags[FS_HAS_GNSS] == 0) {
+    fs_flags *flags = &m->flags;
+    if (flags->landed == 1 || flags->has_gnss == 0) {
         m->yaw_fix[FS_YAW_UPDATES] = FS_LIT(0.0);
         return;
     }
@@ -272,11 +268,11 @@ void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
     if (m->yaw_fix[FS_YAW_VARIANCE] > FS_CONVERGED_RAD * FS_CONVERGED_RAD) {
         return;
     }
-    if (m->flags[FS_HAS_YAW] == 0) {
+    if (flags->has_yaw == 0) {
         reset_to_models(m, f, row);
     } else {
         if (is_wrong(m, row[0])) {
-            m->flags[FS_MAG_FAULT] = m->flags[FS_HAS_MAG];
+            flags->mag_fault = flags->has_mag;
             reset_to_models(m, f, row);
         }
     }

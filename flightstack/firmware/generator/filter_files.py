@@ -22,7 +22,7 @@ NAMES = {geometry.__name__: "fs_estimation_geometry", portable_math.__name__: "f
 """Files of functions that the control laws do not use; those that they use stand in ``firmware/core``."""
 INDICES: tuple[tuple[ModuleType, tuple[str, ...]], ...] = (
     (rings, ("GNSS_RING", "MAG_RING", "BARO_RING", "RANGE_RING")),
-    (memory, ("ALIGNED", "LANDED", "HAS_GNSS", "HAS_YAW", "POSITION_RESET", "VELOCITY_RESET", "YAW_RESET")),
+    (memory, ("POSITION_RESET", "VELOCITY_RESET", "YAW_RESET")),
     (kalman, ("GNSS_VELOCITY", "GNSS_POSITION", "BARO", "MAG")),
 )
 """Indices of the arrays in the memory that callers use."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from flightstack.core.contract import FloatArray, RecordArray
 from flightstack.estimation.estimator_params import EstimatorParams
-from flightstack.estimation.memory import LANDED, MEMORY, EstimatorMemory
+from flightstack.estimation.memory import MEMORY, EstimatorMemory, Flags
 from flightstack.firmware.c_filter import CFilter, c_layout, copy_memory
 from flightstack.firmware.pil import sensing
 from flightstack.firmware.pil.sensing import MOST_PARAMS, PAGES, WORDS, Event, ReadWords, SenseEvents
@@ -23,7 +23,7 @@ class HostFilter:
         """Compile the estimator if needed; raise BuildError. ``real`` is ``float`` or ``double``."""
         self._filter = CFilter(real=real)
         self.memory: RecordArray = np.zeros(1, MEMORY)
-        held, shown = self._filter.memory[0], self.memory[0]
+        held, shown = self._filter.memory, self.memory
         self._current = [(shown[name], held[name]) for name in _CURRENT]
 
     def start(self, params: EstimatorParams) -> None:
@@ -37,7 +37,7 @@ class HostFilter:
 
     def set_landed(self, landed: bool) -> None:
         """Set whether the vehicle stands on the ground."""
-        self._filter.memory[0]["flags"][LANDED] = landed
+        self._filter.memory[0]["flags"]["landed"] = landed
 
     def set_earth(self, earth: FloatArray, is_known: bool) -> None:
         """Set the Earth's field, shape (4,); correct the state with it if ``is_known``."""
@@ -76,7 +76,8 @@ class TargetFilter:
         self._held: RecordArray = np.zeros(1, c_layout(EstimatorMemory, "f4"))
         self._words = self._held.view("<u4")
         self._record = self.memory[0]
-        self._bits = np.arange(len(self._record["flags"]))
+        self._flags = self.memory["flags"].view(np.int64)
+        self._bits = np.arange(len(Flags._fields))
         self._waiting: list[Event] = []
         self._next = 0
         self._is_fresh = False
@@ -132,4 +133,4 @@ class TargetFilter:
         record = self._record
         if events[-1].kind in (sensing.IMU, sensing.EARTH):
             record["state"], record["resets"] = answer.state, answer.resets
-        record["flags"] = (answer.flags >> self._bits) & 1
+        self._flags[:] = (answer.flags >> self._bits) & 1

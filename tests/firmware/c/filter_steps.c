@@ -50,7 +50,7 @@ static void take(filter_steps *s)
 
     switch (s->kind) {
     case FILTER_IMU:
-        aligned = m->flags[FS_ALIGNED];
+        aligned = m->flags.aligned;
         before = s->clock != 0 ? s->clock() : 0U;
         fs_imu_kernel(m, s->row);
         cost = s->clock != 0 ? s->clock() - before : 0U;
@@ -63,7 +63,7 @@ static void take(filter_steps *s)
         fs_field_kernel(m);
         break;
     case FILTER_LANDING:
-        m->flags[FS_LANDED] = s->row[0] > FS_LIT(0.5) ? 1 : 0;
+        m->flags.landed = s->row[0] > FS_LIT(0.5) ? 1 : 0;
         break;
     case FILTER_EARTH:
         for (i = 0U; i < 4U; i++) {
