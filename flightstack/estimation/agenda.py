@@ -17,10 +17,7 @@ from flightstack.estimation.height_sources import take_baro, take_range
 from flightstack.estimation.imu_input import mean_force, mean_rate, noise_of, read_step
 from flightstack.estimation.kalman import Filter
 from flightstack.estimation.memory import (
-    AXIS,
-    FUSED_ANY,
     NOTHING,
-    SOURCE,
     MemoryRecord,
 )
 from flightstack.estimation.output_predictor import follow
@@ -97,19 +94,19 @@ def work(m: MemoryRecord, f: Filter, r: Rings, horizon_s: float, params: Estimat
     A part is one scalar, with the prediction if that is due, or the end of a step.
     """
     agenda = m["agenda"]
-    if agenda[SOURCE] == IDLE:  # noqa: SIM102  # a call that writes stands alone in C
+    if agenda["source"] == IDLE:  # noqa: SIM102  # a call that writes stands alone in C
         if not _begin(m, f, r, horizon_s, params):
             return False
     for _ in range(SOURCES):
-        if agenda[SOURCE] >= SOURCES:
+        if agenda["source"] >= SOURCES:
             break
         following = _part(m, f, r, params)
         if following != NOTHING:
-            agenda[AXIS], agenda[FUSED_ANY] = following, 1
-            if count_of_resets(m) != m["followed"][0]:  # users of the output follow the count at once
+            agenda["axis"], agenda["has_fused"] = following, 1
+            if count_of_resets(m) != m["followed"]:  # users of the output follow the count at once
                 _move_output(m, f, r, 1.0, params)
             return True
-        agenda[SOURCE] += 1
+        agenda["source"] += 1
     _finish(m, f, r, params)
     return True
 
@@ -118,7 +115,7 @@ def work(m: MemoryRecord, f: Filter, r: Rings, horizon_s: float, params: Estimat
 def take_field_at_rest(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorParams) -> None:
     """Correct the filter with the Earth's field now, after the open step: a vehicle that is ready may arm next."""
     for _ in range(MOST_PARTS):
-        if m["agenda"][SOURCE] == IDLE:
+        if m["agenda"]["source"] == IDLE:
             break
         work(m, f, r, f.clock[0], params)
     predict_errors(f, noise_of(m["sums"]), params)
@@ -145,7 +142,7 @@ def _begin(m: MemoryRecord, f: Filter, r: Rings, horizon_s: float, params: Estim
         predict_errors(f, noise_of(m["sums"]), params)
     add_unknown(f, step)
     add_fault_noise(m["checks"], f, step.dt_s)
-    agenda[SOURCE], agenda[AXIS], agenda[FUSED_ANY] = EARTH_SOURCE, 0, 0
+    agenda["source"], agenda["axis"], agenda["has_fused"] = EARTH_SOURCE, 0, 0
     return True
 
 
@@ -153,7 +150,7 @@ def _begin(m: MemoryRecord, f: Filter, r: Rings, horizon_s: float, params: Estim
 def _is_covariance_due(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorParams) -> bool:
     """Return True if a measurement may be fused in the step at hand, or the covariance is behind by the most."""
     now_s = f.clock[0]
-    rests = m["flags"]["landed"] == 1 and now_s - m["rest_s"][0] >= _REST_PERIOD_S
+    rests = m["flags"]["landed"] == 1 and now_s - m["rest_s"] >= _REST_PERIOD_S
     is_asked = rests or m["flags"]["field_is_new"] == 1
     if f.behind[0] > _BEHIND_S or is_asked or params.drag_is_fused > 0.0 or not is_velocity_measured(f):
         return True
@@ -169,25 +166,25 @@ def _is_covariance_due(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorPa
 def _finish(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorParams) -> None:
     """Move the output as the filter has moved, and close the step."""
     agenda, dt_s = m["agenda"], r.imu[slot_of(r, IMU_RING, IMU_ROWS, 0), 1]
-    is_reset = count_of_resets(m) != m["followed"][0]  # between two steps, by the Earth's field
+    is_reset = count_of_resets(m) != m["followed"]  # between two steps, by the Earth's field
     share = 1.0 if is_reset or params.output_s <= dt_s else dt_s / params.output_s
-    if is_reset or agenda[FUSED_ANY] == 1 or share < 1.0:  # else the output has moved as the filter has
+    if is_reset or agenda["has_fused"] == 1 or share < 1.0:  # else the output has moved as the filter has
         _move_output(m, f, r, share, params)
     pop(r, IMU_RING, IMU_ROWS)
-    agenda[SOURCE] = IDLE
+    agenda["source"] = IDLE
 
 
 @compiled
 def _move_output(m: MemoryRecord, f: Filter, r: Rings, share: float, params: EstimatorParams) -> None:
     """Move the output by a share of its difference to the filter."""
-    m["followed"][0] = count_of_resets(m)
+    m["followed"] = count_of_resets(m)
     follow(r, m["output"], motion_of(read_nominal(f.nominal)), share, params.gravity_m_s2)
 
 
 @compiled
 def _part(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorParams) -> int:
     """Fuse the next scalar of the source at hand."""
-    source, axis = m["agenda"][SOURCE], m["agenda"][AXIS]
+    source, axis = m["agenda"]["source"], m["agenda"]["axis"]
     if source == EARTH_SOURCE:
         return take_earth_field(m, f, axis, params)
     if source == REST_SOURCE:
@@ -276,9 +273,9 @@ def _rest(m: MemoryRecord, f: Filter, r: Rings, stage: int, params: EstimatorPar
     """Fuse rest ten times a second: three axes of the velocity, three of the rate."""
     axis: int = stage
     if stage == 0:
-        if f.clock[0] - m["rest_s"][0] < _REST_PERIOD_S or not _stands(m, params):
+        if f.clock[0] - m["rest_s"] < _REST_PERIOD_S or not _stands(m, params):
             return NOTHING
-        m["rest_s"][0] = f.clock[0]
+        m["rest_s"] = f.clock[0]
         if not is_platform_at_rest(m, f):
             axis = 3
     if axis < 3:
@@ -294,10 +291,10 @@ def _rest(m: MemoryRecord, f: Filter, r: Rings, stage: int, params: EstimatorPar
 def _drag(m: MemoryRecord, f: Filter, r: Rings, axis: int, params: EstimatorParams) -> int:
     """Fuse drag in flight while the velocity over ground is measured, twenty times a second."""
     if axis == 0:
-        waits = f.clock[0] - m["drag_s"][0] < _DRAG_PERIOD_S
+        waits = f.clock[0] - m["drag_s"] < _DRAG_PERIOD_S
         if params.drag_is_fused == 0.0 or m["flags"]["landed"] == 1 or waits or not is_velocity_measured(f):
             return NOTHING
-        m["drag_s"][0] = f.clock[0]
+        m["drag_s"] = f.clock[0]
     step = read_step(r.imu[slot_of(r, IMU_RING, IMU_ROWS, 0)])
     fuse_drag(f, axis, scaled(step.velocity_m_s, 1.0 / step.dt_s), params)
     return 1 - axis

@@ -22,8 +22,6 @@ from flightstack.estimation.imu_input import (
 from flightstack.estimation.imu_track import IMU_SIZE
 from flightstack.estimation.kalman import Filter
 from flightstack.estimation.memory import (
-    GAP_S,
-    GAPS,
     MemoryArray,
     MemoryRecord,
     filter_of,
@@ -179,15 +177,15 @@ def field_kernel(memory: MemoryArray) -> None:
 @compiled
 def _real_step(m: MemoryRecord, time_s: float, dt_s: float) -> float:
     """Return the time that a sample has to cover: its own, or longer after a gap; zero for one that came too late."""
-    last_s = m["last_imu_s"][0]
+    last_s = m["last_imu_s"]
     if dt_s <= 0.0 or (last_s > 0.0 and time_s <= last_s):
         return 0.0
-    m["last_imu_s"][0] = time_s
+    m["last_imu_s"] = time_s
     elapsed_s = time_s - last_s
     if last_s == 0.0 or elapsed_s < 1.5 * dt_s:
         return dt_s
-    m["imu_gap"][GAPS] += 1.0
-    m["imu_gap"][GAP_S] += elapsed_s - dt_s
+    m["gaps"]["number"] += 1.0
+    m["gaps"]["total_s"] += elapsed_s - dt_s
     covered_s: float = min(elapsed_s, _LONGEST_GAP_S)
     note_gap(m["sums"], covered_s - dt_s)
     return covered_s

@@ -66,9 +66,9 @@ def take_range(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorPar
         m["flags"]["has_range"] = 0
     age_s = f.clock[0] - row[0]
     if m["flags"]["has_range"] == 0:
-        m["ground_m"][0] = f.nominal[9] - age_s * f.nominal[6] + row[1] * cos_tilt
+        m["ground_m"] = f.nominal[9] - age_s * f.nominal[6] + row[1] * cos_tilt
         m["flags"]["has_range"] = 1
-    fuse_range(f, row[1] * cos_tilt, m["ground_m"][0], age_s, params)
+    fuse_range(f, row[1] * cos_tilt, m["ground_m"], age_s, params)
 
 
 @compiled

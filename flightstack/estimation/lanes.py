@@ -213,4 +213,4 @@ def _count_change(old: RecordArray, new: RecordArray, offset: StateOffset) -> No
     x[YAW_RESET] += 1.0
     x[YAW_RESET + RESET_CHANGE] = offset.yaw_rad
     x[YAW_RESET_SUM] += offset.yaw_rad
-    new["followed"][0, 0] = count_of_resets(new[0])
+    new["followed"][0] = count_of_resets(new[0])

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple, TypeAlias
 
-import numpy as np
-
 from flightstack.core.array_items import as_tuple
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import STATE_SIZE, FloatArray, Record, RecordArray
@@ -20,20 +18,12 @@ from flightstack.estimation.rings import MEAN_SIZE, RINGS, TRACK_COLUMNS, Rings
 from flightstack.estimation.source_checks import Checks
 from flightstack.estimation.yaw_estimator import Models
 
-SOURCE, AXIS, FUSED_ANY, AGENDA_SIZE = 0, 1, 2, 3
-"""The open step: the source that is at work, 0 if no step is open; its next axis; 1 if a measurement was fused."""
 NOTHING = -1
 """Returned by a source without a measurement that is due; else it returns its next axis, 0 after the last one."""
-Agenda: TypeAlias = "Annotated[np.ndarray[tuple[int], np.dtype[np.int64]], AGENDA_SIZE]"
 POSITION_RESET, VELOCITY_RESET, YAW_RESET, RESETS = 0, 8, 16, 19
 RESET_CHANGE, RESET_SUM, RESET_S, YAW_RESET_SUM = 1, 4, 7, 18
 """Of each kind: the number of its resets, their change in the last step with one, the sum of all changes, and the time
 of that step; yaw has no time."""
-GAP_S, GAPS = 0, 1
-"""Columns of ``imu_gap``: time without samples in all, and the number of such gaps."""
-YAW_TURN, YAW_VARIANCE, YAW_UPDATES, YAW_WRONG_S = 0, 1, 2, 3
-"""Columns of ``yaw_fix``: turn from the filter's yaw to that of GNSS velocity [rad], its variance, updates, and the
-time since which they contradict each other, 0 if they do not."""
 
 
 class Flags(NamedTuple):
@@ -53,6 +43,56 @@ class Flags(NamedTuple):
     """The filter has not yet been corrected with the Earth's field."""
 
 
+class Gaps(NamedTuple):
+    """Time without samples of the IMU in all, and the number of such gaps."""
+
+    total_s: float
+    number: float
+
+
+class Hold(NamedTuple):
+    """Horizontal position that is held."""
+
+    place_m: Annotated[FloatArray, 2]
+    """North, east."""
+    fused_s: float
+    """Time of the last fusion, 0 if nothing is held."""
+
+
+class YawFix(NamedTuple):
+    """Comparison of the filter's yaw with that of GNSS velocity."""
+
+    turn_rad: float
+    """From the filter's yaw to that of GNSS velocity."""
+    variance: float
+    updates: float
+    wrong_s: float
+    """Time since which they contradict each other, 0 if they do not."""
+
+
+class Agenda(NamedTuple):
+    """The open step."""
+
+    source: int
+    """The source that is at work, 0 if no step is open."""
+    axis: int
+    """The next one of the source."""
+    has_fused: int
+    """1 if a measurement was fused in the step."""
+
+
+class BeforeGnss(NamedTuple):
+    """The state before the measurement of GNSS that is being fused."""
+
+    elapsed_s: float
+    """Since the last measurement."""
+    outage_s: float
+    """Since the last accepted position."""
+    place_m: Annotated[FloatArray, 2]
+    """North, east; the velocity too."""
+    velocity_m_s: Annotated[FloatArray, 2]
+
+
 class EstimatorMemory(NamedTuple):
     """Parameters, state and waiting measurements of an estimator.
 
@@ -62,25 +102,24 @@ class EstimatorMemory(NamedTuple):
     output: Annotated[FloatArray, TRACK_COLUMNS]
     state: Annotated[FloatArray, STATE_SIZE]
     """The output as ``VehicleState``."""
-    last_imu_s: Annotated[FloatArray, 1]
-    imu_gap: Annotated[FloatArray, 2]
-    last_gnss_s: Annotated[FloatArray, 1]
+    last_imu_s: float
+    gaps: Annotated[Record, Gaps]
+    last_gnss_s: float
     gnss_speed_m_s: Annotated[FloatArray, 2]
     """North, east, smoothed."""
     refused_s: Annotated[FloatArray, 6]
     """Time of refused GNSS velocities and positions, without an accepted one."""
-    ground_m: Annotated[FloatArray, 1]
-    hold: Annotated[FloatArray, 3]
-    """North, east [m], time of the last fusion."""
-    rest_s: Annotated[FloatArray, 1]
+    ground_m: float
+    hold: Annotated[Record, Hold]
+    rest_s: float
     """Time of the last fusion at rest."""
-    drag_s: Annotated[FloatArray, 1]
+    drag_s: float
     """Time of the last fusion of drag."""
     flags: Annotated[Record, Flags]
-    yaw_fix: Annotated[FloatArray, 4]
-    followed: Annotated[FloatArray, 1]
+    yaw_fix: Annotated[Record, YawFix]
+    followed: float
     """Number of resets that the output has followed."""
-    agenda: Agenda
+    agenda: Annotated[Record, Agenda]
     pending: Annotated[FloatArray, 10]
     """The measurement that is being fused, a row of its ring."""
     filter: Filter
@@ -95,8 +134,7 @@ class EstimatorMemory(NamedTuple):
     """Field NED [gauss], declination [rad], NaN if unknown."""
     field: Annotated[FloatArray, 3]
     """Of the body [gauss], the last one at the horizon."""
-    before_gnss: Annotated[FloatArray, 6]
-    """Before the measurement of GNSS that is being fused: time since the last one, outage; position and velocity NE."""
+    before_gnss: Annotated[Record, BeforeGnss]
     yaw_models: Models
     rings: Rings
 

@@ -48,8 +48,6 @@ _SPEED_SMOOTHING_S = 2.0
 _MOVES_M_S = 0.15
 YAW_STAGE = 6
 """Stage of a measurement after its velocities (0 to 2) and positions (3 to 5)."""
-_ELAPSED_S, _OUTAGE_S, _BEFORE = 0, 1, 2
-"""Columns of ``before_gnss``."""
 
 
 @compiled
@@ -80,28 +78,29 @@ def _begin_gnss(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorPa
     if m["flags"]["has_gnss"] == 0:
         _start_gnss(m, f, row, params)
     before = m["before_gnss"]
-    before[_ELAPSED_S] = max(0.0, row[0] - m["last_gnss_s"][0])
-    before[_OUTAGE_S] = f.clock[0] - f.observations[GNSS_POSITION, FUSED_S]
+    before["elapsed_s"] = max(0.0, row[0] - m["last_gnss_s"])
+    before["outage_s"] = f.clock[0] - f.observations[GNSS_POSITION, FUSED_S]
     for axis in range(2):
-        before[_BEFORE + axis], before[_BEFORE + 2 + axis] = f.nominal[7 + axis], f.nominal[4 + axis]
-    m["last_gnss_s"][0] = row[0]
+        before["place_m"][axis], before["velocity_m_s"][axis] = f.nominal[7 + axis], f.nominal[4 + axis]
+    m["last_gnss_s"] = row[0]
     follow_height_drift(m["checks"], row, m["flags"]["landed"] == 0, speed_accuracy(row))
     follow_drift(m["checks"], f, row, horizontal_accuracy(row))
-    drift_gnss_bias(f, row, before[_ELAPSED_S], params)
+    drift_gnss_bias(f, row, before["elapsed_s"], params)
 
 
 @compiled
 def _end_gnss(m: MemoryRecord, f: Filter, row: FloatArray, first: int, params: EstimatorParams) -> None:
     """Judge the measurement by its innovations, and reset what was refused too long."""
     before, c = m["before_gnss"], m["checks"]
-    elapsed_s = before[_ELAPSED_S]
+    elapsed_s = before["elapsed_s"]
     if m["flags"]["landed"] == 0:
         take_gnss_innovations(c, f, elapsed_s, m["flags"]["has_baro"] == 1)
         if first == 0:
             take_horizontal_innovations(c, f, elapsed_s)
-    dx, dy = f.nominal[7] - before[_BEFORE], f.nominal[8] - before[_BEFORE + 1]
-    if before[_OUTAGE_S] > _GNSS_LOST_S and dx * dx + dy * dy > _COUNTED_M * _COUNTED_M:
-        count_correction(m, f, dx, dy, f.nominal[4] - before[_BEFORE + 2], f.nominal[5] - before[_BEFORE + 3])
+    dx, dy = f.nominal[7] - before["place_m"][0], f.nominal[8] - before["place_m"][1]
+    if before["outage_s"] > _GNSS_LOST_S and dx * dx + dy * dy > _COUNTED_M * _COUNTED_M:
+        v = before["velocity_m_s"]
+        count_correction(m, f, dx, dy, f.nominal[4] - v[0], f.nominal[5] - v[1])
     _count_refused(m, f, first, min(elapsed_s, _LONGEST_INTERVAL_S))
     share = min(elapsed_s / _SPEED_SMOOTHING_S, 1.0)
     for axis in range(2):
@@ -153,7 +152,7 @@ def _start_gnss(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorPa
             p[at, at] += variance
             reset_variance(p, GNSS_BIAS + axis, 1, slow)
             p[at, GNSS_BIAS + axis] = -slow
-    m["last_gnss_s"][0] = row[0]
+    m["last_gnss_s"] = row[0]
     m["flags"]["has_gnss"] = 1
 
 
@@ -168,7 +167,7 @@ def is_velocity_measured(f: Filter) -> bool:
 def is_platform_at_rest(m: MemoryRecord, f: Filter) -> bool:
     """Return False if GNSS measures that what the vehicle stands on moves, as a boat does."""
     north, east = m["gnss_speed_m_s"][0], m["gnss_speed_m_s"][1]
-    is_measured = m["flags"]["has_gnss"] == 1 and f.clock[0] - m["last_gnss_s"][0] < _GNSS_LOST_S
+    is_measured = m["flags"]["has_gnss"] == 1 and f.clock[0] - m["last_gnss_s"] < _GNSS_LOST_S
     return not is_measured or math.sqrt(north * north + east * east) < _MOVES_M_S
 
 
@@ -179,12 +178,12 @@ def hold_position(m: MemoryRecord, f: Filter, axis: int, params: EstimatorParams
     if axis == 0:
         is_used = m["flags"]["has_gnss"] == 1 and m["flags"]["has_yaw"] == 1
         if is_velocity_measured(f) or (is_used and deviation(f, VELOCITY, 2) < params.hold_velocity_m_s):
-            hold[2] = 0.0
+            hold["fused_s"] = 0.0
             return NOTHING
-        if hold[2] == 0.0:
-            hold[0], hold[1] = f.nominal[7], f.nominal[8]
-        if now_s - hold[2] < _HOLD_PERIOD_S:
+        if hold["fused_s"] == 0.0:
+            hold["place_m"][0], hold["place_m"][1] = f.nominal[7], f.nominal[8]
+        if now_s - hold["fused_s"] < _HOLD_PERIOD_S:
             return NOTHING
-        hold[2] = now_s
-    fuse_hold(f, axis, hold[axis], params)
+        hold["fused_s"] = now_s
+    fuse_hold(f, axis, hold["place_m"][axis], params)
     return 1 - axis

@@ -20,10 +20,6 @@ from flightstack.estimation.fusion import fuse_field_axis, speed_accuracy
 from flightstack.estimation.kalman import DECLINATION, KNOWN_FIELD, Filter, Noise, clear, fuse, reset_variance
 from flightstack.estimation.memory import (
     NOTHING,
-    YAW_TURN,
-    YAW_UPDATES,
-    YAW_VARIANCE,
-    YAW_WRONG_S,
     MemoryRecord,
 )
 from flightstack.estimation.prediction import DeltaSample, less_bias
@@ -170,7 +166,7 @@ def _fuse_declination(f: Filter, was_rad: float, change_rad: float) -> None:
 @compiled
 def predict_yaw(m: MemoryRecord, f: Filter, step: DeltaSample) -> None:
     """Move the models over a step of the flight."""
-    if m["yaw_fix"][YAW_UPDATES] > 0.0:
+    if m["yaw_fix"]["updates"] > 0.0:
         angle = less_bias(step.angle_rad, read_vector(f.nominal, 10), step.dt_s)
         velocity = less_bias(step.velocity_m_s, read_vector(f.nominal, 13), step.dt_s)
         predict_models(m["yaw_models"], angle, velocity, step.dt_s)
@@ -181,17 +177,17 @@ def take_velocity(m: MemoryRecord, f: Filter, row: FloatArray) -> None:
     """Weigh the models with a GNSS velocity; reset the yaw if it is unknown, or wrong."""
     models, fix, flags = m["yaw_models"], m["yaw_fix"], m["flags"]
     if flags["landed"] == 1 or flags["has_gnss"] == 0:
-        fix[YAW_UPDATES] = 0.0
+        fix["updates"] = 0.0
         return
     attitude, noise_m_s = read_nominal(f.nominal).attitude, max(speed_accuracy(row), 0.1)
-    if fix[YAW_UPDATES] == 0.0:
+    if fix["updates"] == 0.0:
         start_models(models, attitude, row[4], row[5], noise_m_s * noise_m_s)
     else:
         update_models(models, row[4], row[5], noise_m_s * noise_m_s)
-    fix[YAW_UPDATES] += 1.0
-    fix[YAW_TURN] = mean_turn(models, attitude)
-    fix[YAW_VARIANCE] = variance_of(models, attitude, fix[YAW_TURN])
-    if fix[YAW_VARIANCE] > _CONVERGED_RAD * _CONVERGED_RAD:
+    fix["updates"] += 1.0
+    fix["turn_rad"] = mean_turn(models, attitude)
+    fix["variance"] = variance_of(models, attitude, fix["turn_rad"])
+    if fix["variance"] > _CONVERGED_RAD * _CONVERGED_RAD:
         return
     if flags["has_yaw"] == 0:
         _reset_to_models(m, f, row)
@@ -204,12 +200,12 @@ def take_velocity(m: MemoryRecord, f: Filter, row: FloatArray) -> None:
 def _is_wrong(m: MemoryRecord, time_s: float) -> bool:
     """Return True if the models have contradicted the yaw for a second, or do while GNSS velocities are refused."""
     fix, refused = m["yaw_fix"], m["refused_s"]
-    differs = abs(fix[YAW_TURN]) > _WRONG_YAW_RAD
-    if not (differs and fix[YAW_TURN] * fix[YAW_TURN] > _CERTAIN_SQUARE * fix[YAW_VARIANCE]):
-        fix[YAW_WRONG_S] = 0.0
-    elif fix[YAW_WRONG_S] == 0.0:
-        fix[YAW_WRONG_S] = time_s
-    lasts: bool = fix[YAW_WRONG_S] > 0.0 and time_s - fix[YAW_WRONG_S] > _REFUSED_S
+    differs = abs(fix["turn_rad"]) > _WRONG_YAW_RAD
+    if not (differs and fix["turn_rad"] * fix["turn_rad"] > _CERTAIN_SQUARE * fix["variance"]):
+        fix["wrong_s"] = 0.0
+    elif fix["wrong_s"] == 0.0:
+        fix["wrong_s"] = time_s
+    lasts: bool = fix["wrong_s"] > 0.0 and time_s - fix["wrong_s"] > _REFUSED_S
     is_refused: bool = max(refused[0], refused[1]) > _REFUSED_S
     return lasts or (differs and is_refused)
 
@@ -217,15 +213,15 @@ def _is_wrong(m: MemoryRecord, time_s: float) -> bool:
 @compiled
 def _reset_to_models(m: MemoryRecord, f: Filter, row: FloatArray) -> None:
     """Take tilt and yaw from the models, velocity and position from GNSS."""
-    m["yaw_fix"][YAW_WRONG_S] = 0.0
+    m["yaw_fix"]["wrong_s"] = 0.0
     models, before = m["yaw_models"], read_nominal(f.nominal).attitude
     best = likeliest(models)
     q = attitude_of(models, best)
-    q = turned(q, Vector3(0.0, 0.0, m["yaw_fix"][YAW_TURN] - turn_between(before, q)))
+    q = turned(q, Vector3(0.0, 0.0, m["yaw_fix"]["turn_rad"] - turn_between(before, q)))
     f.nominal[0], f.nominal[1], f.nominal[2], f.nominal[3] = q.w, q.x, q.y, q.z
     for axis in range(2):
         reset_variance(f.covariance, ATTITUDE + axis, 1, tilt_variance(models, best, axis))
-    reset_variance(f.covariance, ATTITUDE + 2, 1, m["yaw_fix"][YAW_VARIANCE])
+    reset_variance(f.covariance, ATTITUDE + 2, 1, m["yaw_fix"]["variance"])
     count_yaw_reset(m, turn_between(before, q))
     m["flags"]["has_yaw"] = 1
     reset_velocity(m, f, row, 0, 2)

@@ -18,7 +18,6 @@
 #include "fs_source_checks.h"
 #include "fs_yaw_sources.h"
 
-#define FS_SOURCE 0
 #define FS_IDLE 0
 #define FS_IMU_RING 4
 #define FS_IMU_ROWS 64
@@ -33,8 +32,6 @@
 #define FS_GNSS_RING 0
 #define FS_GNSS_ROWS 8
 #define FS_EARTH_SOURCE 1
-#define FS_AXIS 1
-#define FS_FUSED_ANY 2
 #define FS_SOURCES 9
 #define FS_REST_SOURCE 2
 #define FS_STILL_FORCE_M_S2 FS_LIT(1.0)
@@ -54,13 +51,13 @@
 
 /*
  * Return True if a measurement may be fused in the step at hand, or the covariance is behind by the most.
- * agenda.py:153
+ * agenda.py:150
  */
 static bool is_covariance_due(const fs_estimator_memory *m, const fs_filter *f, const fs_rings *r,
                               const fs_estimator_params *params)
 {
     const fs_real now_s = f->clock[0];
-    const bool rests = m->flags.landed == 1 && now_s - m->rest_s[0] >= FS_REST_PERIOD_S;
+    const bool rests = m->flags.landed == 1 && now_s - m->rest_s >= FS_REST_PERIOD_S;
     const bool is_asked = rests || m->flags.field_is_new == 1;
     if (f->behind[0] > FS_BEHIND_S || is_asked || params->drag_is_fused > FS_LIT(0.0) ||
         !fs_is_velocity_measured(f)) {
@@ -72,10 +69,11 @@ static bool is_covariance_due(const fs_estimator_memory *m, const fs_filter *f, 
            fs_is_due(r, FS_GNSS_RING, r->gnss[fs_slot_of(r, FS_GNSS_RING, FS_GNSS_ROWS, 0)][0], now_s);
 }
 
-/* Predict a step that is not later than the horizon; return False if there is none. agenda.py:133 */
+/* Predict a step that is not later than the horizon; return False if there is none. agenda.py:130 */
 static bool begin(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, fs_real horizon_s,
                   const fs_estimator_params *params)
 {
+    fs_agenda *agenda = &m->agenda;
     if (r->cursors[FS_IMU_RING][1] == 0) {
         return false;
     }
@@ -92,13 +90,13 @@ static bool begin(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, fs_re
     }
     fs_add_unknown(f, &step);
     fs_add_fault_noise(m->checks, f, step.dt_s);
-    m->agenda[FS_SOURCE] = FS_EARTH_SOURCE;
-    m->agenda[FS_AXIS] = 0;
-    m->agenda[FS_FUSED_ANY] = 0;
+    agenda->source = FS_EARTH_SOURCE;
+    agenda->axis = 0;
+    agenda->has_fused = 0;
     return true;
 }
 
-/* Return True if the vehicle is on the ground and nothing moves it. agenda.py:263 */
+/* Return True if the vehicle is on the ground and nothing moves it. agenda.py:260 */
 static bool stands(const fs_estimator_memory *m, const fs_estimator_params *params)
 {
     if (m->flags.landed == 0) {
@@ -112,17 +110,17 @@ static bool stands(const fs_estimator_memory *m, const fs_estimator_params *para
     return fs_abs(off) < FS_STILL_FORCE_M_S2 && largest < FS_STILL_RATE_RAD_S;
 }
 
-/* Fuse rest ten times a second: three axes of the velocity, three of the rate. agenda.py:275 */
+/* Fuse rest ten times a second: three axes of the velocity, three of the rate. agenda.py:272 */
 static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t stage,
                     const fs_estimator_params *params)
 {
     (void)r;
     int32_t axis = stage;
     if (stage == 0) {
-        if (f->clock[0] - m->rest_s[0] < FS_REST_PERIOD_S || !stands(m, params)) {
+        if (f->clock[0] - m->rest_s < FS_REST_PERIOD_S || !stands(m, params)) {
             return FS_NOTHING;
         }
-        m->rest_s[0] = f->clock[0];
+        m->rest_s = f->clock[0];
         if (!fs_is_platform_at_rest(m, f)) {
             axis = 3;
         }
@@ -139,16 +137,16 @@ static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int
     return axis < 5 ? axis + 1 : 0;
 }
 
-/* Fuse drag in flight while the velocity over ground is measured, twenty times a second. agenda.py:294 */
+/* Fuse drag in flight while the velocity over ground is measured, twenty times a second. agenda.py:291 */
 static int32_t drag(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t axis,
                     const fs_estimator_params *params)
 {
     if (axis == 0) {
-        const bool waits = f->clock[0] - m->drag_s[0] < FS_DRAG_PERIOD_S;
+        const bool waits = f->clock[0] - m->drag_s < FS_DRAG_PERIOD_S;
         if (params->drag_is_fused == FS_LIT(0.0) || m->flags.landed == 1 || waits || !fs_is_velocity_measured(f)) {
             return FS_NOTHING;
         }
-        m->drag_s[0] = f->clock[0];
+        m->drag_s = f->clock[0];
     }
     const fs_delta_sample step = fs_read_step(r->imu[fs_slot_of(r, FS_IMU_RING, FS_IMU_ROWS, 0)]);
     const fs_vector3 scaled = fs_scaled(&step.velocity_m_s, FS_LIT(1.0) / step.dt_s);
@@ -156,7 +154,7 @@ static int32_t drag(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int
     return 1 - axis;
 }
 
-/* Move the oldest row of a ring to row; return False if none is due. agenda.py:253 */
+/* Move the oldest row of a ring to row; return False if none is due. agenda.py:250 */
 static bool next_row(fs_rings *r, int32_t ring, int32_t size, const fs_real oldest[], int32_t oldest_size,
                      fs_real now_s, fs_real row[])
 {
@@ -168,7 +166,7 @@ static bool next_row(fs_rings *r, int32_t ring, int32_t size, const fs_real olde
     return true;
 }
 
-/* Move the oldest row of a source that is due to pending; drop those that are too late. agenda.py:226 */
+/* Move the oldest row of a source that is due to pending; drop those that are too late. agenda.py:223 */
 static bool take_row(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, int32_t source)
 {
     const fs_real now_s = f->clock[0];
@@ -203,7 +201,7 @@ static bool take_row(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, in
     return false;
 }
 
-/* Fuse the next scalar of a sensor whose rows wait. agenda.py:205 */
+/* Fuse the next scalar of a sensor whose rows wait. agenda.py:202 */
 static int32_t measured(fs_estimator_memory *m, fs_filter *f, fs_rings *r, int32_t source, int32_t axis,
                         const fs_estimator_params *params)
 {
@@ -233,11 +231,11 @@ static int32_t measured(fs_estimator_memory *m, fs_filter *f, fs_rings *r, int32
     return following;
 }
 
-/* Fuse the next scalar of the source at hand. agenda.py:188 */
+/* Fuse the next scalar of the source at hand. agenda.py:185 */
 static int32_t part(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_estimator_params *params)
 {
-    const int32_t source = m->agenda[FS_SOURCE];
-    const int32_t axis = m->agenda[FS_AXIS];
+    const int32_t source = m->agenda.source;
+    const int32_t axis = m->agenda.axis;
     if (source == FS_EARTH_SOURCE) {
         return fs_take_earth_field(m, f, axis, params);
     }
@@ -256,62 +254,63 @@ static int32_t part(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_
     return measured(m, f, r, source, axis, params);
 }
 
-/* Move the output by a share of its difference to the filter. agenda.py:181 */
+/* Move the output by a share of its difference to the filter. agenda.py:178 */
 static void move_output(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, fs_real share,
                         const fs_estimator_params *params)
 {
-    m->followed[0] = fs_count_of_resets(m);
+    m->followed = fs_count_of_resets(m);
     const fs_nominal read_nominal = fs_read_nominal(f->nominal);
     const fs_motion motion_of = fs_motion_of(&read_nominal);
     fs_follow(r, m->output, &motion_of, share, params->gravity_m_s2);
 }
 
-/* Move the output as the filter has moved, and close the step. agenda.py:169 */
+/* Move the output as the filter has moved, and close the step. agenda.py:166 */
 static void finish(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, const fs_estimator_params *params)
 {
+    fs_agenda *agenda = &m->agenda;
     const fs_real dt_s = r->imu[fs_slot_of(r, FS_IMU_RING, FS_IMU_ROWS, 0)][1];
-    const bool is_reset = fs_count_of_resets(m) != m->followed[0]; /* between two steps, by the Earth's field */
+    const bool is_reset = fs_count_of_resets(m) != m->followed; /* between two steps, by the Earth's field */
     const fs_real share = is_reset || params->output_s <= dt_s ? FS_LIT(1.0) : dt_s / params->output_s;
-    /* else the output has moved as the filter has */
-    if (is_reset || m->agenda[FS_FUSED_ANY] == 1 || share < FS_LIT(1.0)) {
+    if (is_reset || agenda->has_fused == 1 || share < FS_LIT(1.0)) { /* else the output has moved as the filter has */
         move_output(m, f, r, share, params);
     }
     fs_pop(r, FS_IMU_RING, FS_IMU_ROWS);
-    m->agenda[FS_SOURCE] = FS_IDLE;
+    agenda->source = FS_IDLE;
 }
 
-/* agenda.py:94 */
+/* agenda.py:91 */
 bool fs_work(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_s, const fs_estimator_params *params)
 {
-    if (m->agenda[FS_SOURCE] == FS_IDLE) {
+    fs_agenda *agenda = &m->agenda;
+    if (agenda->source == FS_IDLE) {
         if (!begin(m, f, r, horizon_s, params)) {
             return false;
         }
     }
     for (int32_t count = 0; count < 9; count++) {
-        if (m->agenda[FS_SOURCE] >= FS_SOURCES) {
+        if (agenda->source >= FS_SOURCES) {
             break;
         }
         const int32_t following = part(m, f, r, params);
         if (following != FS_NOTHING) {
-            m->agenda[FS_AXIS] = following;
-            m->agenda[FS_FUSED_ANY] = 1;
-            if (fs_count_of_resets(m) != m->followed[0]) { /* users of the output follow the count at once */
+            agenda->axis = following;
+            agenda->has_fused = 1;
+            if (fs_count_of_resets(m) != m->followed) { /* users of the output follow the count at once */
                 move_output(m, f, r, FS_LIT(1.0), params);
             }
             return true;
         }
-        m->agenda[FS_SOURCE] += 1;
+        agenda->source += 1;
     }
     finish(m, f, r, params);
     return true;
 }
 
-/* agenda.py:118 */
+/* agenda.py:115 */
 void fs_take_field_at_rest(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_estimator_params *params)
 {
     for (int32_t count = 0; count < 256; count++) {
-        if (m->agenda[FS_SOURCE] == FS_IDLE) {
+        if (m->agenda.source == FS_IDLE) {
             break;
         }
         (void)fs_work(m, f, r, f->clock[0], params);

@@ -27,8 +27,6 @@
 #define FS_BARO_ROWS 32
 #define FS_RANGE_RING 3
 #define FS_RANGE_ROWS 32
-#define FS_GAPS 1
-#define FS_GAP_S 0
 #define FS_LONGEST_GAP_S FS_LIT(1.0)
 #define FS_ALIGNMENT_S FS_LIT(0.4)
 #define FS_WAIT_FOR_MAG_S FS_LIT(2.0)
@@ -36,7 +34,7 @@
 #define FS_IMU_ROWS 64
 #define FS_BACKLOG_S FS_LIT(0.03)
 
-/* delayed_filter.py:64 */
+/* delayed_filter.py:62 */
 void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], int32_t row_size)
 {
     for (int32_t i = 0; i < row_size; i++) {
@@ -82,27 +80,27 @@ void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], in
 
 /*
  * Return the time that a sample has to cover: its own, or longer after a gap; zero for one that came too late.
- * delayed_filter.py:180
+ * delayed_filter.py:178
  */
 static fs_real real_step(fs_estimator_memory *m, fs_real time_s, fs_real dt_s)
 {
-    const fs_real last_s = m->last_imu_s[0];
+    const fs_real last_s = m->last_imu_s;
     if (dt_s <= FS_LIT(0.0) || (last_s > FS_LIT(0.0) && time_s <= last_s)) {
         return FS_LIT(0.0);
     }
-    m->last_imu_s[0] = time_s;
+    m->last_imu_s = time_s;
     const fs_real elapsed_s = time_s - last_s;
     if (last_s == FS_LIT(0.0) || elapsed_s < FS_LIT(1.5) * dt_s) {
         return dt_s;
     }
-    m->imu_gap[FS_GAPS] += FS_LIT(1.0);
-    m->imu_gap[FS_GAP_S] += elapsed_s - dt_s;
+    m->gaps.number += FS_LIT(1.0);
+    m->gaps.total_s += elapsed_s - dt_s;
     const fs_real covered_s = fs_min(elapsed_s, FS_LONGEST_GAP_S);
     fs_note_gap(m->sums, covered_s - dt_s);
     return covered_s;
 }
 
-/* Add a sample to the alignment; align when it is long enough. delayed_filter.py:197 */
+/* Add a sample to the alignment; align when it is long enough. delayed_filter.py:195 */
 static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real time_s, fs_real dt_s,
                     const fs_estimator_params *params)
 {
@@ -137,7 +135,7 @@ static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real tim
 
 /*
  * Return True if the filter is so far behind the horizon that a sample does more than a part of its work.
- * delayed_filter.py:150
+ * delayed_filter.py:148
  */
 static bool is_behind(const fs_rings *r, fs_real horizon_s)
 {
@@ -145,7 +143,7 @@ static bool is_behind(const fs_rings *r, fs_real horizon_s)
     return r->cursors[FS_IMU_RING][1] > 0 && oldest_s < horizon_s - FS_BACKLOG_S;
 }
 
-/* Do a part of the filter's work, and all of it while it is behind horizon_s. delayed_filter.py:99 */
+/* Do a part of the filter's work, and all of it while it is behind horizon_s. delayed_filter.py:97 */
 static void work_up_to(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_s,
                        const fs_estimator_params *params)
 {
@@ -157,7 +155,7 @@ static void work_up_to(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_rea
     }
 }
 
-/* Write the output in the order of VehicleState. delayed_filter.py:157 */
+/* Write the output in the order of VehicleState. delayed_filter.py:155 */
 static void write_state(fs_estimator_memory *m, const fs_vector3 *rates)
 {
     for (int32_t i = 0; i < 3; i++) {
@@ -172,7 +170,7 @@ static void write_state(fs_estimator_memory *m, const fs_vector3 *rates)
     fs_write_vector(m->state, 10, rates);
 }
 
-/* delayed_filter.py:108 */
+/* delayed_filter.py:106 */
 void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
 {
     for (int32_t i = 0; i < 8; i++) {
@@ -226,7 +224,7 @@ void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
     write_state(m, &less_bias);
 }
 
-/* delayed_filter.py:168 */
+/* delayed_filter.py:166 */
 void fs_field_kernel(fs_estimator_memory *memory)
 {
     fs_estimator_memory *m = memory;

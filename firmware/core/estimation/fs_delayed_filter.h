@@ -18,7 +18,7 @@
  * A measurement that is not finite is dropped; only the accuracies of GNSS, behind its velocity, may be missing. row
  * may change.
  *
- * delayed_filter.py:64
+ * delayed_filter.py:62
  */
 void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], int32_t row_size);
 
@@ -28,13 +28,13 @@ void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], in
  * A sample that is not finite, or without a step in time, or not later than the last one, is dropped. Time without
  * samples is bridged by the next sample.
  *
- * delayed_filter.py:108
+ * delayed_filter.py:106
  */
 void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[]);
 
 /*
  * Correct the filter with the Earth's field in earth: on the ground at once, in flight in its next step.
- * delayed_filter.py:168
+ * delayed_filter.py:166
  */
 void fs_field_kernel(fs_estimator_memory *memory);
 

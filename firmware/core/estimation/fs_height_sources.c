@@ -74,10 +74,10 @@ void fs_take_range(fs_estimator_memory *m, fs_filter *f, const fs_real row[], co
     }
     const fs_real age_s = f->clock[0] - row[0];
     if (m->flags.has_range == 0) {
-        m->ground_m[0] = f->nominal[9] - age_s * f->nominal[6] + row[1] * cos_tilt;
+        m->ground_m = f->nominal[9] - age_s * f->nominal[6] + row[1] * cos_tilt;
         m->flags.has_range = 1;
     }
-    fs_fuse_range(f, row[1] * cos_tilt, m->ground_m[0], age_s, params);
+    fs_fuse_range(f, row[1] * cos_tilt, m->ground_m, age_s, params);
 }
 
 /* height_sources.py:75 */

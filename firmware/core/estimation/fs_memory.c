@@ -8,7 +8,7 @@
 #include "fs_law_math.h"
 #include "fs_math.h"
 
-/* memory.py:112 */
+/* memory.py:150 */
 void fs_start_memory(fs_estimator_memory *memory)
 {
     fs_estimator_memory *m = memory;

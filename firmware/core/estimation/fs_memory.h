@@ -11,6 +11,18 @@
 #include "fs_rings.h"
 #include "fs_types.h"
 
+/* Time without samples of the IMU in all, and the number of such gaps. */
+typedef struct {
+    fs_real total_s;
+    fs_real number;
+} fs_gaps;
+
+/* Horizontal position that is held. */
+typedef struct {
+    fs_real place_m[2];
+    fs_real fused_s;
+} fs_hold;
+
 /* What the estimator knows, 1 if it is true. */
 typedef struct {
     int32_t aligned;
@@ -24,23 +36,46 @@ typedef struct {
     int32_t field_is_new;
 } fs_flags;
 
+/* Comparison of the filter's yaw with that of GNSS velocity. */
+typedef struct {
+    fs_real turn_rad;
+    fs_real variance;
+    fs_real updates;
+    fs_real wrong_s;
+} fs_yaw_fix;
+
+/* The open step. */
+typedef struct {
+    int32_t source;
+    int32_t axis;
+    int32_t has_fused;
+} fs_agenda;
+
+/* The state before the measurement of GNSS that is being fused. */
+typedef struct {
+    fs_real elapsed_s;
+    fs_real outage_s;
+    fs_real place_m[2];
+    fs_real velocity_m_s[2];
+} fs_before_gnss;
+
 /* Parameters, state and waiting measurements of an estimator. */
 typedef struct {
     fs_real output[11];
     fs_real state[13];
-    fs_real last_imu_s[1];
-    fs_real imu_gap[2];
-    fs_real last_gnss_s[1];
+    fs_real last_imu_s;
+    fs_gaps gaps;
+    fs_real last_gnss_s;
     fs_real gnss_speed_m_s[2];
     fs_real refused_s[6];
-    fs_real ground_m[1];
-    fs_real hold[3];
-    fs_real rest_s[1];
-    fs_real drag_s[1];
+    fs_real ground_m;
+    fs_hold hold;
+    fs_real rest_s;
+    fs_real drag_s;
     fs_flags flags;
-    fs_real yaw_fix[4];
-    fs_real followed[1];
-    int32_t agenda[3];
+    fs_yaw_fix yaw_fix;
+    fs_real followed;
+    fs_agenda agenda;
     fs_real pending[10];
     fs_filter filter;
     fs_estimator_params params;
@@ -52,12 +87,12 @@ typedef struct {
     fs_real rate_filter[9];
     fs_real earth[4];
     fs_real field[3];
-    fs_real before_gnss[6];
+    fs_before_gnss before_gnss;
     fs_real yaw_models[5][32];
     fs_rings rings;
 } fs_estimator_memory;
 
-/* Set what is not zero at the start in a memory of zeros that has its parameters. memory.py:112 */
+/* Set what is not zero at the start in a memory of zeros that has its parameters. memory.py:150 */
 void fs_start_memory(fs_estimator_memory *memory);
 
 #endif

@@ -21,52 +21,50 @@
 #define FS_HOLD_PERIOD_S FS_LIT(0.2)
 #define FS_POSITION 6
 #define FS_GNSS_BIAS 24
-#define FS_ELAPSED_S 0
 #define FS_GNSS_POSITION 3
-#define FS_OUTAGE_S 1
-#define FS_BEFORE 2
 #define FS_GNSS_FAULT 17
 #define FS_YAW_STAGE 6
 #define FS_COUNTED_M FS_LIT(0.5)
 #define FS_LONGEST_INTERVAL_S FS_LIT(2.5)
 #define FS_SPEED_SMOOTHING_S FS_LIT(2.0)
 
-/* position_sources.py:161 */
+/* position_sources.py:160 */
 bool fs_is_velocity_measured(const fs_filter *f)
 {
     const fs_real fused_s = f->observations[FS_GNSS_VELOCITY][FS_FUSED_S];
     return fused_s > FS_LIT(0.0) && f->clock[0] - fused_s < FS_GNSS_LOST_S;
 }
 
-/* position_sources.py:168 */
+/* position_sources.py:167 */
 bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f)
 {
     const fs_real north = m->gnss_speed_m_s[0];
     const fs_real east = m->gnss_speed_m_s[1];
-    const bool is_measured = m->flags.has_gnss == 1 && f->clock[0] - m->last_gnss_s[0] < FS_GNSS_LOST_S;
+    const bool is_measured = m->flags.has_gnss == 1 && f->clock[0] - m->last_gnss_s < FS_GNSS_LOST_S;
     return !is_measured || fs_sqrt(north * north + east * east) < FS_MOVES_M_S;
 }
 
-/* position_sources.py:176 */
+/* position_sources.py:175 */
 int32_t fs_hold_position(fs_estimator_memory *m, fs_filter *f, int32_t axis, const fs_estimator_params *params)
 {
+    fs_hold *hold = &m->hold;
     const fs_real now_s = f->clock[0];
     if (axis == 0) {
         const bool is_used = m->flags.has_gnss == 1 && m->flags.has_yaw == 1;
         if (fs_is_velocity_measured(f) || (is_used && fs_deviation(f, FS_VELOCITY, 2) < params->hold_velocity_m_s)) {
-            m->hold[2] = FS_LIT(0.0);
+            hold->fused_s = FS_LIT(0.0);
             return FS_NOTHING;
         }
-        if (m->hold[2] == FS_LIT(0.0)) {
-            m->hold[0] = f->nominal[7];
-            m->hold[1] = f->nominal[8];
+        if (hold->fused_s == FS_LIT(0.0)) {
+            hold->place_m[0] = f->nominal[7];
+            hold->place_m[1] = f->nominal[8];
         }
-        if (now_s - m->hold[2] < FS_HOLD_PERIOD_S) {
+        if (now_s - hold->fused_s < FS_HOLD_PERIOD_S) {
             return FS_NOTHING;
         }
-        m->hold[2] = now_s;
+        hold->fused_s = now_s;
     }
-    fs_fuse_hold(f, axis, m->hold[axis], params);
+    fs_fuse_hold(f, axis, hold->place_m[axis], params);
     return 1 - axis;
 }
 
@@ -75,7 +73,7 @@ int32_t fs_hold_position(fs_estimator_memory *m, fs_filter *f, int32_t axis, con
  *
  * The slow part of that error is the bias of the next ones too: position and bias have opposite errors.
  *
- * position_sources.py:136
+ * position_sources.py:135
  */
 static void start_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params)
 {
@@ -94,35 +92,36 @@ static void start_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[]
             f->covariance[at][FS_GNSS_BIAS + axis] = -slow;
         }
     }
-    m->last_gnss_s[0] = row[0];
+    m->last_gnss_s = row[0];
     m->flags.has_gnss = 1;
 }
 
 /*
- * Propagate what belongs to GNSS to the time of the measurement, and note the state before it. position_sources.py:78
+ * Propagate what belongs to GNSS to the time of the measurement, and note the state before it. position_sources.py:76
  */
 static void begin_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params)
 {
     if (m->flags.has_gnss == 0) {
         start_gnss(m, f, row, params);
     }
-    m->before_gnss[FS_ELAPSED_S] = fs_max(FS_LIT(0.0), row[0] - m->last_gnss_s[0]);
-    m->before_gnss[FS_OUTAGE_S] = f->clock[0] - f->observations[FS_GNSS_POSITION][FS_FUSED_S];
+    fs_before_gnss *before = &m->before_gnss;
+    before->elapsed_s = fs_max(FS_LIT(0.0), row[0] - m->last_gnss_s);
+    before->outage_s = f->clock[0] - f->observations[FS_GNSS_POSITION][FS_FUSED_S];
     for (int32_t axis = 0; axis < 2; axis++) {
         const fs_real value = f->nominal[7 + axis];
         const fs_real value_2 = f->nominal[4 + axis];
-        m->before_gnss[FS_BEFORE + axis] = value;
-        m->before_gnss[FS_BEFORE + 2 + axis] = value_2;
+        before->place_m[axis] = value;
+        before->velocity_m_s[axis] = value_2;
     }
-    m->last_gnss_s[0] = row[0];
+    m->last_gnss_s = row[0];
     fs_follow_height_drift(m->checks, row, m->flags.landed == 0, fs_speed_accuracy(row));
     fs_follow_drift(m->checks, f, row, fs_horizontal_accuracy(row));
-    fs_drift_gnss_bias(f, row, m->before_gnss[FS_ELAPSED_S], params);
+    fs_drift_gnss_bias(f, row, before->elapsed_s, params);
 }
 
 /*
  * Add up the time between refused measurements; an accepted one ends it. Time without any does not count.
- * position_sources.py:122
+ * position_sources.py:121
  */
 static void count_refused(fs_estimator_memory *m, const fs_filter *f, int32_t first, fs_real elapsed_s)
 {
@@ -140,22 +139,23 @@ static void count_refused(fs_estimator_memory *m, const fs_filter *f, int32_t fi
     }
 }
 
-/* Judge the measurement by its innovations, and reset what was refused too long. position_sources.py:94 */
+/* Judge the measurement by its innovations, and reset what was refused too long. position_sources.py:92 */
 static void end_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t first,
                      const fs_estimator_params *params)
 {
-    const fs_real elapsed_s = m->before_gnss[FS_ELAPSED_S];
+    fs_before_gnss *before = &m->before_gnss;
+    const fs_real elapsed_s = before->elapsed_s;
     if (m->flags.landed == 0) {
         fs_take_gnss_innovations(m->checks, f, elapsed_s, m->flags.has_baro == 1);
         if (first == 0) {
             fs_take_horizontal_innovations(m->checks, f, elapsed_s);
         }
     }
-    const fs_real dx = f->nominal[7] - m->before_gnss[FS_BEFORE];
-    const fs_real dy = f->nominal[8] - m->before_gnss[FS_BEFORE + 1];
-    if (m->before_gnss[FS_OUTAGE_S] > FS_GNSS_LOST_S && dx * dx + dy * dy > FS_COUNTED_M * FS_COUNTED_M) {
-        fs_count_correction(m, f, dx, dy, f->nominal[4] - m->before_gnss[FS_BEFORE + 2],
-                            f->nominal[5] - m->before_gnss[FS_BEFORE + 3]);
+    const fs_real dx = f->nominal[7] - before->place_m[0];
+    const fs_real dy = f->nominal[8] - before->place_m[1];
+    if (before->outage_s > FS_GNSS_LOST_S && dx * dx + dy * dy > FS_COUNTED_M * FS_COUNTED_M) {
+        fs_count_correction(m, f, dx, dy, f->nominal[4] - before->velocity_m_s[0],
+                            f->nominal[5] - before->velocity_m_s[1]);
     }
     count_refused(m, f, first, fs_min(elapsed_s, FS_LONGEST_INTERVAL_S));
     const fs_real share = fs_min(elapsed_s / FS_SPEED_SMOOTHING_S, FS_LIT(1.0));
@@ -179,7 +179,7 @@ static void end_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], 
     }
 }
 
-/* position_sources.py:56 */
+/* position_sources.py:54 */
 int32_t fs_take_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t stage,
                      const fs_estimator_params *params)
 {

@@ -17,7 +17,6 @@
 #include "fs_resets.h"
 #include "fs_yaw_estimator.h"
 
-#define FS_YAW_UPDATES 2
 #define FS_NOTHING -1
 #define FS_LARGEST_TURN_RAD FS_LIT(0.5)
 #define FS_FIELD_STAGE 4
@@ -26,19 +25,16 @@
 #define FS_DECLINATION 22
 #define FS_KNOWN_FIELD 19
 #define FS_COUNTED_TURN_RAD FS_LIT(0.01)
-#define FS_YAW_TURN 0
-#define FS_YAW_VARIANCE 1
 #define FS_CONVERGED_RAD FS_LIT(0.262)
-#define FS_YAW_WRONG_S 3
 #define FS_ATTITUDE 0
 #define FS_WRONG_YAW_RAD FS_LIT(0.436)
 #define FS_CERTAIN_SQUARE FS_LIT(16.0)
 #define FS_REFUSED_S FS_LIT(1.0)
 
-/* yaw_sources.py:171 */
+/* yaw_sources.py:167 */
 void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_sample *step)
 {
-    if (m->yaw_fix[FS_YAW_UPDATES] > FS_LIT(0.0)) {
+    if (m->yaw_fix.updates > FS_LIT(0.0)) {
         const fs_vector3 read_vector = fs_read_vector(f->nominal, 10);
         const fs_vector3 angle = fs_less_bias(&step->angle_rad, &read_vector, step->dt_s);
         const fs_vector3 read_vector_2 = fs_read_vector(f->nominal, 13);
@@ -49,7 +45,7 @@ void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_s
 
 /*
  * Turn the Earth's field by a change of the declination; the yaw follows as far as it depends on it.
- * yaw_sources.py:153
+ * yaw_sources.py:149
  */
 static void fuse_declination(fs_filter *f, fs_real was_rad, fs_real change_rad)
 {
@@ -77,7 +73,7 @@ static void fuse_declination(fs_filter *f, fs_real was_rad, fs_real change_rad)
     f->nominal[17] = along * sine + across * cosine;
 }
 
-/* Align the yaw again, or fuse the declination; return the next stage. yaw_sources.py:125 */
+/* Align the yaw again, or fuse the declination; return the next stage. yaw_sources.py:121 */
 static int32_t begin_earth_field(fs_estimator_memory *m, fs_filter *f, const fs_estimator_params *params)
 {
     const fs_vector3 known = fs_read_vector(m->earth, 0);
@@ -99,7 +95,7 @@ static int32_t begin_earth_field(fs_estimator_memory *m, fs_filter *f, const fs_
     return 1;
 }
 
-/* Fuse a component of the Earth's field. yaw_sources.py:114 */
+/* Fuse a component of the Earth's field. yaw_sources.py:110 */
 static void fuse_known_field(const fs_estimator_memory *m, fs_filter *f, int32_t axis,
                              const fs_estimator_params *params)
 {
@@ -113,7 +109,7 @@ static void fuse_known_field(const fs_estimator_memory *m, fs_filter *f, int32_t
 
 /*
  * Count the turn since the attitude in pending as a reset of the yaw; the field is not new any more.
- * yaw_sources.py:141
+ * yaw_sources.py:137
  */
 static void count_turn(fs_estimator_memory *m, const fs_filter *f)
 {
@@ -131,7 +127,7 @@ static void count_turn(fs_estimator_memory *m, const fs_filter *f)
     }
 }
 
-/* yaw_sources.py:89 */
+/* yaw_sources.py:85 */
 int32_t fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, int32_t stage, const fs_estimator_params *params)
 {
     fs_flags *flags = &m->flags;
@@ -158,7 +154,7 @@ int32_t fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, int32_t stage,
     return stage + 1;
 }
 
-/* Note the field; set the states of the field, and an unknown yaw, by the first one. yaw_sources.py:73 */
+/* Note the field; set the states of the field, and an unknown yaw, by the first one. yaw_sources.py:69 */
 static void start_field(fs_estimator_memory *m, fs_filter *f, const fs_vector3 *field,
                         const fs_estimator_params *params)
 {
@@ -181,7 +177,7 @@ static void start_field(fs_estimator_memory *m, fs_filter *f, const fs_vector3 *
     }
 }
 
-/* yaw_sources.py:58 */
+/* yaw_sources.py:54 */
 int32_t fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t axis,
                       const fs_estimator_params *params)
 {
@@ -196,10 +192,10 @@ int32_t fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[],
     return axis < 2 ? axis + 1 : 0;
 }
 
-/* Take tilt and yaw from the models, velocity and position from GNSS. yaw_sources.py:218 */
+/* Take tilt and yaw from the models, velocity and position from GNSS. yaw_sources.py:214 */
 static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 {
-    m->yaw_fix[FS_YAW_WRONG_S] = FS_LIT(0.0);
+    m->yaw_fix.wrong_s = FS_LIT(0.0);
     const fs_nominal read_nominal = fs_read_nominal(f->nominal);
     const fs_quaternion before = read_nominal.attitude;
     const int32_t best = fs_likeliest((const fs_real(*)[32])m->yaw_models);
@@ -207,7 +203,7 @@ static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real 
     const fs_vector3 world_rotation = {
         .x = FS_LIT(0.0),
         .y = FS_LIT(0.0),
-        .z = m->yaw_fix[FS_YAW_TURN] - fs_turn_between(&before, &q),
+        .z = m->yaw_fix.turn_rad - fs_turn_between(&before, &q),
     };
     q = fs_turned(&q, &world_rotation);
     f->nominal[0] = q.w;
@@ -218,7 +214,7 @@ static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real 
         fs_reset_variance(f->covariance, FS_ATTITUDE + axis, 1,
                           fs_tilt_variance((const fs_real(*)[32])m->yaw_models, best, axis));
     }
-    fs_reset_variance(f->covariance, FS_ATTITUDE + 2, 1, m->yaw_fix[FS_YAW_VARIANCE]);
+    fs_reset_variance(f->covariance, FS_ATTITUDE + 2, 1, m->yaw_fix.variance);
     fs_count_yaw_reset(m, fs_turn_between(&before, &q));
     m->flags.has_yaw = 1;
     fs_reset_velocity(m, f, row, 0, 2);
@@ -227,45 +223,45 @@ static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real 
 
 /*
  * Return True if the models have contradicted the yaw for a second, or do while GNSS velocities are refused.
- * yaw_sources.py:204
+ * yaw_sources.py:200
  */
 static bool is_wrong(fs_estimator_memory *m, fs_real time_s)
 {
-    const bool differs = fs_abs(m->yaw_fix[FS_YAW_TURN]) > FS_WRONG_YAW_RAD;
-    if (!(differs && m->yaw_fix[FS_YAW_TURN] * m->yaw_fix[FS_YAW_TURN] > FS_CERTAIN_SQUARE *
-          m->yaw_fix[FS_YAW_VARIANCE])) {
-        m->yaw_fix[FS_YAW_WRONG_S] = FS_LIT(0.0);
+    fs_yaw_fix *fix = &m->yaw_fix;
+    const bool differs = fs_abs(fix->turn_rad) > FS_WRONG_YAW_RAD;
+    if (!(differs && fix->turn_rad * fix->turn_rad > FS_CERTAIN_SQUARE * fix->variance)) {
+        fix->wrong_s = FS_LIT(0.0);
     } else {
-        if (m->yaw_fix[FS_YAW_WRONG_S] == FS_LIT(0.0)) {
-            m->yaw_fix[FS_YAW_WRONG_S] = time_s;
+        if (fix->wrong_s == FS_LIT(0.0)) {
+            fix->wrong_s = time_s;
         }
     }
-    const bool lasts = m->yaw_fix[FS_YAW_WRONG_S] > FS_LIT(0.0) && time_s - m->yaw_fix[FS_YAW_WRONG_S] > FS_REFUSED_S;
+    const bool lasts = fix->wrong_s > FS_LIT(0.0) && time_s - fix->wrong_s > FS_REFUSED_S;
     const bool is_refused = fs_max(m->refused_s[0], m->refused_s[1]) > FS_REFUSED_S;
     return lasts || (differs && is_refused);
 }
 
-/* yaw_sources.py:180 */
+/* yaw_sources.py:176 */
 void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 {
+    fs_yaw_fix *fix = &m->yaw_fix;
     fs_flags *flags = &m->flags;
     if (flags->landed == 1 || flags->has_gnss == 0) {
-        m->yaw_fix[FS_YAW_UPDATES] = FS_LIT(0.0);
+        fix->updates = FS_LIT(0.0);
         return;
     }
     const fs_nominal read_nominal = fs_read_nominal(f->nominal);
     const fs_quaternion attitude = read_nominal.attitude;
     const fs_real noise_m_s = fs_max(fs_speed_accuracy(row), FS_LIT(0.1));
-    if (m->yaw_fix[FS_YAW_UPDATES] == FS_LIT(0.0)) {
+    if (fix->updates == FS_LIT(0.0)) {
         fs_start_models(m->yaw_models, &attitude, row[4], row[5], noise_m_s * noise_m_s);
     } else {
         fs_update_models(m->yaw_models, row[4], row[5], noise_m_s * noise_m_s);
     }
-    m->yaw_fix[FS_YAW_UPDATES] += FS_LIT(1.0);
-    m->yaw_fix[FS_YAW_TURN] = fs_mean_turn((const fs_real(*)[32])m->yaw_models, &attitude);
-    m->yaw_fix[FS_YAW_VARIANCE] = fs_variance_of((const fs_real(*)[32])m->yaw_models, &attitude,
-                                                 m->yaw_fix[FS_YAW_TURN]);
-    if (m->yaw_fix[FS_YAW_VARIANCE] > FS_CONVERGED_RAD * FS_CONVERGED_RAD) {
+    fix->updates += FS_LIT(1.0);
+    fix->turn_rad = fs_mean_turn((const fs_real(*)[32])m->yaw_models, &attitude);
+    fix->variance = fs_variance_of((const fs_real(*)[32])m->yaw_models, &attitude, fix->turn_rad);
+    if (fix->variance > FS_CONVERGED_RAD * FS_CONVERGED_RAD) {
         return;
     }
     if (flags->has_yaw == 0) {
