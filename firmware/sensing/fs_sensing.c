@@ -5,7 +5,6 @@
 
 #define ROW 10U
 #define STATE 13U
-#define RESETS 19U
 #define EARTH 4U
 #define KNOWN 4U      /* place of the flag behind the Earth's field */
 #define VALUES_AT 2U  /* of parameters, behind the first index and their number */
@@ -22,6 +21,11 @@ typedef union {
     fs_flags fields;
     int32_t values[sizeof(fs_flags) / sizeof(int32_t)];
 } flags_view;
+
+typedef union {
+    fs_resets fields;
+    fs_real values[sizeof(fs_resets) / sizeof(fs_real)];
+} resets_view;
 
 /* The members of the memory are floats and integers of 32 bits, so that it can be read and cleared as words. */
 typedef union {
@@ -84,13 +88,15 @@ static void set_earth(const fs_pil_sense *event)
 
 static void tell(fs_pil_estimate *estimate)
 {
+    resets_view resets;
     uint16_t i;
 
     for (i = 0U; i < STATE; i++) {
         estimate->state[i] = (float)memory->state[i];
     }
-    for (i = 0U; i < RESETS; i++) {
-        estimate->resets[i] = (float)memory->resets[i];
+    resets.fields = memory->resets;
+    for (i = 0U; i < (uint16_t)(sizeof resets.values / sizeof resets.values[0]); i++) {
+        estimate->resets[i] = (float)resets.values[i];
     }
 }
 

@@ -28,13 +28,7 @@ from flightstack.estimation.kalman import (
     REST_VELOCITY,
     TEST_RATIO,
 )
-from flightstack.estimation.memory import (
-    POSITION_RESET,
-    RESET_CHANGE,
-    VELOCITY_RESET,
-    YAW_RESET,
-    Flags,
-)
+from flightstack.estimation.memory import Flags
 from flightstack.mavlink.dialect import mavlink
 
 AIDED_S = 1.0
@@ -205,7 +199,7 @@ def estimator_report(memory: Record, time_s: float, imu_has_failed: bool) -> Est
         range=range_finder,
         horizontal_accuracy_m=_root(variances[POSITION] + variances[POSITION + 1]),
         vertical_accuracy_m=_root(variances[POSITION + 2]),
-        resets=_resets(memory["resets"].tolist()),
+        resets=_resets(memory["resets"]),
     )
 
 
@@ -226,14 +220,12 @@ def nominal_of(memory: Record) -> Nominal:
     )  # fmt: skip
 
 
-def _resets(x: Sequence[float]) -> Resets:
-    position, velocity = (
-        Vector3(*x[kind + RESET_CHANGE : kind + RESET_CHANGE + 3])
-        for kind in (POSITION_RESET, VELOCITY_RESET)
-    )
+def _resets(found: Record) -> Resets:
+    position, velocity, yaw = found["position"], found["velocity"], found["yaw"]
     return Resets(
-        int(x[POSITION_RESET]), position, int(x[VELOCITY_RESET]), velocity,
-        int(x[YAW_RESET]), x[YAW_RESET + RESET_CHANGE],
+        int(position["number"]), Vector3(*position["change"].tolist()),
+        int(velocity["number"]), Vector3(*velocity["change"].tolist()),
+        int(yaw["number"]), float(yaw["change_rad"]),
     )  # fmt: skip
 
 

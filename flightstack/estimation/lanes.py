@@ -13,14 +13,6 @@ from flightstack.estimation.error_state import turn_between
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.health import EstimateHealth, HealthMonitor
 from flightstack.estimation.imu_track import IMU_MISSING_S
-from flightstack.estimation.memory import (
-    POSITION_RESET,
-    RESET_CHANGE,
-    RESET_SUM,
-    VELOCITY_RESET,
-    YAW_RESET,
-    YAW_RESET_SUM,
-)
 from flightstack.estimation.resets import count_of_resets
 from flightstack.estimation.selector import (
     LaneFacts,
@@ -203,14 +195,23 @@ def _offset(new: FloatArray, old: FloatArray) -> StateOffset:
 
 def _count_change(old: RecordArray, new: RecordArray, offset: StateOffset) -> None:
     """Let the record of one estimator continue the counts of resets of another."""
-    x: FloatArray = new["resets"][0]
-    x[:] = old["resets"][0]
-    changes = ((POSITION_RESET, offset.position_m), (VELOCITY_RESET, offset.velocity_m_s))
-    for kind, moved in changes:
-        x[kind] += 1.0
-        x[kind + RESET_CHANGE : kind + RESET_CHANGE + 3] = moved
-        x[kind + RESET_SUM : kind + RESET_SUM + 3] += np.array(moved)
-    x[YAW_RESET] += 1.0
-    x[YAW_RESET + RESET_CHANGE] = offset.yaw_rad
-    x[YAW_RESET_SUM] += offset.yaw_rad
+    resets = new["resets"][0]
+    new["resets"] = old["resets"]
+    for kind, moved in (("position", offset.position_m), ("velocity", offset.velocity_m_s)):
+        reset = resets[kind]
+        reset["number"] += 1.0
+        reset["change"] = moved
+        reset["sum"] += np.array(moved)
+    yaw = resets["yaw"]
+    yaw["number"] += 1.0
+    yaw["change_rad"] = offset.yaw_rad
+    yaw["sum_rad"] += offset.yaw_rad
     new["followed"][0] = count_of_resets(new[0])
+
+
+def sum_of_resets(memory: RecordArray) -> StateOffset:
+    """Return the sum of all changes by resets of an estimator."""
+    position, velocity, yaw = memory["resets"][0]
+    return StateOffset(
+        Vector3(*position["sum"].tolist()), Vector3(*velocity["sum"].tolist()), float(yaw["sum_rad"])
+    )

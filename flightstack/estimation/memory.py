@@ -1,4 +1,4 @@
-"""The memory of one estimator: a record of arrays, the meaning of its flags and of its counters of resets."""
+"""The memory of one estimator: a record."""
 
 from __future__ import annotations
 
@@ -20,10 +20,6 @@ from flightstack.estimation.yaw_estimator import Models
 
 NOTHING = -1
 """Returned by a source without a measurement that is due; else it returns its next axis, 0 after the last one."""
-POSITION_RESET, VELOCITY_RESET, YAW_RESET, RESETS = 0, 8, 16, 19
-RESET_CHANGE, RESET_SUM, RESET_S, YAW_RESET_SUM = 1, 4, 7, 18
-"""Of each kind: the number of its resets, their change in the last step with one, the sum of all changes, and the time
-of that step; yaw has no time."""
 
 
 class Flags(NamedTuple):
@@ -93,6 +89,34 @@ class BeforeGnss(NamedTuple):
     velocity_m_s: Annotated[FloatArray, 2]
 
 
+class Reset(NamedTuple):
+    """Resets of position or velocity, NED."""
+
+    number: float
+    change: Annotated[FloatArray, 3]
+    """In the last step with one."""
+    sum: Annotated[FloatArray, 3]
+    """Of all changes."""
+    time_s: float
+    """Of the last step with one."""
+
+
+class YawReset(NamedTuple):
+    """Resets of the yaw: their number, the last change, and the sum of all."""
+
+    number: float
+    change_rad: float
+    sum_rad: float
+
+
+class Resets(NamedTuple):
+    """Resets of each kind."""
+
+    position: Annotated[Record, Reset]
+    velocity: Annotated[Record, Reset]
+    yaw: Annotated[Record, YawReset]
+
+
 class EstimatorMemory(NamedTuple):
     """Parameters, state and waiting measurements of an estimator.
 
@@ -128,7 +152,7 @@ class EstimatorMemory(NamedTuple):
     means: Annotated[FloatArray, RINGS, MEAN_SIZE]
     checks: Checks
     alignment: Alignment
-    resets: Annotated[FloatArray, RESETS]
+    resets: Annotated[Record, Resets]
     rate_filter: RateFilter
     earth: Annotated[FloatArray, 4]
     """Field NED [gauss], declination [rad], NaN if unknown."""
@@ -142,6 +166,7 @@ class EstimatorMemory(NamedTuple):
 MEMORY = dtype_of(EstimatorMemory)
 MemoryRecord: TypeAlias = Annotated[Record, EstimatorMemory]
 """One record of ``MEMORY``."""
+ResetRecord: TypeAlias = Annotated[Record, Reset]
 MemoryArray: TypeAlias = Annotated[RecordArray, EstimatorMemory]
 """An array of one such record, shape (1,)."""
 

@@ -7,16 +7,7 @@ from flightstack.core.contract import FloatArray
 from flightstack.estimation.error_state import GNSS_BIAS, POSITION, VELOCITY
 from flightstack.estimation.fusion import horizontal_accuracy, speed_accuracy, vertical_accuracy
 from flightstack.estimation.kalman import Filter, reset_variance
-from flightstack.estimation.memory import (
-    POSITION_RESET,
-    RESET_CHANGE,
-    RESET_S,
-    RESET_SUM,
-    VELOCITY_RESET,
-    YAW_RESET,
-    YAW_RESET_SUM,
-    MemoryRecord,
-)
+from flightstack.estimation.memory import MemoryRecord, ResetRecord
 
 _LEAST_POSITION_M, _LEAST_SPEED_M_S = 0.5, 0.3
 
@@ -25,9 +16,10 @@ _LEAST_POSITION_M, _LEAST_SPEED_M_S = 0.5, 0.3
 def reset_velocity(m: MemoryRecord, f: Filter, row: FloatArray, first: int, count: int) -> None:
     """Set ``count`` axes of the velocity from ``first`` to a GNSS measurement."""
     speed_m_s = max(speed_accuracy(row), _LEAST_SPEED_M_S)
-    _count(m, f, VELOCITY_RESET)
+    reset = m["resets"]["velocity"]
+    _count(reset, f.clock[0])
     for axis in range(first, first + count):
-        _add_change(m, VELOCITY_RESET, axis, row[4 + axis] - f.nominal[4 + axis])
+        _add_change(reset, axis, row[4 + axis] - f.nominal[4 + axis])
         f.nominal[4 + axis], m["refused_s"][axis] = row[4 + axis], 0.0
     reset_variance(f.covariance, VELOCITY + first, count, speed_m_s * speed_m_s)
 
@@ -38,10 +30,11 @@ def reset_position(m: MemoryRecord, f: Filter, row: FloatArray, first: int, coun
     accuracy_m = vertical_accuracy(row) if first == 2 else horizontal_accuracy(row)
     accuracy_m = max(accuracy_m, _LEAST_POSITION_M)
     age_s = f.clock[0] - row[0]
-    _count(m, f, POSITION_RESET)
+    reset = m["resets"]["position"]
+    _count(reset, f.clock[0])
     for axis in range(first, first + count):
         now_m = row[1 + axis] + age_s * f.nominal[4 + axis]
-        _add_change(m, POSITION_RESET, axis, now_m - f.nominal[7 + axis])
+        _add_change(reset, axis, now_m - f.nominal[7 + axis])
         f.nominal[7 + axis], f.nominal[25 + axis], m["refused_s"][3 + axis] = now_m, 0.0, 0.0
     reset_variance(f.covariance, POSITION + first, count, accuracy_m * accuracy_m)
     reset_variance(f.covariance, GNSS_BIAS + first, count, 1e-4)
@@ -52,41 +45,43 @@ def count_correction(
     m: MemoryRecord, f: Filter, north_m: float, east_m: float, north_m_s: float, east_m_s: float
 ) -> None:
     """Count a horizontal change of position and velocity as resets of both."""
-    _count(m, f, POSITION_RESET)
-    _count(m, f, VELOCITY_RESET)
-    _add_change(m, POSITION_RESET, 0, north_m)
-    _add_change(m, POSITION_RESET, 1, east_m)
-    _add_change(m, VELOCITY_RESET, 0, north_m_s)
-    _add_change(m, VELOCITY_RESET, 1, east_m_s)
+    position, velocity = m["resets"]["position"], m["resets"]["velocity"]
+    _count(position, f.clock[0])
+    _count(velocity, f.clock[0])
+    _add_change(position, 0, north_m)
+    _add_change(position, 1, east_m)
+    _add_change(velocity, 0, north_m_s)
+    _add_change(velocity, 1, east_m_s)
 
 
 @compiled
-def _count(m: MemoryRecord, f: Filter, kind: int) -> None:
+def _count(reset: ResetRecord, now_s: float) -> None:
     """Count a reset of position or velocity; the changes of one step of the filter are added up."""
-    resets = m["resets"]
-    resets[kind] += 1.0
-    if resets[kind + RESET_S] != f.clock[0]:
-        resets[kind + RESET_S] = f.clock[0]
+    reset["number"] += 1.0
+    if reset["time_s"] != now_s:
+        reset["time_s"] = now_s
         for axis in range(3):
-            resets[kind + RESET_CHANGE + axis] = 0.0
+            reset["change"][axis] = 0.0
 
 
 @compiled
-def _add_change(m: MemoryRecord, kind: int, axis: int, change: float) -> None:
-    m["resets"][kind + RESET_CHANGE + axis] += change
-    m["resets"][kind + RESET_SUM + axis] += change
+def _add_change(reset: ResetRecord, axis: int, change: float) -> None:
+    reset["change"][axis] += change
+    reset["sum"][axis] += change
 
 
 @compiled
 def count_yaw_reset(m: MemoryRecord, turn_rad: float) -> None:
     """Count a change of the yaw."""
-    m["resets"][YAW_RESET] += 1.0
-    m["resets"][YAW_RESET + RESET_CHANGE] = turn_rad
-    m["resets"][YAW_RESET_SUM] += turn_rad
+    reset = m["resets"]["yaw"]
+    reset["number"] += 1.0
+    reset["change_rad"] = turn_rad
+    reset["sum_rad"] += turn_rad
 
 
 @compiled
 def count_of_resets(m: MemoryRecord) -> float:
     """Return the number of resets of any kind."""
-    total: float = m["resets"][POSITION_RESET] + m["resets"][VELOCITY_RESET] + m["resets"][YAW_RESET]
+    resets = m["resets"]
+    total: float = resets["position"]["number"] + resets["velocity"]["number"] + resets["yaw"]["number"]
     return total

@@ -19,7 +19,6 @@ from flightstack.estimation.delayed_filter import imu_kernel
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.filter_core import PythonCore
 from flightstack.estimation.imu_track import RECORD_SIZE, take_wire
-from flightstack.estimation.memory import POSITION_RESET, RESETS, VELOCITY_RESET, YAW_RESET
 from flightstack.flight_log.flight_log import DEFAULT_CAPACITY, Trace
 from flightstack.flight_log.sensor_topics import IMU_GROUP
 from flightstack.process.assembly import Stack
@@ -42,9 +41,6 @@ from sim_bridge.plant.layout import CONTACT
 from sim_bridge.sensors.imu import measure_imu
 from sim_bridge.sensors.layout import IMU, MOTION
 from sim_bridge.simulator import Simulator
-
-_RESET_COUNTS = np.array([POSITION_RESET, VELOCITY_RESET, YAW_RESET])
-
 
 _Arguments: TypeAlias = tuple[Any, ...]
 """Arguments of the kernel for one part."""
@@ -91,12 +87,11 @@ def _estimates(stack: Stack) -> list[_Arguments]:
     """Return what the filter of each inertial sensor writes."""
     found: list[_Arguments] = []
     for number, estimator in enumerate(_estimators(stack)):
-        record = estimator.memory[0]
-        found.append(
-            (number, record["state"], estimator.memory["flags"]["aligned"], record["resets"], _RESET_COUNTS)
-        )
-    nothing = np.zeros(STATE_SIZE), np.zeros(1, np.int64), np.zeros(RESETS)
-    return found or [(0, *nothing, _RESET_COUNTS)]
+        memory = estimator.memory
+        resets = tuple(memory["resets"][kind]["number"] for kind in ("position", "velocity", "yaw"))
+        found.append((number, memory["state"][0], memory["flags"]["aligned"], resets))
+    no_resets = np.zeros(1), np.zeros(1), np.zeros(1)
+    return found or [(0, np.zeros(STATE_SIZE), np.zeros(1, np.int64), no_resets)]
 
 
 class QuietBlock:

@@ -19,14 +19,7 @@ from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits,
 from flightstack.estimation.filter_core import FilterCore
 from flightstack.estimation.health import NO_HEALTH
 from flightstack.estimation.imu_track import SingleArray
-from flightstack.estimation.lanes import Lanes
-from flightstack.estimation.memory import (
-    POSITION_RESET,
-    RESET_SUM,
-    VELOCITY_RESET,
-    YAW_RESET,
-    YAW_RESET_SUM,
-)
+from flightstack.estimation.lanes import Lanes, sum_of_resets
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed
 from flightstack.estimation.sensor_samples import BaroSample, ImuSample, MagSample
@@ -105,14 +98,17 @@ class Estimation:
         self._health_due_us = 0
         self._time_us = 0  # of the newest message of the sensors
         self._read_selected()
-        self._seen, self._counts = self._resets.tolist(), (0.0, 0.0, 0.0)
+        self._seen, self._counts = sum_of_resets(self.estimator.memory), (0.0, 0.0, 0.0)
         self._mag_has_failed = self._baro_has_failed = self._spare_has_failed = False
 
     def _read_selected(self) -> None:
         """Read resets and the fault of the magnetometer of the selected estimator from now on."""
         # as memory: a number of an array takes four times as long to read
-        self._resets = self.estimator.memory["resets"][0].data
-        self._mag_fault = self.estimator.memory["flags"]["mag_fault"].data
+        memory = self.estimator.memory
+        self._numbers = tuple(
+            memory["resets"][kind]["number"].data for kind in ("position", "velocity", "yaw")
+        )
+        self._mag_fault = memory["flags"]["mag_fault"].data
 
     @property
     def estimator(self) -> Estimator:
@@ -212,8 +208,10 @@ class Estimation:
         self._check_resets(time_us)
 
     def _check_resets(self, time_us: int) -> None:
-        resets = self._resets
-        if (resets[POSITION_RESET], resets[VELOCITY_RESET], resets[YAW_RESET]) != self._counts:
+        position, velocity, yaw = self._numbers
+        counts = position[0], velocity[0], yaw[0]
+        if counts != self._counts:
+            self._counts = counts
             self._follow_resets()
             self.recorder.local_position(time_us, self.sensed())
 
@@ -229,16 +227,14 @@ class Estimation:
     def _follow_resets(self) -> None:
         """Shift the reference of guidance by the resets since the last call."""
         seen, users = self._seen, self._users
-        x = self._seen = self._resets.tolist()
-        self._counts = x[POSITION_RESET], x[VELOCITY_RESET], x[YAW_RESET]
+        now = self._seen = sum_of_resets(self.estimator.memory)
         if not self._now.flying:
             return
-        change = [new - old for new, old in zip(x, seen, strict=True)]
         position_m, velocity_m_s = (
-            Vector3(*change[kind + RESET_SUM : kind + RESET_SUM + 3])
-            for kind in (POSITION_RESET, VELOCITY_RESET)
+            _difference(now.position_m, seen.position_m),
+            _difference(now.velocity_m_s, seen.velocity_m_s),
         )
-        yaw_rad = change[YAW_RESET_SUM]
+        yaw_rad = now.yaw_rad - seen.yaw_rad
         users.navigator.shift(self._now.status.mode, position_m, velocity_m_s, yaw_rad)
         if abs(yaw_rad) > _SMALL_TURN_RAD:  # the reference attitude of the loops has the old yaw
             self._reset_loops()
@@ -290,6 +286,10 @@ class Estimation:
             self._users.journal.say(Severity.WARNING, "Barometer is stuck or missing and not used")
         elif self._now.flying:
             self._users.journal.say(Severity.NOTICE, "Barometer is used again")
+
+
+def _difference(new: Vector3, old: Vector3) -> Vector3:
+    return Vector3(new.x - old.x, new.y - old.y, new.z - old.z)
 
 
 class SensorAutopilot:

@@ -27,10 +27,9 @@ _QUATERNION_AT = 6
 
 
 @compiled
-def _sum_at(values: FloatArray, columns: Any) -> float:
-    total = 0.0
-    for i in columns:
-        total += values[i]
+def _total(numbers: Any) -> float:
+    position, velocity, yaw = numbers
+    total: float = position[0] + velocity[0] + yaw[0]
     return total
 
 
@@ -80,7 +79,7 @@ def _advance(
 ) -> bool:  # fmt: skip
     """Advance plant, sensors and estimate to ``time_us``; return False if no tick is to follow."""
     memory, commands, steps, output, largest_result, sent, taken = plant
-    selected, known, is_known, resets, reset_counts = estimate
+    selected, known, is_known, resets = estimate
     records, record_times, record_at = imu_log
     result = call_kernel_int(calls[ADVANCE], (memory, commands, flags, steps, output))
     counters[FLOWN] += 1
@@ -89,7 +88,7 @@ def _advance(
         return False
     copy_all(sent, taken)
     if len(sensing[1]) > 0:
-        resets_before = _sum_at(resets, reset_counts)
+        resets_before = _total(resets)
         at = record_at + counters[SENSED]
         record_times[at] = time_us
         measure_slow(slow_calls, slow, time_us + following[5], memory, sensing[2], sensing[3])
@@ -99,7 +98,7 @@ def _advance(
         if is_known[0] != 0:
             copy_all(known, state)
         log_truth(slow, time_us, following)
-        if _sum_at(resets, reset_counts) != resets_before:
+        if _total(resets) != resets_before:
             counters[WAITS] = 1
             return False
     return True
@@ -115,7 +114,7 @@ def fly_quiet_ticks(
 
     The state of the first tick ``is_taken``, or the plant advances to it. The first outer tick is that after
     ``outer_in`` ticks. It stops when the result of the plant is larger than ``largest_result``, after a reset of the
-    estimate, counted in the columns ``reset_counts``, and at an outer tick that is not nominal: their tick waits.
+    estimate, which it counts in ``resets``, and at an outer tick that is not nominal: their tick waits.
     Records and frames are bytes. ``tracks``, ``counters`` and ``filters`` of ``sensing`` have an element for each
     inertial sensor; on the true state there are no ``imus``. ``slow`` and ``following`` are those of ``slow_kernel``.
     """

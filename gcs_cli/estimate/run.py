@@ -42,7 +42,6 @@ class Estimate:
     covariance: FloatArray
     observations: FloatArray
     samples: dict[str, int]
-    resets: FloatArray
 
 
 def run(log: Recording, given: Mapping[str, float]) -> Estimate:
@@ -142,5 +141,4 @@ class _Keeper:
             np.array(covariance).reshape(-1, MOTION_SIZE, MOTION_SIZE),
             np.array(observations).reshape(-1, OBSERVATIONS, OBSERVATION_COLUMNS),
             self._samples,
-            self._record["resets"].copy(),
         )

@@ -67,7 +67,7 @@ def test_flight_through_the_application_has_the_bits_of_the_filter(target: Targe
         flags = here.memory["flags"].view(np.int64).tolist()
         if kind == IMU:
             assert answer.state == here.memory["state"][0].tolist()
-            assert answer.resets == here.memory["resets"][0].tolist()
+            assert answer.resets == here.memory["resets"].view(np.float64).tolist()
             moved += bool(here.memory["flags"]["aligned"][0])
         if kind in (IMU, FIELD_EVENT):
             assert answer.flags == sum(int(bit != 0) << at for at, bit in enumerate(flags))

@@ -23,7 +23,6 @@ from flightstack.estimation.kalman import (
     INNOVATION_VARIANCE,
     REFUSED,
 )
-from flightstack.estimation.memory import POSITION_RESET, VELOCITY_RESET
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, ImuSample, MagSample
 from tests.support import flown_sensors as flown
 from tests.support.flown_sensors import Faults
@@ -118,22 +117,22 @@ def test_dead_reckoning_grows_no_faster_than_its_deviation() -> None:
 def test_correction_after_a_gnss_outage_counts_as_one_reset() -> None:
     flight = fly(OUTAGE)
     assert rms(flight.between(52.0, SECONDS)[:, 7:9]) < 1.0
-    assert flight.estimator.memory["resets"][0, POSITION_RESET] == 1.0
+    assert flight.estimator.memory["resets"]["position"]["number"][0] == 1.0
 
 
 def test_short_jump_of_gnss_is_refused() -> None:
     flight = fly(Faults(jump_s=(35.0, 39.0), jump_m=30.0))
     errors = flight.between(35.0, 39.0)
     assert np.abs(errors[:, 7:9]).max() < 1.0
-    assert flight.estimator.memory["resets"][0, POSITION_RESET] == 0.0
+    assert flight.estimator.memory["resets"]["position"]["number"][0] == 0.0
 
 
 def test_lasting_jump_of_gnss_resets_the_position_alone() -> None:
     flight = fly(Faults(jump_s=(35.0, math.inf), jump_m=30.0))
     resets = flight.estimator.memory["resets"][0]
-    assert resets[POSITION_RESET] == 1.0
-    assert resets[POSITION_RESET + 1] == pytest.approx(30.0, abs=1.5)
-    assert resets[VELOCITY_RESET] == 0.0
+    assert resets["position"]["number"] == 1.0
+    assert resets["position"]["change"][0] == pytest.approx(30.0, abs=1.5)
+    assert resets["velocity"]["number"] == 0.0
     assert rms(flight.between(45.0, SECONDS)[:, 4:6]) < 0.15
 
 

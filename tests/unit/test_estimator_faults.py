@@ -16,13 +16,6 @@ from flightstack.estimation.error_state import POSITION, VELOCITY, turn_between
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits, tuning_of
 from flightstack.estimation.kalman import FUSED, FUSED_S, GNSS_POSITION, GNSS_VELOCITY, MAG, RANGE, REFUSED
-from flightstack.estimation.memory import (
-    POSITION_RESET,
-    RESET_CHANGE,
-    RESET_SUM,
-    VELOCITY_RESET,
-    YAW_RESET,
-)
 from flightstack.estimation.sensor_samples import (
     BaroSample,
     GnssSample,
@@ -61,8 +54,13 @@ def yaw_error_deg(estimator: Estimator, time_s: float) -> float:
     return math.degrees(turn_between(flown.attitude(time_s), estimator.state().attitude))
 
 
-def resets(estimator: Estimator, kind: int) -> float:
-    return float(estimator.memory["resets"][0, kind])
+def resets(estimator: Estimator, kind: str) -> float:
+    return float(estimator.memory["resets"][kind]["number"][0])
+
+
+def last_change(estimator: Estimator, kind: str) -> list[float]:
+    changes: list[float] = estimator.memory["resets"][kind]["change"][0].tolist()
+    return changes
 
 
 def field_at(yaw_rad: float, earth: Vector3 = flown.EARTH) -> Vector3:
@@ -102,8 +100,10 @@ def test_earth_field_known_late_keeps_a_turn_since_the_alignment(declination_deg
         flown.feed(estimator, sample)
     turned = (yaw_deg(estimator) - before - 13.5 + 180.0) % 360.0 - 180.0
     assert turned == pytest.approx(declination_deg, abs=2.5)  # measured 1.6
-    assert resets(estimator, YAW_RESET) == 1.0
-    assert math.degrees(resets(estimator, YAW_RESET + 1)) == pytest.approx(declination_deg, abs=2.5)
+    assert resets(estimator, "yaw") == 1.0
+    assert math.degrees(estimator.memory["resets"]["yaw"]["change_rad"][0]) == pytest.approx(
+        declination_deg, abs=2.5
+    )
 
 
 def test_earth_field_known_in_flight_keeps_the_yaw_of_gnss_velocity() -> None:
@@ -123,7 +123,7 @@ def test_magnetometer_that_starts_late_gives_the_yaw() -> None:
     assert estimator.memory["flags"][0]["has_yaw"] == 1
     assert abs(yaw_error_deg(estimator, 12.0)) < 3.0
     assert estimator.memory["observations"][0, MAG, REFUSED] == 0.0
-    assert resets(estimator, YAW_RESET) == 1.0
+    assert resets(estimator, "yaw") == 1.0
 
 
 # ------------------------------------------------------------------ yaw from GNSS velocity
@@ -134,7 +134,7 @@ def test_yaw_without_magnetometer_comes_from_gnss_velocity() -> None:
     assert estimator.memory["flags"][0]["has_yaw"] == 1
     assert abs(yaw_error_deg(estimator, 30.0)) < 5.0
     assert np.abs(estimator.state().velocity_ned_m_s - flown.velocity(30.0)).max() < 0.3
-    assert resets(estimator, YAW_RESET) == 1.0
+    assert resets(estimator, "yaw") == 1.0
 
 
 def test_yaw_without_magnetometer_stays_unknown_at_rest() -> None:
@@ -154,7 +154,7 @@ def test_turned_magnetometer_is_disproved_by_gnss_velocity(turned_deg: float) ->
 def test_good_magnetometer_is_not_suspected() -> None:
     estimator = fly(30.0, Faults())
     assert estimator.memory["flags"][0]["mag_fault"] == 0
-    assert resets(estimator, YAW_RESET) == 0.0
+    assert resets(estimator, "yaw") == 0.0
 
 
 # ------------------------------------------------------------------ GNSS
@@ -169,8 +169,8 @@ def test_reset_to_gnss_of_unknown_accuracy_stays_finite(accuracy: float) -> None
 
     faults = Faults(jump_s=(12.0, math.inf), jump_m=60.0, vertical_jump_m_s=6.0)
     estimator = fly(30.0, faults, unknown, GnssLimits(eph_m=5.0, epv_m=8.0))
-    assert resets(estimator, POSITION_RESET) >= 1.0
-    assert resets(estimator, VELOCITY_RESET) >= 1.0
+    assert resets(estimator, "position") >= 1.0
+    assert resets(estimator, "velocity") >= 1.0
     assert np.isfinite(estimator.memory["covariance"]).all()
     assert np.isfinite(estimator.memory["nominal"]).all()
 
@@ -200,21 +200,21 @@ def test_ideal_gnss_with_zero_accuracies_is_trusted() -> None:
 
 def test_lasting_error_of_the_vertical_velocity_without_a_barometer_resets_it_alone() -> None:
     estimator = fly(25.0, Faults(jump_s=(12.0, math.inf), vertical_jump_m_s=4.0), without_barometer)
-    assert resets(estimator, VELOCITY_RESET) >= 1.0
-    assert estimator.memory["resets"][0, VELOCITY_RESET + 1 : VELOCITY_RESET + 3].tolist() == [0.0, 0.0]
+    assert resets(estimator, "velocity") >= 1.0
+    assert last_change(estimator, "velocity")[:2] == [0.0, 0.0]
     assert np.abs(np.array(estimator.state().velocity_ned_m_s)[:2] - flown.velocity(25.0)[:2]).max() < 0.3
 
 
 def test_vertical_velocity_that_contradicts_both_heights_is_not_followed() -> None:
     estimator = fly(40.0, Faults(jump_s=(12.0, math.inf), vertical_jump_m_s=4.0))
-    assert resets(estimator, VELOCITY_RESET) == 0.0
+    assert resets(estimator, "velocity") == 0.0
     assert abs(estimator.state().velocity_ned_m_s.z - flown.velocity(40.0)[2]) < 0.5  # measured 0.1
     assert abs(estimator.state().position_ned_m.z - flown.position(40.0)[2]) < 1.0
 
 
 def test_lasting_jump_of_slow_gnss_resets_the_position() -> None:
     estimator = fly(35.0, Faults(jump_s=(20.0, math.inf), jump_m=60.0, gnss_period=500))  # every 2 s
-    assert resets(estimator, POSITION_RESET) == 1.0
+    assert resets(estimator, "position") == 1.0
 
 
 def test_resets_of_all_axes_in_one_step_are_added_up() -> None:
@@ -223,10 +223,10 @@ def test_resets_of_all_axes_in_one_step_are_added_up() -> None:
         return sample._replace(altitude_msl_m=sample.altitude_msl_m + 30.0) if is_late else sample
 
     estimator = fly(22.0, Faults(jump_s=(12.0, math.inf), jump_m=60.0), higher)
-    x = estimator.memory["resets"][0, POSITION_RESET:]
-    assert x[0] == 2.0
-    assert x[RESET_CHANGE : RESET_CHANGE + 3].tolist() == x[RESET_SUM : RESET_SUM + 3].tolist()
-    assert x[RESET_SUM : RESET_SUM + 3].tolist() == pytest.approx([60.0, 0.0, -30.0], abs=3.0)
+    reset = estimator.memory["resets"]["position"][0]
+    assert reset["number"] == 2.0
+    assert reset["change"].tolist() == reset["sum"].tolist()
+    assert reset["sum"].tolist() == pytest.approx([60.0, 0.0, -30.0], abs=3.0)
 
 
 def test_refused_fix_after_an_outage_is_not_reset_to() -> None:
@@ -234,8 +234,8 @@ def test_refused_fix_after_an_outage_is_not_reset_to() -> None:
     estimator = fly(26.0, faults)
     assert estimator.memory["observations"][0, GNSS_POSITION, REFUSED] > 0.0
     # the first accepted one corrects the error of dead reckoning, not the jump of 300 m
-    assert abs(resets(estimator, POSITION_RESET + 1)) < 10.0  # measured 1.7
-    assert abs(resets(estimator, VELOCITY_RESET + 1)) < 2.0  # measured 0.3
+    assert abs(last_change(estimator, "position")[0]) < 10.0  # measured 1.7
+    assert abs(last_change(estimator, "velocity")[0]) < 2.0  # measured 0.3
     assert np.abs(estimator.state().position_ned_m - flown.position(26.0)).max() < 2.0  # measured 0.2
 
 
@@ -250,7 +250,7 @@ def test_fix_that_repeats_itself_in_motion_is_dropped() -> None:
 
     estimator = fly(35.0, Faults(), freeze)
     assert estimator.memory["observations"][0, GNSS_VELOCITY, FUSED_S] == pytest.approx(20.0, abs=0.2)
-    assert resets(estimator, POSITION_RESET) == 0.0
+    assert resets(estimator, "position") == 0.0
     assert (
         np.abs(estimator.state().position_ned_m - flown.position(35.0)).max() < 2.0
     )  # 0.8; 84 if it is fused
@@ -359,7 +359,7 @@ def test_boat_that_drifts_is_not_held_at_rest() -> None:
             estimator.gnss(GnssSample(time_s, *point, Vector3(0.6, 0.0, 0.0), 0.5, 0.8, 0.1, 3, 14))
         estimator.imu(ImuSample(time_s, 0.004, STILL, GRAVITY))
     assert estimator.state().velocity_ned_m_s.x == pytest.approx(0.6, abs=0.05)
-    assert resets(estimator, VELOCITY_RESET) == 0.0
+    assert resets(estimator, "velocity") == 0.0
 
 
 def test_reset_of_the_yaw_turns_the_output_without_a_jump_of_its_rates() -> None:

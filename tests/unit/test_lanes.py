@@ -9,7 +9,6 @@ from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.lanes import Lanes
-from flightstack.estimation.memory import POSITION_RESET, RESET_SUM, VELOCITY_RESET, YAW_RESET, YAW_RESET_SUM
 from flightstack.estimation.selector import LaneFacts
 from flightstack.estimation.sensor_feed import SensorFeed
 from flightstack.mavlink.dialect import mavlink
@@ -68,21 +67,17 @@ def test_change_before_the_first_judgement_is_left_out() -> None:
 def test_change_counts_as_a_reset_after_those_of_the_former_estimator() -> None:
     pair = Pair()
     old, new = (each.memory for each in pair.estimators)
-    old["resets"][0, POSITION_RESET], old["resets"][0, POSITION_RESET + RESET_SUM] = 4.0, 10.0
-    new["resets"][0, POSITION_RESET], new["resets"][0, YAW_RESET] = 7.0, 3.0
+    earlier, later = old["resets"][0], new["resets"][0]
+    earlier["position"]["number"], earlier["position"]["sum"][0] = 4.0, 10.0
+    later["position"]["number"], later["yaw"]["number"] = 7.0, 3.0
     old["state"][0, 6], new["state"][0, 6:10] = 1.0, [np.cos(0.1), 0.0, 0.0, np.sin(0.1)]
     new["state"][0, :6] = old["state"][0, :6] + [0.5, -1.0, 0.25, 0.1, 0.2, -0.3]
     pair.step(100_000, 1)
     assert pair.lanes.replace_lost(100_000)
-    resets = new["resets"][0]
-    assert [resets[kind] for kind in (POSITION_RESET, VELOCITY_RESET, YAW_RESET)] == [5.0, 1.0, 1.0]
-    assert resets[POSITION_RESET + RESET_SUM : POSITION_RESET + RESET_SUM + 3] == pytest.approx(
-        [10.5, -1.0, 0.25]
-    )
-    assert resets[VELOCITY_RESET + RESET_SUM : VELOCITY_RESET + RESET_SUM + 3] == pytest.approx(
-        [0.1, 0.2, -0.3]
-    )
-    assert resets[YAW_RESET_SUM] == pytest.approx(0.2)
+    assert [later[kind]["number"] for kind in ("position", "velocity", "yaw")] == [5.0, 1.0, 1.0]
+    assert later["position"]["sum"] == pytest.approx([10.5, -1.0, 0.25])
+    assert later["velocity"]["sum"] == pytest.approx([0.1, 0.2, -0.3])
+    assert later["yaw"]["sum_rad"] == pytest.approx(0.2)
     assert pair.lanes.estimator is pair.estimators[1]
 
 

@@ -14,7 +14,6 @@ from flightstack.estimation.error_state import ATTITUDE, VELOCITY
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams, tuning_of
 from flightstack.estimation.kalman import FUSED, GNSS_VELOCITY, KNOWN_FIELD, REFUSED
-from flightstack.estimation.memory import YAW_RESET
 from flightstack.estimation.rings import MEAN_SIZE, take_mean
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, ImuSample, MagSample
 from tests.support import flown_sensors as flown
@@ -150,15 +149,15 @@ def test_earth_field_is_fused_with_a_covariance_of_that_time() -> None:
             break
     assert estimator is not None
     fused = estimator.memory["observations"][0, KNOWN_FIELD, FUSED]
-    turned, count = estimator.state().attitude, estimator.memory["resets"][0, YAW_RESET]
+    turned, count = estimator.state().attitude, estimator.memory["resets"]["yaw"]["number"][0]
     east = Vector3(flown.EARTH.x, flown.EARTH.y + 0.05, flown.EARTH.z)
     estimator.set_earth_field(east)
-    assert estimator.memory["resets"][0, YAW_RESET] == count  # with the attitude, not before it
+    assert estimator.memory["resets"]["yaw"]["number"][0] == count  # with the attitude, not before it
     assert estimator.state().attitude == turned
     time_s = float(estimator.memory["output"][0, 0])
     for tick in range(1, 30):
         estimator.imu(ImuSample(time_s + tick * STEP_S, STEP_S, STILL, GRAVITY))
-        if estimator.memory["resets"][0, YAW_RESET] > count:
+        if estimator.memory["resets"]["yaw"]["number"][0] > count:
             break
     assert estimator.memory["observations"][0, KNOWN_FIELD, FUSED] == fused + 1.0
     assert float(estimator.memory["behind"][0, 0]) == 0.0

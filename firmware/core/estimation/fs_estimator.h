@@ -14,9 +14,6 @@
 #define FS_MAG_RING 1
 #define FS_BARO_RING 2
 #define FS_RANGE_RING 3
-#define FS_POSITION_RESET 0
-#define FS_VELOCITY_RESET 8
-#define FS_YAW_RESET 16
 #define FS_GNSS_VELOCITY 0
 #define FS_GNSS_POSITION 3
 #define FS_BARO 6

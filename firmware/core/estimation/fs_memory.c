@@ -1,14 +1,11 @@
 /* Generated from Python by flightstack.firmware.generator: do not edit. */
-/*
- * The memory of one estimator: a record of arrays, the meaning of its flags and of its counters of resets.
- * flightstack/estimation/memory.py
- */
+/* The memory of one estimator: a record. flightstack/estimation/memory.py */
 #include "fs_memory.h"
 
 #include "fs_law_math.h"
 #include "fs_math.h"
 
-/* memory.py:150 */
+/* memory.py:175 */
 void fs_start_memory(fs_estimator_memory *memory)
 {
     fs_estimator_memory *m = memory;

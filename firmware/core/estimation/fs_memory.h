@@ -1,8 +1,5 @@
 /* Generated from Python by flightstack.firmware.generator: do not edit. */
-/*
- * The memory of one estimator: a record of arrays, the meaning of its flags and of its counters of resets.
- * flightstack/estimation/memory.py
- */
+/* The memory of one estimator: a record. flightstack/estimation/memory.py */
 #ifndef FS_MEMORY_H
 #define FS_MEMORY_H
 
@@ -51,6 +48,28 @@ typedef struct {
     int32_t has_fused;
 } fs_agenda;
 
+/* Resets of position or velocity, NED. */
+typedef struct {
+    fs_real number;
+    fs_real change[3];
+    fs_real sum[3];
+    fs_real time_s;
+} fs_reset;
+
+/* Resets of the yaw: their number, the last change, and the sum of all. */
+typedef struct {
+    fs_real number;
+    fs_real change_rad;
+    fs_real sum_rad;
+} fs_yaw_reset;
+
+/* Resets of each kind. */
+typedef struct {
+    fs_reset position;
+    fs_reset velocity;
+    fs_yaw_reset yaw;
+} fs_resets;
+
 /* The state before the measurement of GNSS that is being fused. */
 typedef struct {
     fs_real elapsed_s;
@@ -83,7 +102,7 @@ typedef struct {
     fs_real means[5][11];
     fs_real checks[30];
     fs_real alignment[9];
-    fs_real resets[19];
+    fs_resets resets;
     fs_real rate_filter[9];
     fs_real earth[4];
     fs_real field[3];
@@ -92,7 +111,7 @@ typedef struct {
     fs_rings rings;
 } fs_estimator_memory;
 
-/* Set what is not zero at the start in a memory of zeros that has its parameters. memory.py:150 */
+/* Set what is not zero at the start in a memory of zeros that has its parameters. memory.py:175 */
 void fs_start_memory(fs_estimator_memory *memory);
 
 #endif

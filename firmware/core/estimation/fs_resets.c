@@ -9,69 +9,65 @@
 #include "fs_kalman.h"
 #include "fs_math.h"
 
-#define FS_YAW_RESET 16
-#define FS_RESET_CHANGE 1
-#define FS_YAW_RESET_SUM 18
 #define FS_LEAST_SPEED_M_S FS_LIT(0.3)
-#define FS_RESET_S 7
-#define FS_VELOCITY_RESET 8
-#define FS_RESET_SUM 4
 #define FS_VELOCITY 3
 #define FS_LEAST_POSITION_M FS_LIT(0.5)
-#define FS_POSITION_RESET 0
 #define FS_POSITION 6
 #define FS_GNSS_BIAS 24
 
-/* resets.py:81 */
+/* resets.py:74 */
 void fs_count_yaw_reset(fs_estimator_memory *m, fs_real turn_rad)
 {
-    m->resets[FS_YAW_RESET] += FS_LIT(1.0);
-    m->resets[FS_YAW_RESET + FS_RESET_CHANGE] = turn_rad;
-    m->resets[FS_YAW_RESET_SUM] += turn_rad;
+    fs_yaw_reset *reset = &m->resets.yaw;
+    reset->number += FS_LIT(1.0);
+    reset->change_rad = turn_rad;
+    reset->sum_rad += turn_rad;
 }
 
-/* Count a reset of position or velocity; the changes of one step of the filter are added up. resets.py:64 */
-static void count_(fs_estimator_memory *m, const fs_filter *f, int32_t kind)
+/* Count a reset of position or velocity; the changes of one step of the filter are added up. resets.py:58 */
+static void count_(fs_reset *reset, fs_real now_s)
 {
-    m->resets[kind] += FS_LIT(1.0);
-    if (m->resets[kind + FS_RESET_S] != f->clock[0]) {
-        m->resets[kind + FS_RESET_S] = f->clock[0];
+    reset->number += FS_LIT(1.0);
+    if (reset->time_s != now_s) {
+        reset->time_s = now_s;
         for (int32_t axis = 0; axis < 3; axis++) {
-            m->resets[kind + FS_RESET_CHANGE + axis] = FS_LIT(0.0);
+            reset->change[axis] = FS_LIT(0.0);
         }
     }
 }
 
-/* resets.py:75 */
-static void add_change(fs_estimator_memory *m, int32_t kind, int32_t axis, fs_real change)
+/* resets.py:68 */
+static void add_change(fs_reset *reset, int32_t axis, fs_real change)
 {
-    m->resets[kind + FS_RESET_CHANGE + axis] += change;
-    m->resets[kind + FS_RESET_SUM + axis] += change;
+    reset->change[axis] += change;
+    reset->sum[axis] += change;
 }
 
-/* resets.py:25 */
+/* resets.py:16 */
 void fs_reset_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t first, int32_t count)
 {
     const fs_real speed_m_s = fs_max(fs_speed_accuracy(row), FS_LEAST_SPEED_M_S);
-    count_(m, f, FS_VELOCITY_RESET);
+    fs_reset *reset = &m->resets.velocity;
+    count_(reset, f->clock[0]);
     for (int32_t axis = first; axis < first + count; axis++) {
-        add_change(m, FS_VELOCITY_RESET, axis, row[4 + axis] - f->nominal[4 + axis]);
+        add_change(reset, axis, row[4 + axis] - f->nominal[4 + axis]);
         f->nominal[4 + axis] = row[4 + axis];
         m->refused_s[axis] = FS_LIT(0.0);
     }
     fs_reset_variance(f->covariance, FS_VELOCITY + first, count, speed_m_s * speed_m_s);
 }
 
-/* resets.py:36 */
+/* resets.py:28 */
 void fs_reset_position(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t first, int32_t count)
 {
     fs_real accuracy_m = first == 2 ? fs_vertical_accuracy(row) : fs_horizontal_accuracy(row);
     accuracy_m = fs_max(accuracy_m, FS_LEAST_POSITION_M);
     const fs_real age_s = f->clock[0] - row[0];
-    count_(m, f, FS_POSITION_RESET);
+    fs_reset *reset = &m->resets.position;
+    count_(reset, f->clock[0]);
     for (int32_t axis = first; axis < first + count; axis++) {
         const fs_real now_m = row[1 + axis] + age_s * f->nominal[4 + axis];
-        add_change(m, FS_POSITION_RESET, axis, now_m - f->nominal[7 + axis]);
+        add_change(reset, axis, now_m - f->nominal[7 + axis]);
         f->nominal[7 + axis] = now_m;
         f->nominal[25 + axis] = FS_LIT(0.0);
         m->refused_s[3 + axis] = FS_LIT(0.0);
@@ -80,21 +76,24 @@ void fs_reset_position(fs_estimator_memory *m, fs_filter *f, const fs_real row[]
     fs_reset_variance(f->covariance, FS_GNSS_BIAS + first, count, FS_LIT(0.0001));
 }
 
-/* resets.py:51 */
+/* resets.py:44 */
 void fs_count_correction(fs_estimator_memory *m, const fs_filter *f, fs_real north_m, fs_real east_m,
                          fs_real north_m_s, fs_real east_m_s)
 {
-    count_(m, f, FS_POSITION_RESET);
-    count_(m, f, FS_VELOCITY_RESET);
-    add_change(m, FS_POSITION_RESET, 0, north_m);
-    add_change(m, FS_POSITION_RESET, 1, east_m);
-    add_change(m, FS_VELOCITY_RESET, 0, north_m_s);
-    add_change(m, FS_VELOCITY_RESET, 1, east_m_s);
+    fs_reset *position = &m->resets.position;
+    fs_reset *velocity = &m->resets.velocity;
+    count_(position, f->clock[0]);
+    count_(velocity, f->clock[0]);
+    add_change(position, 0, north_m);
+    add_change(position, 1, east_m);
+    add_change(velocity, 0, north_m_s);
+    add_change(velocity, 1, east_m_s);
 }
 
-/* resets.py:89 */
+/* resets.py:83 */
 fs_real fs_count_of_resets(const fs_estimator_memory *m)
 {
-    const fs_real total = m->resets[FS_POSITION_RESET] + m->resets[FS_VELOCITY_RESET] + m->resets[FS_YAW_RESET];
+    const fs_resets *resets = &m->resets;
+    const fs_real total = resets->position.number + resets->velocity.number + resets->yaw.number;
     return total;
 }

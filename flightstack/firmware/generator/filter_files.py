@@ -6,7 +6,7 @@ from types import ModuleType
 from typing import Any
 
 from flightstack.core import geometry, portable_math
-from flightstack.estimation import kalman, memory, rings
+from flightstack.estimation import kalman, rings
 from flightstack.estimation.delayed_filter import field_kernel, imu_kernel, push_kernel
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.health import health_kernel
@@ -22,7 +22,6 @@ NAMES = {geometry.__name__: "fs_estimation_geometry", portable_math.__name__: "f
 """Files of functions that the control laws do not use; those that they use stand in ``firmware/core``."""
 INDICES: tuple[tuple[ModuleType, tuple[str, ...]], ...] = (
     (rings, ("GNSS_RING", "MAG_RING", "BARO_RING", "RANGE_RING")),
-    (memory, ("POSITION_RESET", "VELOCITY_RESET", "YAW_RESET")),
     (kalman, ("GNSS_VELOCITY", "GNSS_POSITION", "BARO", "MAG")),
 )
 """Indices of the arrays in the memory that callers use."""

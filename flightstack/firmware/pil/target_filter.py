@@ -77,6 +77,7 @@ class TargetFilter:
         self._words = self._held.view("<u4")
         self._record = self.memory[0]
         self._flags = self.memory["flags"].view(np.int64)
+        self._resets = self.memory["resets"].view(np.float64)
         self._bits = np.arange(len(Flags._fields))
         self._waiting: list[Event] = []
         self._next = 0
@@ -132,5 +133,5 @@ class TargetFilter:
         self._is_fresh = False
         record = self._record
         if events[-1].kind in (sensing.IMU, sensing.EARTH):
-            record["state"], record["resets"] = answer.state, answer.resets
+            record["state"], self._resets[:] = answer.state, answer.resets
         self._flags[:] = (answer.flags >> self._bits) & 1
