@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, TypeAlias
+from typing import Annotated, NamedTuple, TypeAlias
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray, Quaternion, Vector3
+from flightstack.core.contract import FloatArray, Quaternion, Record, Vector3
 from flightstack.core.geometry import quaternion_from_euler, rotate, wrap_pi
 from flightstack.core.portable_math import atan2, sin_cos
 from flightstack.estimation.error_state import (
@@ -31,14 +31,45 @@ from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.fusion import fuse_field
 from flightstack.estimation.kalman import Filter, reset_variance
 
-ALIGNMENT_SIZE = 9
-"""Sums of specific force (3) and magnetic field (3), their numbers of samples, and seconds."""
-Alignment: TypeAlias = Annotated[FloatArray, ALIGNMENT_SIZE]
-
-ALIGNMENT_S = 0.4
-WAIT_FOR_MAG_S = 2.0
+_ALIGNMENT_S, _WAIT_FOR_MAG_S = 0.4, 2.0
 _UNKNOWN_YAW_RAD, _ANY_YAW_RAD = 1.0, 1.8
 """Deviation of the yaw that a magnetic field is to give, and without a magnetometer."""
+
+
+class Alignment(NamedTuple):
+    """Sums of the samples of a vehicle that stands."""
+
+    force: Annotated[FloatArray, 3]
+    field: Annotated[FloatArray, 3]
+    forces: float
+    """Number of samples of the specific force."""
+    fields: float
+    """Number of samples of the magnetic field."""
+    elapsed_s: float
+
+
+AlignmentRecord: TypeAlias = Annotated[Record, Alignment]
+
+
+@compiled
+def add_force(sums: AlignmentRecord, force: Vector3, dt_s: float) -> bool:
+    """Add a sample of the specific force; return True if all are enough."""
+    sums["force"][0] += force.x
+    sums["force"][1] += force.y
+    sums["force"][2] += force.z
+    sums["forces"] += 1.0
+    sums["elapsed_s"] += dt_s
+    elapsed_s: float = sums["elapsed_s"]
+    return elapsed_s >= _ALIGNMENT_S and (sums["fields"] > 0.0 or elapsed_s >= _WAIT_FOR_MAG_S)
+
+
+@compiled
+def add_field(sums: AlignmentRecord, field: Vector3) -> None:
+    """Add a sample of the magnetic field."""
+    sums["field"][0] += field.x
+    sums["field"][1] += field.y
+    sums["field"][2] += field.z
+    sums["fields"] += 1.0
 
 
 @compiled
@@ -67,24 +98,27 @@ def set_initial_variances(f: Filter, params: EstimatorParams, speed_m_s: float, 
 
 @compiled
 def align(
-    f: Filter, sums: Alignment, earth: Vector3, declination_rad: float, params: EstimatorParams
+    f: Filter, sums: AlignmentRecord, earth: Vector3, declination_rad: float, params: EstimatorParams
 ) -> None:
     """Set attitude, field and covariance from the sums of a vehicle that stands.
 
     ``earth`` is the Earth's field [gauss, NED] at the place; zero if unknown: then the measured field is taken, turned
     to the declination, or to zero if that is NaN.
     """
-    force = read_vector(sums, 0)
+    force = read_vector(sums["force"], 0)
     off = abs(
-        math.sqrt(force.x * force.x + force.y * force.y + force.z * force.z) / sums[6] - params.gravity_m_s2
+        math.sqrt(force.x * force.x + force.y * force.y + force.z * force.z) / sums["forces"]
+        - params.gravity_m_s2
     )
     moves = off > 1.0
     for i in range(f.nominal.size):
         f.nominal[i] = 0.0
     set_initial_variances(f, params, 5.0 if moves else 0.1, 0.3 if moves else params.tilt_rad)
     _set_attitude(f, level_attitude(force, 0.0))
-    if sums[7] > 0.0:
-        field = Vector3(sums[3] / sums[7], sums[4] / sums[7], sums[5] / sums[7])
+    count = sums["fields"]
+    if count > 0.0:
+        total = read_vector(sums["field"], 0)
+        field = Vector3(total.x / count, total.y / count, total.z / count)
         align_yaw(f, field, earth, declination_rad, params)
 
 

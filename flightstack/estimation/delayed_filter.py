@@ -8,7 +8,7 @@ from flightstack.core.array_items import as_tuple
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Vector3
 from flightstack.estimation.agenda import MOST_PARTS, take_field_at_rest, work
-from flightstack.estimation.alignment import ALIGNMENT_S, WAIT_FOR_MAG_S, align
+from flightstack.estimation.alignment import add_field, add_force, align
 from flightstack.estimation.error_state import read_nominal, read_vector, scaled, write_vector
 from flightstack.estimation.estimator_params import PARAMS_SIZE, EstimatorParams
 from flightstack.estimation.imu_input import (
@@ -77,9 +77,7 @@ def push_kernel(memory: MemoryArray, ring: int, row: FloatArray) -> None:
             write_row(r.gnss[slot], row)
         return
     if ring == MAG_RING and m["flags"]["aligned"] == 0:
-        for i in range(3):
-            m["alignment"][3 + i] += row[1 + i]
-        m["alignment"][7] += 1.0
+        add_field(m["alignment"], read_vector(row, 1))
     if not take_mean(m["means"][ring], row, max(params.sensor_period_s, wait_s / (MAG_ROWS - 4))):
         return
     if ring == MAG_RING:
@@ -194,23 +192,17 @@ def _real_step(m: MemoryRecord, time_s: float, dt_s: float) -> float:
 @compiled
 def _collect(m: MemoryRecord, accel: Vector3, time_s: float, dt_s: float, params: EstimatorParams) -> None:
     """Add a sample to the alignment; align when it is long enough."""
-    sums = m["alignment"]
-    sums[0] += accel.x
-    sums[1] += accel.y
-    sums[2] += accel.z
-    sums[6] += 1.0
-    sums[8] += dt_s
-    if sums[8] < ALIGNMENT_S or (sums[7] == 0.0 and sums[8] < WAIT_FOR_MAG_S):
+    if not add_force(m["alignment"], accel, dt_s):
         return
     f, earth = filter_of(m), m["earth"]
-    align(f, sums, read_vector(earth, 0), earth[3], params)
+    align(f, m["alignment"], read_vector(earth, 0), earth[3], params)
     f.clock[0] = time_s
     take_step(m["sums"], time_s)
     write_motion(m["output"], time_s, motion_of(read_nominal(f.nominal)))
     m["flags"]["aligned"] = 1
     for ring in range(MAG_RING, IMU_RING):
         m["cursors"][ring, 1] = 0  # older than the state; the fields are in its yaw
-    if sums[7] > 0.0:
+    if m["alignment"]["fields"] > 0.0:
         m["flags"]["has_mag"], m["flags"]["has_yaw"] = 1, 1
         for i in range(3):
-            m["field"][i] = sums[3 + i] / sums[7]
+            m["field"][i] = m["alignment"]["field"][i] / m["alignment"]["fields"]

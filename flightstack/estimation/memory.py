@@ -14,7 +14,7 @@ from flightstack.estimation.estimator_params import PARAMS_SIZE, EstimatorParams
 from flightstack.estimation.imu_input import Sums
 from flightstack.estimation.kalman import Filter
 from flightstack.estimation.rate_filter import RateFilter
-from flightstack.estimation.rings import MEAN_SIZE, RINGS, TRACK_COLUMNS, Rings
+from flightstack.estimation.rings import RINGS, TRACK_COLUMNS, Mean, Rings
 from flightstack.estimation.source_checks import Checks
 from flightstack.estimation.yaw_estimator import Models
 
@@ -149,11 +149,11 @@ class EstimatorMemory(NamedTuple):
     filter: Filter
     params: EstimatorParams
     sums: Sums
-    means: Annotated[FloatArray, RINGS, MEAN_SIZE]
-    checks: Checks
-    alignment: Alignment
+    means: Annotated[RecordArray, Mean, RINGS]
+    checks: Annotated[Record, Checks]
+    alignment: Annotated[Record, Alignment]
     resets: Annotated[Record, Resets]
-    rate_filter: RateFilter
+    rate_filter: Annotated[Record, RateFilter]
     earth: Annotated[FloatArray, 4]
     """Field NED [gauss], declination [rad], NaN if unknown."""
     field: Annotated[FloatArray, 3]

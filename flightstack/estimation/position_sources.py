@@ -30,7 +30,6 @@ from flightstack.estimation.kalman import (
 from flightstack.estimation.memory import NOTHING, MemoryRecord
 from flightstack.estimation.resets import count_correction, reset_position, reset_velocity
 from flightstack.estimation.source_checks import (
-    GNSS_FAULT,
     follow_drift,
     follow_height_drift,
     position_drifts,
@@ -62,7 +61,7 @@ def take_gnss(m: MemoryRecord, f: Filter, row: FloatArray, stage: int, params: E
         _begin_gnss(m, f, row, params)
         at = first
     axis: int = at if at < 3 else at - 3
-    fault = m["checks"][GNSS_FAULT + axis]
+    fault = m["checks"]["fault"][axis]
     if at < 3:
         fuse_gnss_velocity(f, row, axis, fault, params)
     else:

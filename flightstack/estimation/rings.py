@@ -8,14 +8,12 @@ from typing import Annotated, NamedTuple, TypeAlias
 import numpy as np
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray
+from flightstack.core.contract import FloatArray, Record
 
 GNSS_ROWS, MAG_ROWS, BARO_ROWS, RANGE_ROWS, IMU_ROWS = 8, 32, 32, 32, 64
 GNSS_RING, MAG_RING, BARO_RING, RANGE_RING, IMU_RING, RINGS = 0, 1, 2, 3, 4, 5
 IMU_COLUMNS, TRACK_COLUMNS = 10, 11
-_COUNT, _PUSHED_S, _LAST_S, _FIRST, MEAN_SIZE = 4, 5, 6, 7, 11
-"""Columns of a mean of samples: sums of their differences to the first (4), their number, times of the last row and of
-the last sample, the first sample (4). Equal samples so have exactly their value as mean."""
+_MOST_VALUES = 4
 _ROUNDING_S = 2.5e-4
 """Means of samples end at the time of a step: the rounding of a float32 must not decide in which step they count."""
 
@@ -34,6 +32,20 @@ class Rings(NamedTuple):
     track: Annotated[FloatArray, IMU_ROWS, TRACK_COLUMNS]
     """The output at the time of each row of ``imu``: time, attitude, velocity, position."""
     cursors: Cursors
+
+
+class Mean(NamedTuple):
+    """Mean of samples. Equal samples have exactly their value as mean."""
+
+    sums: Annotated[FloatArray, _MOST_VALUES]
+    """Of the differences of the samples to the first one."""
+    number: float
+    pushed_s: float
+    """Time of the last row."""
+    last_s: float
+    """Time of the last sample."""
+    first: Annotated[FloatArray, _MOST_VALUES]
+    """The first sample."""
 
 
 @compiled
@@ -77,24 +89,22 @@ def pop(rings: Rings, ring: int, size: int) -> None:
 
 
 @compiled
-def take_mean(mean: FloatArray, row: FloatArray, period_s: float) -> bool:
+def take_mean(mean: Annotated[Record, Mean], row: FloatArray, period_s: float) -> bool:
     """Add a sample to a mean; return True, with the mean in ``row``, if ``period_s`` passed since the last one."""
-    if row[0] - mean[_LAST_S] > period_s:  # a gap: the older samples are outdated
-        for i in range(_PUSHED_S):
-            mean[i] = 0.0
-    mean[_LAST_S] = row[0]
+    if row[0] - mean["last_s"] > period_s:  # a gap: the older samples are outdated
+        mean["number"] = 0.0
+    mean["last_s"] = row[0]
     for i in range(row.size):
-        if mean[_COUNT] == 0.0:
-            mean[_FIRST + i] = row[i]
-        mean[i] += row[i] - mean[_FIRST + i]
-    mean[_COUNT] += 1.0
-    if row[0] - mean[_PUSHED_S] < 0.9 * period_s:
+        if mean["number"] == 0.0:
+            mean["first"][i], mean["sums"][i] = row[i], 0.0
+        mean["sums"][i] += row[i] - mean["first"][i]
+    mean["number"] += 1.0
+    if row[0] - mean["pushed_s"] < 0.9 * period_s:
         return False
-    mean[_PUSHED_S] = row[0]
+    mean["pushed_s"] = row[0]
     for i in range(row.size):
-        row[i] = mean[_FIRST + i] + mean[i] / mean[_COUNT]
-    for i in range(_PUSHED_S):
-        mean[i] = 0.0
+        row[i] = mean["first"][i] + mean["sums"][i] / mean["number"]
+    mean["number"] = 0.0
     return True
 
 

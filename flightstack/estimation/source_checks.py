@@ -10,10 +10,10 @@ altitude with the vertical velocity: where they drift apart, the height of GNSS 
 from __future__ import annotations
 
 import math
-from typing import Annotated, TypeAlias
+from typing import Annotated, NamedTuple, TypeAlias
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray
+from flightstack.core.contract import FloatArray, Record
 from flightstack.estimation.error_state import ACCEL_BIAS, BARO_BIAS, POSITION, VELOCITY
 from flightstack.estimation.kalman import (
     BARO,
@@ -24,19 +24,6 @@ from flightstack.estimation.kalman import (
     Filter,
 )
 
-CHECKS_SIZE = 30
-"""Means of the innovations upwards (3); times until which the accelerometer and the barometer count as wrong; altitude
-of the barometer, and the time since which it is equal; time, position and velocity of the last GNSS measurement (7),
-drift of its position from its velocity (3), fault of each axis (3); drift of the barometer, downwards, from the
-velocity of GNSS; means of the innovations of GNSS velocity along north and east, and the time at which it contradicted
-the prediction last, with the sign of its error (2); time of the last altitude; altitude at the last measurement of
-GNSS, and now; 1 if there was one at that measurement; mean of the drift of GNSS height over 2 s."""
-Checks: TypeAlias = Annotated[FloatArray, CHECKS_SIZE]
-
-_SPEED, _HEIGHT, _PRESSURE, ACCEL_UNTIL_S, BARO_UNTIL_S = 0, 1, 2, 3, 4
-_ALTITUDE, _EQUAL_SINCE_S, _GNSS_S, _PLACE, _MOTION, _DRIFT = 5, 6, 7, 8, 11, 14
-GNSS_FAULT, _BARO_DRIFT, _SIDEWAYS, _ONSET_S, _ALTITUDE_S = 17, 20, 21, 23, 25
-_ALTITUDE_THEN, _ALTITUDE_NOW, _HAD_ALTITUDE, _HEIGHT_DRIFT = 26, 27, 28, 29
 CONSISTENT, POSITION_DRIFTS, VELOCITY_IS_WRONG = 0.0, 1.0, 2.0
 """Faults of GNSS along an axis."""
 
@@ -64,154 +51,200 @@ _ONSET_LASTS_S = 40.0
 takes so long to exceed the limit."""
 
 
+class Checks(NamedTuple):
+    """What the checks remember of the sensors."""
+
+    speed: float
+    """Mean of the innovations of the vertical velocity of GNSS, upwards; the next two are of heights."""
+    height: float
+    pressure: float
+    accel_until_s: float
+    """Time until which the accelerometer counts as wrong."""
+    baro_until_s: float
+    altitude_m: float
+    """Of the barometer, equal since the next one."""
+    equal_since_s: float
+    gnss_s: float
+    """Time, position and velocity of the last measurement of GNSS."""
+    place_m: Annotated[FloatArray, 3]
+    velocity_m_s: Annotated[FloatArray, 3]
+    drift_m: Annotated[FloatArray, 3]
+    """Of the position of GNSS from its velocity."""
+    fault: Annotated[FloatArray, 3]
+    """Fault of each axis of GNSS."""
+    baro_drift_m: float
+    """Of the barometer, downwards, from the velocity of GNSS."""
+    sideways: Annotated[FloatArray, 2]
+    """Means of the innovations of GNSS velocity along north and east."""
+    onset_s: Annotated[FloatArray, 2]
+    """Time at which GNSS velocity contradicted the prediction last, with the sign of its error."""
+    altitude_s: float
+    """Time of the last altitude."""
+    altitude_then_m: float
+    """At the last measurement of GNSS."""
+    altitude_now_m: float
+    had_altitude: float
+    """1 if there was an altitude at the last measurement of GNSS."""
+    height_drift_m: float
+    """Mean of the drift of GNSS height over 2 s."""
+
+
+ChecksRecord: TypeAlias = Annotated[Record, Checks]
+
+
 @compiled
-def _take(c: Checks, at: int, f: Filter, row: int, sign: float, dt_s: float) -> None:
-    """Add the newest innovation of a row to its mean, upwards."""
+def _mean(mean: float, f: Filter, row: int, sign: float, dt_s: float) -> float:
+    """Return a mean of innovations upwards with the newest one of a row."""
     variance = max(f.observations[row, INNOVATION_VARIANCE], _LEAST_VARIANCE)  # 0 before the first fusion
     value = sign * f.observations[row, INNOVATION] / math.sqrt(variance)
     value = min(max(value, -_LARGEST), _LARGEST)
-    c[at] += min(dt_s / _MEAN_S, 1.0) * (value - c[at])
+    made: float = mean + min(dt_s / _MEAN_S, 1.0) * (value - mean)
+    return made
 
 
 @compiled
-def take_pressure_innovation(c: Checks, f: Filter, measured_s: float, altitude_m: float) -> None:
+def take_pressure_innovation(c: ChecksRecord, f: Filter, measured_s: float, altitude_m: float) -> None:
     """Take the barometer's newest innovation, of an altitude measured at ``measured_s``."""
-    _take(c, _PRESSURE, f, BARO, 1.0, max(0.0, measured_s - c[_ALTITUDE_S]))
-    c[_ALTITUDE_S], c[_ALTITUDE_NOW] = measured_s, altitude_m
+    c["pressure"] = _mean(c["pressure"], f, BARO, 1.0, max(0.0, measured_s - c["altitude_s"]))
+    c["altitude_s"], c["altitude_now_m"] = measured_s, altitude_m
 
 
 @compiled
-def take_horizontal_innovations(c: Checks, f: Filter, dt_s: float) -> None:
+def take_horizontal_innovations(c: ChecksRecord, f: Filter, dt_s: float) -> None:
     """Take the horizontal innovations of GNSS velocity, and note when they contradict the prediction."""
     for axis in range(2):
-        _take(c, _SIDEWAYS + axis, f, GNSS_VELOCITY + axis, 1.0, dt_s)
-        if abs(c[_SIDEWAYS + axis]) > _LIMIT:
-            c[_ONSET_S + axis] = f.clock[0] if c[_SIDEWAYS + axis] > 0.0 else -f.clock[0]
+        mean = _mean(c["sideways"][axis], f, GNSS_VELOCITY + axis, 1.0, dt_s)
+        c["sideways"][axis] = mean
+        if abs(mean) > _LIMIT:
+            c["onset_s"][axis] = f.clock[0] if mean > 0.0 else -f.clock[0]
 
 
 @compiled
-def take_gnss_innovations(c: Checks, f: Filter, dt_s: float, has_baro: bool) -> None:
+def take_gnss_innovations(c: ChecksRecord, f: Filter, dt_s: float, has_baro: bool) -> None:
     """Take the vertical innovations of GNSS, and decide whether the accelerometer is wrong."""
-    _take(c, _SPEED, f, GNSS_VELOCITY + 2, -1.0, dt_s)
-    _take(c, _HEIGHT, f, GNSS_POSITION + 2, -1.0, dt_s)
-    up = 1.0 if c[_SPEED] >= 0.0 else -1.0
-    second = c[_PRESSURE] if has_baro else c[_HEIGHT]
-    if min(up * c[_SPEED], up * second) > _LIMIT:
-        c[ACCEL_UNTIL_S] = f.clock[0] + _ACCEL_HOLD_S
+    c["speed"] = _mean(c["speed"], f, GNSS_VELOCITY + 2, -1.0, dt_s)
+    c["height"] = _mean(c["height"], f, GNSS_POSITION + 2, -1.0, dt_s)
+    up = 1.0 if c["speed"] >= 0.0 else -1.0
+    second = c["pressure"] if has_baro else c["height"]
+    if min(up * c["speed"], up * second) > _LIMIT:
+        c["accel_until_s"] = f.clock[0] + _ACCEL_HOLD_S
 
 
 @compiled
-def add_fault_noise(c: Checks, f: Filter, dt_s: float) -> None:
+def add_fault_noise(c: ChecksRecord, f: Filter, dt_s: float) -> None:
     """Add the uncertainty of the sensors that count as wrong, so that the filter learns their error anew."""
     p = f.covariance
-    if f.clock[0] < c[ACCEL_UNTIL_S]:
+    if f.clock[0] < c["accel_until_s"]:
         p[VELOCITY + 2, VELOCITY + 2] += _ACCEL_DENSITY * dt_s
         p[ACCEL_BIAS + 2, ACCEL_BIAS + 2] += _ACCEL_BIAS_DENSITY * dt_s
-    if f.clock[0] < c[BARO_UNTIL_S]:
+    if f.clock[0] < c["baro_until_s"]:
         p[BARO_BIAS, BARO_BIAS] += _BARO_DENSITY * dt_s
         p[POSITION + 2, POSITION + 2] += _HEIGHT_DENSITY * dt_s  # it has moved with the barometer
 
 
 @compiled
-def is_stuck(c: Checks, altitude_m: float, now_s: float) -> bool:
+def is_stuck(c: ChecksRecord, altitude_m: float, now_s: float) -> bool:
     """Return True if the barometer has repeated its altitude for 1 s; its noise changes each measurement."""
-    if abs(altitude_m - c[_ALTITUDE]) > _EQUAL_M:
-        c[_ALTITUDE], c[_EQUAL_SINCE_S] = altitude_m, now_s
-    equal_s: float = now_s - c[_EQUAL_SINCE_S]
+    if abs(altitude_m - c["altitude_m"]) > _EQUAL_M:
+        c["altitude_m"], c["equal_since_s"] = altitude_m, now_s
+    equal_s: float = now_s - c["equal_since_s"]
     return equal_s > _STUCK_S
 
 
 @compiled
-def follow_drift(c: Checks, f: Filter, row: FloatArray, eph_m: float) -> None:
+def follow_drift(c: ChecksRecord, f: Filter, row: FloatArray, eph_m: float) -> None:
     """Compare the changes of the position of a GNSS measurement with its velocity, over 20 s.
 
     A horizontal axis has a fault above four times the accuracy that the receiver states, and until it is below half of
     that. A jump counts as a change of one accuracy: the gate of the innovation refuses it. The barometer watches the
     height.
     """
-    dt_s = row[0] - c[_GNSS_S]
+    dt_s = row[0] - c["gnss_s"]
     accuracy_m = max(eph_m, _LEAST_ACCURACY_M)
     for axis in range(2):
-        place, speed, fault = row[1 + axis], row[4 + axis], c[GNSS_FAULT + axis]
-        if c[_GNSS_S] == 0.0 or dt_s > _LONGEST_GAP_S:
-            c[_DRIFT + axis] = 0.0
+        place, speed, fault = row[1 + axis], row[4 + axis], c["fault"][axis]
+        if c["gnss_s"] == 0.0 or dt_s > _LONGEST_GAP_S:
+            c["drift_m"][axis] = 0.0
         else:
-            change = place - c[_PLACE + axis] - 0.5 * dt_s * (speed + c[_MOTION + axis])
+            change = place - c["place_m"][axis] - 0.5 * dt_s * (speed + c["velocity_m_s"][axis])
             change = min(max(change, -accuracy_m), accuracy_m)
-            c[_DRIFT + axis] += change - min(dt_s / _DRIFT_S, 1.0) * c[_DRIFT + axis]
-        c[_PLACE + axis], c[_MOTION + axis] = place, speed
+            c["drift_m"][axis] += change - min(dt_s / _DRIFT_S, 1.0) * c["drift_m"][axis]
+        c["place_m"][axis], c["velocity_m_s"][axis] = place, speed
         limit_m = _DRIFT_ACCURACIES * accuracy_m * (1.0 if fault == CONSISTENT else 0.5)
-        if abs(c[_DRIFT + axis]) <= limit_m:
-            c[GNSS_FAULT + axis] = CONSISTENT
+        if abs(c["drift_m"][axis]) <= limit_m:
+            c["fault"][axis] = CONSISTENT
         elif fault == CONSISTENT:
             _start_fault(c, f, axis)
         elif fault == POSITION_DRIFTS:
             _doubt_position(c, f, axis, dt_s)
-    c[_GNSS_S] = row[0]
+    c["gnss_s"] = row[0]
 
 
 @compiled
-def follow_height_drift(c: Checks, row: FloatArray, flies: bool, accuracy_m_s: float) -> None:
+def follow_height_drift(c: ChecksRecord, row: FloatArray, flies: bool, accuracy_m_s: float) -> None:
     """Compare the changes of height of GNSS and barometer with the vertical velocity of GNSS, over 20 s of flight.
 
     ``accuracy_m_s`` is that of the velocity, whose noise adds up.
     """
-    dt_s, altitude_m = row[0] - c[_GNSS_S], c[_ALTITUDE_NOW]
-    has_altitude = abs(row[0] - c[_ALTITUDE_S]) < _MISSING_S
-    if not flies or c[_GNSS_S] == 0.0 or dt_s > _LONGEST_GAP_S:
-        c[_DRIFT + 2], c[_HEIGHT_DRIFT], c[_BARO_DRIFT] = 0.0, 0.0, 0.0
+    dt_s, altitude_m = row[0] - c["gnss_s"], c["altitude_now_m"]
+    has_altitude = abs(row[0] - c["altitude_s"]) < _MISSING_S
+    if not flies or c["gnss_s"] == 0.0 or dt_s > _LONGEST_GAP_S:
+        c["drift_m"][2], c["height_drift_m"], c["baro_drift_m"] = 0.0, 0.0, 0.0
     else:
-        kept, moved_m = 1.0 - min(dt_s / _DRIFT_S, 1.0), 0.5 * dt_s * (row[6] + c[_MOTION + 2])
-        c[_DRIFT + 2] = kept * c[_DRIFT + 2] + row[3] - c[_PLACE + 2] - moved_m
-        c[_HEIGHT_DRIFT] += min(dt_s / _HEIGHT_MEAN_S, 1.0) * (c[_DRIFT + 2] - c[_HEIGHT_DRIFT])
-        change_m = 0.0 if c[_HAD_ALTITUDE] == 0.0 else c[_ALTITUDE_THEN] - altitude_m - moved_m
+        kept, moved_m = 1.0 - min(dt_s / _DRIFT_S, 1.0), 0.5 * dt_s * (row[6] + c["velocity_m_s"][2])
+        c["drift_m"][2] = kept * c["drift_m"][2] + row[3] - c["place_m"][2] - moved_m
+        c["height_drift_m"] += min(dt_s / _HEIGHT_MEAN_S, 1.0) * (c["drift_m"][2] - c["height_drift_m"])
+        change_m = 0.0 if c["had_altitude"] == 0.0 else c["altitude_then_m"] - altitude_m - moved_m
         change_m = min(max(change_m, -_LARGEST_CHANGE_M), _LARGEST_CHANGE_M)
-        c[_BARO_DRIFT] = kept * c[_BARO_DRIFT] + change_m if has_altitude else 0.0
+        c["baro_drift_m"] = kept * c["baro_drift_m"] + change_m if has_altitude else 0.0
         _judge_height(c, row[0], _NOISE_SHARE * accuracy_m_s * math.sqrt(0.5 * _DRIFT_S * dt_s))
-    c[_PLACE + 2], c[_MOTION + 2], c[_ALTITUDE_THEN] = row[3], row[6], altitude_m
-    c[_HAD_ALTITUDE] = 1.0 if has_altitude else 0.0
+    c["place_m"][2], c["velocity_m_s"][2], c["altitude_then_m"] = row[3], row[6], altitude_m
+    c["had_altitude"] = 1.0 if has_altitude else 0.0
 
 
 @compiled
-def _judge_height(c: Checks, now_s: float, noise_m: float) -> None:
+def _judge_height(c: ChecksRecord, now_s: float, noise_m: float) -> None:
     """Decide whether barometer or vertical GNSS velocity is wrong, beyond the noise of their drift."""
-    apart_m, side = abs(c[_BARO_DRIFT]), c[_HEIGHT_DRIFT] if c[_BARO_DRIFT] > 0.0 else -c[_HEIGHT_DRIFT]
+    apart_m, side = (
+        abs(c["baro_drift_m"]),
+        c["height_drift_m"] if c["baro_drift_m"] > 0.0 else -c["height_drift_m"],
+    )
     if apart_m < 0.5 * max(_APART_M, noise_m):
-        c[GNSS_FAULT + 2] = CONSISTENT
+        c["fault"][2] = CONSISTENT
     elif apart_m > max(_APART_M, noise_m) and side < _SIDES * apart_m:
-        c[BARO_UNTIL_S], c[GNSS_FAULT + 2] = now_s + _BARO_HOLD_S, CONSISTENT
+        c["baro_until_s"], c["fault"][2] = now_s + _BARO_HOLD_S, CONSISTENT
     elif apart_m > max(_SURELY_APART_M, noise_m):
-        c[GNSS_FAULT + 2] = VELOCITY_IS_WRONG
+        c["fault"][2] = VELOCITY_IS_WRONG
 
 
 @compiled
-def _start_fault(c: Checks, f: Filter, axis: int) -> None:
+def _start_fault(c: ChecksRecord, f: Filter, axis: int) -> None:
     """Decide which of GNSS position and velocity is wrong along an axis.
 
     A velocity that becomes wrong contradicts the inertial sensor at that time, a position that begins to drift does
     not. A wrong velocity has moved position and velocity of the filter by as much as the drift, and has noise from now
     on.
     """
-    drift_m, onset_s, p = c[_DRIFT + axis], c[_ONSET_S + axis], f.covariance
+    drift_m, onset_s, p = c["drift_m"][axis], c["onset_s"][axis], f.covariance
     left_s = _ONSET_LASTS_S - (f.clock[0] - abs(onset_s))
     if min(left_s, -onset_s * drift_m) > 0.0:
-        c[GNSS_FAULT + axis] = VELOCITY_IS_WRONG
+        c["fault"][axis] = VELOCITY_IS_WRONG
         p[VELOCITY + axis, VELOCITY + axis] += drift_m * drift_m / (_DRIFT_S * _DRIFT_S)
         p[POSITION + axis, POSITION + axis] += drift_m * drift_m
     else:
-        c[GNSS_FAULT + axis] = POSITION_DRIFTS
+        c["fault"][axis] = POSITION_DRIFTS
 
 
 @compiled
-def _doubt_position(c: Checks, f: Filter, axis: int, dt_s: float) -> None:
+def _doubt_position(c: ChecksRecord, f: Filter, axis: int, dt_s: float) -> None:
     """Let the position become uncertain at the rate of the drift, for the velocity may be wrong instead."""
     at = POSITION + axis
-    grown_m = math.sqrt(f.covariance[at, at]) + abs(c[_DRIFT + axis]) / _DRIFT_S * dt_s
+    grown_m = math.sqrt(f.covariance[at, at]) + abs(c["drift_m"][axis]) / _DRIFT_S * dt_s
     f.covariance[at, at] = grown_m * grown_m
 
 
 @compiled
-def position_drifts(c: Checks) -> bool:
+def position_drifts(c: ChecksRecord) -> bool:
     """Return True if the GNSS position drifts from its velocity along an axis."""
-    north, east = c[GNSS_FAULT], c[GNSS_FAULT + 1]
+    north, east = c["fault"][0], c["fault"][1]
     return bool(min(abs(north - POSITION_DRIFTS), abs(east - POSITION_DRIFTS)) == 0.0)

@@ -7,13 +7,14 @@ import pytest
 from scipy import signal
 
 from flightstack.core.contract import Vector3
-from flightstack.estimation.rate_filter import RATE_FILTER_SIZE, filtered_rates
+from flightstack.core.record_types import dtype_of
+from flightstack.estimation.rate_filter import RateFilter, filtered_rates
 
 DT_S, CUTOFF_HZ = 0.002, 40.0
 
 
 def _filtered(rows: np.ndarray, cutoff_hz: float) -> np.ndarray:
-    memory = np.zeros(RATE_FILTER_SIZE)
+    memory = np.zeros(1, dtype_of(RateFilter))[0]
     return np.array([filtered_rates(memory, Vector3(*row), DT_S, cutoff_hz) for row in rows.tolist()])
 
 
@@ -36,7 +37,7 @@ def test_rate_filter_without_effect_passes_rates_on(cutoff_hz: float) -> None:
 
 
 def test_rate_filter_continues_through_a_longer_step() -> None:
-    memory = np.zeros(RATE_FILTER_SIZE)
+    memory = np.zeros(1, dtype_of(RateFilter))[0]
     for dt_s in (DT_S, DT_S, 5.0 * DT_S, DT_S):
         rates = filtered_rates(memory, Vector3(0.3, -0.2, 1.0), dt_s, CUTOFF_HZ)
     assert np.abs(np.array(rates) - [0.3, -0.2, 1.0]).max() < 1e-14

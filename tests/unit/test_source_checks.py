@@ -26,9 +26,6 @@ from flightstack.estimation.kalman import (
 )
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, ImuSample, MagSample
 from flightstack.estimation.source_checks import (
-    ACCEL_UNTIL_S,
-    BARO_UNTIL_S,
-    GNSS_FAULT,
     POSITION_DRIFTS,
     VELOCITY_IS_WRONG,
 )
@@ -243,12 +240,12 @@ def blamed(estimator: Estimator) -> set[str]:
     """Return the sources that count as wrong now."""
     memory = estimator.memory[0]
     checks, now_s, o = memory["checks"], memory["clock"][0], memory["observations"]
-    faults = set(checks[GNSS_FAULT : GNSS_FAULT + 2])
+    faults = set(checks["fault"][:2])
     signs = {
-        "accelerometer": now_s < checks[ACCEL_UNTIL_S],
-        "barometer drifts": now_s < checks[BARO_UNTIL_S],
+        "accelerometer": now_s < checks["accel_until_s"],
+        "barometer drifts": now_s < checks["baro_until_s"],
         "barometer is stuck": memory["flags"]["has_baro"] == 0,
-        "climb of GNSS": checks[GNSS_FAULT + 2] == VELOCITY_IS_WRONG,
+        "climb of GNSS": checks["fault"][2] == VELOCITY_IS_WRONG,
         "position of GNSS": POSITION_DRIFTS in faults,
         "velocity of GNSS": VELOCITY_IS_WRONG in faults,
         "magnetometer": max(o[MAG, TEST_RATIO], o[MAG + 1, TEST_RATIO]) > 1.0,

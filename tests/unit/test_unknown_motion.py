@@ -14,8 +14,9 @@ from flightstack.estimation.error_state import ATTITUDE, VELOCITY
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams, tuning_of
 from flightstack.estimation.kalman import FUSED, GNSS_VELOCITY, KNOWN_FIELD, REFUSED
-from flightstack.estimation.rings import MEAN_SIZE, take_mean
+from flightstack.estimation.rings import Mean, take_mean
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, ImuSample, MagSample
+from flightstack.firmware.c_filter import c_layout
 from tests.support import flown_sensors as flown
 from tests.support.generated_c import in_python
 
@@ -132,7 +133,7 @@ def test_mean_of_equal_single_precision_samples_is_their_value() -> None:
     mean_of = in_python(take_mean)
     for hz in (50, 100, 200, 1000):
         for value in np.linspace(480.0, 500.0, 7, dtype=np.float32):
-            mean = np.zeros(MEAN_SIZE, np.float32)
+            mean = np.zeros(1, c_layout(Mean, "f4"))[0]
             for tick in range(1, 4 * hz):
                 row = np.array([5.0 + tick / hz, value], np.float32)
                 if mean_of(mean, row, np.float32(0.05)):

@@ -89,7 +89,7 @@ static bool begin(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, fs_re
         fs_predict_errors(f, &noise_of, params);
     }
     fs_add_unknown(f, &step);
-    fs_add_fault_noise(m->checks, f, step.dt_s);
+    fs_add_fault_noise(&m->checks, f, step.dt_s);
     agenda->source = FS_EARTH_SOURCE;
     agenda->axis = 0;
     agenda->has_fused = 0;

@@ -13,6 +13,8 @@
 #include "fs_kalman.h"
 #include "fs_math.h"
 
+#define FS_ALIGNMENT_S FS_LIT(0.4)
+#define FS_WAIT_FOR_MAG_S FS_LIT(2.0)
 #define FS_ERROR_STATES 27
 #define FS_ATTITUDE 0
 #define FS_ANY_YAW_RAD FS_LIT(1.8)
@@ -27,7 +29,28 @@
 #define FS_EARTH_FIELD 15
 #define FS_BODY_FIELD 18
 
-/* alignment.py:53 */
+/* alignment.py:67 */
+void fs_add_field(fs_alignment *sums, const fs_vector3 *field)
+{
+    sums->field[0] += field->x;
+    sums->field[1] += field->y;
+    sums->field[2] += field->z;
+    sums->fields += FS_LIT(1.0);
+}
+
+/* alignment.py:55 */
+bool fs_add_force(fs_alignment *sums, const fs_vector3 *force, fs_real dt_s)
+{
+    sums->force[0] += force->x;
+    sums->force[1] += force->y;
+    sums->force[2] += force->z;
+    sums->forces += FS_LIT(1.0);
+    sums->elapsed_s += dt_s;
+    const fs_real elapsed_s = sums->elapsed_s;
+    return elapsed_s >= FS_ALIGNMENT_S && (sums->fields > FS_LIT(0.0) || elapsed_s >= FS_WAIT_FOR_MAG_S);
+}
+
+/* alignment.py:84 */
 void fs_set_initial_variances(fs_filter *f, const fs_estimator_params *params, fs_real speed_m_s, fs_real tilt_rad)
 {
     fs_reset_variance(f->covariance, 0, FS_ERROR_STATES, FS_LIT(1e-08));
@@ -42,7 +65,7 @@ void fs_set_initial_variances(fs_filter *f, const fs_estimator_params *params, f
     fs_reset_variance(f->covariance, FS_GNSS_BIAS, 3, FS_LIT(1e-08));
 }
 
-/* alignment.py:92 */
+/* alignment.py:126 */
 static void set_attitude(fs_filter *f, const fs_quaternion *q)
 {
     f->nominal[0] = q->w;
@@ -51,7 +74,7 @@ static void set_attitude(fs_filter *f, const fs_quaternion *q)
     f->nominal[3] = q->z;
 }
 
-/* alignment.py:45 */
+/* alignment.py:76 */
 fs_quaternion fs_level_attitude(const fs_vector3 *force, fs_real yaw_rad)
 {
     const fs_real roll = fs_atan2(-force->y, -force->z);
@@ -59,7 +82,7 @@ fs_quaternion fs_level_attitude(const fs_vector3 *force, fs_real yaw_rad)
     return fs_quaternion_from_euler(roll, pitch, yaw_rad);
 }
 
-/* Return the direction [rad] of the Earth's field. alignment.py:121 */
+/* Return the direction [rad] of the Earth's field. alignment.py:155 */
 static fs_real north(const fs_vector3 *earth, fs_real declination_rad)
 {
     if (earth->x != FS_LIT(0.0) || earth->y != FS_LIT(0.0)) {
@@ -70,7 +93,7 @@ static fs_real north(const fs_vector3 *earth, fs_real declination_rad)
 
 /*
  * Set the covariance of the field: along it by a share of it, across it by an error of its direction.
- * alignment.py:145
+ * alignment.py:179
  */
 static void set_field_variances(fs_real p[27][27], const fs_vector3 *earth, fs_real scale, fs_real turn_rad,
                                 const fs_estimator_params *params)
@@ -85,7 +108,7 @@ static void set_field_variances(fs_real p[27][27], const fs_vector3 *earth, fs_r
     fs_reset_variance(p, FS_BODY_FIELD, 3, params->body_field_gauss * params->body_field_gauss);
 }
 
-/* alignment.py:129 */
+/* alignment.py:163 */
 void fs_set_field(fs_filter *f, const fs_vector3 *level, const fs_vector3 *earth, fs_real declination_rad,
                   const fs_estimator_params *params)
 {
@@ -110,7 +133,7 @@ void fs_set_field(fs_filter *f, const fs_vector3 *level, const fs_vector3 *earth
     set_field_variances(f->covariance, &start, scale, turn_rad, params);
 }
 
-/* alignment.py:107 */
+/* alignment.py:141 */
 fs_real fs_turn_to_field(fs_filter *f, const fs_vector3 *field, const fs_vector3 *earth, fs_real declination_rad,
                          const fs_estimator_params *params)
 {
@@ -125,7 +148,7 @@ fs_real fs_turn_to_field(fs_filter *f, const fs_vector3 *field, const fs_vector3
     return turn;
 }
 
-/* alignment.py:97 */
+/* alignment.py:131 */
 fs_real fs_align_yaw(fs_filter *f, const fs_vector3 *field, const fs_vector3 *earth, fs_real declination_rad,
                      const fs_estimator_params *params)
 {
@@ -134,12 +157,12 @@ fs_real fs_align_yaw(fs_filter *f, const fs_vector3 *field, const fs_vector3 *ea
     return turn_rad;
 }
 
-/* alignment.py:69 */
-void fs_align(fs_filter *f, const fs_real sums[9], const fs_vector3 *earth, fs_real declination_rad,
+/* alignment.py:100 */
+void fs_align(fs_filter *f, const fs_alignment *sums, const fs_vector3 *earth, fs_real declination_rad,
               const fs_estimator_params *params)
 {
-    const fs_vector3 force = fs_read_vector(sums, 0);
-    const fs_real off = fs_abs(fs_sqrt(force.x * force.x + force.y * force.y + force.z * force.z) / sums[6] -
+    const fs_vector3 force = fs_read_vector(sums->force, 0);
+    const fs_real off = fs_abs(fs_sqrt(force.x * force.x + force.y * force.y + force.z * force.z) / sums->forces -
                                params->gravity_m_s2);
     const bool moves = off > FS_LIT(1.0);
     for (int32_t i = 0; i < 28; i++) {
@@ -148,8 +171,10 @@ void fs_align(fs_filter *f, const fs_real sums[9], const fs_vector3 *earth, fs_r
     fs_set_initial_variances(f, params, moves ? FS_LIT(5.0) : FS_LIT(0.1), moves ? FS_LIT(0.3) : params->tilt_rad);
     const fs_quaternion level_attitude = fs_level_attitude(&force, FS_LIT(0.0));
     set_attitude(f, &level_attitude);
-    if (sums[7] > FS_LIT(0.0)) {
-        const fs_vector3 field = {sums[3] / sums[7], sums[4] / sums[7], sums[5] / sums[7]};
+    const fs_real count = sums->fields;
+    if (count > FS_LIT(0.0)) {
+        const fs_vector3 total = fs_read_vector(sums->field, 0);
+        const fs_vector3 field = {total.x / count, total.y / count, total.z / count};
         (void)fs_align_yaw(f, &field, earth, declination_rad, params);
     }
 }

@@ -28,8 +28,6 @@
 #define FS_RANGE_RING 3
 #define FS_RANGE_ROWS 32
 #define FS_LONGEST_GAP_S FS_LIT(1.0)
-#define FS_ALIGNMENT_S FS_LIT(0.4)
-#define FS_WAIT_FOR_MAG_S FS_LIT(2.0)
 #define FS_IMU_RING 4
 #define FS_IMU_ROWS 64
 #define FS_BACKLOG_S FS_LIT(0.03)
@@ -55,12 +53,10 @@ void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], in
         return;
     }
     if (ring == FS_MAG_RING && m->flags.aligned == 0) {
-        for (int32_t i = 0; i < 3; i++) {
-            m->alignment[3 + i] += row[1 + i];
-        }
-        m->alignment[7] += FS_LIT(1.0);
+        const fs_vector3 read_vector = fs_read_vector(row, 1);
+        fs_add_field(&m->alignment, &read_vector);
     }
-    if (!fs_take_mean(m->means[ring], row, row_size,
+    if (!fs_take_mean(&m->means[ring], row, row_size,
                       fs_max(params->sensor_period_s, wait_s / (fs_real)(FS_MAG_ROWS - 4)))) {
         return;
     }
@@ -80,7 +76,7 @@ void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], in
 
 /*
  * Return the time that a sample has to cover: its own, or longer after a gap; zero for one that came too late.
- * delayed_filter.py:178
+ * delayed_filter.py:176
  */
 static fs_real real_step(fs_estimator_memory *m, fs_real time_s, fs_real dt_s)
 {
@@ -100,21 +96,16 @@ static fs_real real_step(fs_estimator_memory *m, fs_real time_s, fs_real dt_s)
     return covered_s;
 }
 
-/* Add a sample to the alignment; align when it is long enough. delayed_filter.py:195 */
+/* Add a sample to the alignment; align when it is long enough. delayed_filter.py:193 */
 static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real time_s, fs_real dt_s,
                     const fs_estimator_params *params)
 {
-    m->alignment[0] += accel->x;
-    m->alignment[1] += accel->y;
-    m->alignment[2] += accel->z;
-    m->alignment[6] += FS_LIT(1.0);
-    m->alignment[8] += dt_s;
-    if (m->alignment[8] < FS_ALIGNMENT_S || (m->alignment[7] == FS_LIT(0.0) && m->alignment[8] < FS_WAIT_FOR_MAG_S)) {
+    if (!fs_add_force(&m->alignment, accel, dt_s)) {
         return;
     }
     fs_filter *f = &m->filter;
     const fs_vector3 read_vector = fs_read_vector(m->earth, 0);
-    fs_align(f, m->alignment, &read_vector, m->earth[3], params);
+    fs_align(f, &m->alignment, &read_vector, m->earth[3], params);
     f->clock[0] = time_s;
     (void)fs_take_step(m->sums, time_s);
     const fs_nominal read_nominal = fs_read_nominal(f->nominal);
@@ -124,18 +115,18 @@ static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real tim
     for (int32_t ring = 1; ring < 4; ring++) {
         m->rings.cursors[ring][1] = 0; /* older than the state; the fields are in its yaw */
     }
-    if (m->alignment[7] > FS_LIT(0.0)) {
+    if (m->alignment.fields > FS_LIT(0.0)) {
         m->flags.has_mag = 1;
         m->flags.has_yaw = 1;
         for (int32_t i = 0; i < 3; i++) {
-            m->field[i] = m->alignment[3 + i] / m->alignment[7];
+            m->field[i] = m->alignment.field[i] / m->alignment.fields;
         }
     }
 }
 
 /*
  * Return True if the filter is so far behind the horizon that a sample does more than a part of its work.
- * delayed_filter.py:148
+ * delayed_filter.py:146
  */
 static bool is_behind(const fs_rings *r, fs_real horizon_s)
 {
@@ -143,7 +134,7 @@ static bool is_behind(const fs_rings *r, fs_real horizon_s)
     return r->cursors[FS_IMU_RING][1] > 0 && oldest_s < horizon_s - FS_BACKLOG_S;
 }
 
-/* Do a part of the filter's work, and all of it while it is behind horizon_s. delayed_filter.py:97 */
+/* Do a part of the filter's work, and all of it while it is behind horizon_s. delayed_filter.py:95 */
 static void work_up_to(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_s,
                        const fs_estimator_params *params)
 {
@@ -155,7 +146,7 @@ static void work_up_to(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_rea
     }
 }
 
-/* Write the output in the order of VehicleState. delayed_filter.py:155 */
+/* Write the output in the order of VehicleState. delayed_filter.py:153 */
 static void write_state(fs_estimator_memory *m, const fs_vector3 *rates)
 {
     for (int32_t i = 0; i < 3; i++) {
@@ -170,7 +161,7 @@ static void write_state(fs_estimator_memory *m, const fs_vector3 *rates)
     fs_write_vector(m->state, 10, rates);
 }
 
-/* delayed_filter.py:106 */
+/* delayed_filter.py:104 */
 void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
 {
     for (int32_t i = 0; i < 8; i++) {
@@ -219,12 +210,12 @@ void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
     }
     /* between two samples, so that rounding does not matter */
     work_up_to(m, f, r, time_s - params->delay_s + FS_LIT(0.25) * dt_s, params);
-    const fs_vector3 rates = fs_filtered_rates(m->rate_filter, &gyro, dt_s, params->gyro_cutoff_hz);
+    const fs_vector3 rates = fs_filtered_rates(&m->rate_filter, &gyro, dt_s, params->gyro_cutoff_hz);
     const fs_vector3 less_bias = fs_less_bias(&rates, &gyro_bias, FS_LIT(1.0));
     write_state(m, &less_bias);
 }
 
-/* delayed_filter.py:166 */
+/* delayed_filter.py:164 */
 void fs_field_kernel(fs_estimator_memory *memory)
 {
     fs_estimator_memory *m = memory;

@@ -6,10 +6,13 @@
 #ifndef FS_DELAYED_FILTER_H
 #define FS_DELAYED_FILTER_H
 
+#include "fs_alignment.h"
 #include "fs_estimator_params.h"
 #include "fs_kalman.h"
 #include "fs_memory.h"
+#include "fs_rate_filter.h"
 #include "fs_rings.h"
+#include "fs_source_checks.h"
 #include "fs_types.h"
 
 /*
@@ -28,13 +31,13 @@ void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], in
  * A sample that is not finite, or without a step in time, or not later than the last one, is dropped. Time without
  * samples is bridged by the next sample.
  *
- * delayed_filter.py:106
+ * delayed_filter.py:104
  */
 void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[]);
 
 /*
  * Correct the filter with the Earth's field in earth: on the ground at once, in flight in its next step.
- * delayed_filter.py:166
+ * delayed_filter.py:164
  */
 void fs_field_kernel(fs_estimator_memory *memory);
 

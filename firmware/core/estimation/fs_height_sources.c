@@ -42,9 +42,10 @@ static void start_baro(fs_estimator_memory *m, fs_filter *f, fs_real altitude_m,
 /* height_sources.py:21 */
 void fs_take_baro(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params)
 {
+    fs_checks *c = &m->checks;
     bool has_stopped = false;
     if (m->flags.landed == 0) {
-        has_stopped = fs_is_stuck(m->checks, row[1], row[0]);
+        has_stopped = fs_is_stuck(c, row[1], row[0]);
     }
     if (has_stopped) {
         m->flags.has_baro = 0;
@@ -59,7 +60,7 @@ void fs_take_baro(fs_estimator_memory *m, fs_filter *f, const fs_real row[], con
         start_baro(m, f, row[1], params);
     }
     fs_fuse_baro(f, row[1], f->clock[0] - row[0], params);
-    fs_take_pressure_innovation(m->checks, f, row[0], row[1]);
+    fs_take_pressure_innovation(c, f, row[0], row[1]);
 }
 
 /* height_sources.py:60 */

@@ -3,9 +3,12 @@
 #ifndef FS_MEMORY_H
 #define FS_MEMORY_H
 
+#include "fs_alignment.h"
 #include "fs_estimator_params.h"
 #include "fs_kalman.h"
+#include "fs_rate_filter.h"
 #include "fs_rings.h"
+#include "fs_source_checks.h"
 #include "fs_types.h"
 
 /* Time without samples of the IMU in all, and the number of such gaps. */
@@ -99,11 +102,11 @@ typedef struct {
     fs_filter filter;
     fs_estimator_params params;
     fs_real sums[64];
-    fs_real means[5][11];
-    fs_real checks[30];
-    fs_real alignment[9];
+    fs_mean means[5];
+    fs_checks checks;
+    fs_alignment alignment;
     fs_resets resets;
-    fs_real rate_filter[9];
+    fs_rate_filter rate_filter;
     fs_real earth[4];
     fs_real field[3];
     fs_before_gnss before_gnss;

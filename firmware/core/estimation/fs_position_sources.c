@@ -22,20 +22,19 @@
 #define FS_POSITION 6
 #define FS_GNSS_BIAS 24
 #define FS_GNSS_POSITION 3
-#define FS_GNSS_FAULT 17
 #define FS_YAW_STAGE 6
 #define FS_COUNTED_M FS_LIT(0.5)
 #define FS_LONGEST_INTERVAL_S FS_LIT(2.5)
 #define FS_SPEED_SMOOTHING_S FS_LIT(2.0)
 
-/* position_sources.py:160 */
+/* position_sources.py:159 */
 bool fs_is_velocity_measured(const fs_filter *f)
 {
     const fs_real fused_s = f->observations[FS_GNSS_VELOCITY][FS_FUSED_S];
     return fused_s > FS_LIT(0.0) && f->clock[0] - fused_s < FS_GNSS_LOST_S;
 }
 
-/* position_sources.py:167 */
+/* position_sources.py:166 */
 bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f)
 {
     const fs_real north = m->gnss_speed_m_s[0];
@@ -44,7 +43,7 @@ bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f)
     return !is_measured || fs_sqrt(north * north + east * east) < FS_MOVES_M_S;
 }
 
-/* position_sources.py:175 */
+/* position_sources.py:174 */
 int32_t fs_hold_position(fs_estimator_memory *m, fs_filter *f, int32_t axis, const fs_estimator_params *params)
 {
     fs_hold *hold = &m->hold;
@@ -73,7 +72,7 @@ int32_t fs_hold_position(fs_estimator_memory *m, fs_filter *f, int32_t axis, con
  *
  * The slow part of that error is the bias of the next ones too: position and bias have opposite errors.
  *
- * position_sources.py:135
+ * position_sources.py:134
  */
 static void start_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params)
 {
@@ -97,7 +96,7 @@ static void start_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[]
 }
 
 /*
- * Propagate what belongs to GNSS to the time of the measurement, and note the state before it. position_sources.py:76
+ * Propagate what belongs to GNSS to the time of the measurement, and note the state before it. position_sources.py:75
  */
 static void begin_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params)
 {
@@ -114,14 +113,14 @@ static void begin_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[]
         before->velocity_m_s[axis] = value_2;
     }
     m->last_gnss_s = row[0];
-    fs_follow_height_drift(m->checks, row, m->flags.landed == 0, fs_speed_accuracy(row));
-    fs_follow_drift(m->checks, f, row, fs_horizontal_accuracy(row));
+    fs_follow_height_drift(&m->checks, row, m->flags.landed == 0, fs_speed_accuracy(row));
+    fs_follow_drift(&m->checks, f, row, fs_horizontal_accuracy(row));
     fs_drift_gnss_bias(f, row, before->elapsed_s, params);
 }
 
 /*
  * Add up the time between refused measurements; an accepted one ends it. Time without any does not count.
- * position_sources.py:121
+ * position_sources.py:120
  */
 static void count_refused(fs_estimator_memory *m, const fs_filter *f, int32_t first, fs_real elapsed_s)
 {
@@ -139,16 +138,17 @@ static void count_refused(fs_estimator_memory *m, const fs_filter *f, int32_t fi
     }
 }
 
-/* Judge the measurement by its innovations, and reset what was refused too long. position_sources.py:92 */
+/* Judge the measurement by its innovations, and reset what was refused too long. position_sources.py:91 */
 static void end_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t first,
                      const fs_estimator_params *params)
 {
     fs_before_gnss *before = &m->before_gnss;
+    fs_checks *c = &m->checks;
     const fs_real elapsed_s = before->elapsed_s;
     if (m->flags.landed == 0) {
-        fs_take_gnss_innovations(m->checks, f, elapsed_s, m->flags.has_baro == 1);
+        fs_take_gnss_innovations(c, f, elapsed_s, m->flags.has_baro == 1);
         if (first == 0) {
-            fs_take_horizontal_innovations(m->checks, f, elapsed_s);
+            fs_take_horizontal_innovations(c, f, elapsed_s);
         }
     }
     const fs_real dx = f->nominal[7] - before->place_m[0];
@@ -168,7 +168,7 @@ static void end_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], 
     if (velocity_s > limit_s) {
         fs_reset_velocity(m, f, row, 0, 2);
     }
-    if (velocity_s > limit_s || (position_s > limit_s && !fs_position_drifts(m->checks))) {
+    if (velocity_s > limit_s || (position_s > limit_s && !fs_position_drifts(c))) {
         fs_reset_position(m, f, row, 0, 2);
     }
     if (m->refused_s[2] > limit_s) {
@@ -179,7 +179,7 @@ static void end_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], 
     }
 }
 
-/* position_sources.py:54 */
+/* position_sources.py:53 */
 int32_t fs_take_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t stage,
                      const fs_estimator_params *params)
 {
@@ -190,7 +190,7 @@ int32_t fs_take_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], 
         at = first;
     }
     const int32_t axis = at < 3 ? at : at - 3;
-    const fs_real fault = m->checks[FS_GNSS_FAULT + axis];
+    const fs_real fault = m->checks.fault[axis];
     if (at < 3) {
         fs_fuse_gnss_velocity(f, row, axis, fault, params);
     } else {

@@ -8,10 +8,19 @@
 
 #include "fs_types.h"
 
+/* State of the filter. */
+typedef struct {
+    fs_real band[3];
+    fs_real low[3];
+    fs_real step_s;
+    fs_real cutoff_hz;
+    fs_real factor;
+} fs_rate_filter;
+
 /*
  * Return the rates [rad/s] behind the filter; unchanged if cutoff_hz is 0 or near half the sample rate.
- * rate_filter.py:45
+ * rate_filter.py:56
  */
-fs_vector3 fs_filtered_rates(fs_real x[9], const fs_vector3 *gyro, fs_real dt_s, fs_real cutoff_hz);
+fs_vector3 fs_filtered_rates(fs_rate_filter *x, const fs_vector3 *gyro, fs_real dt_s, fs_real cutoff_hz);
 
 #endif

@@ -6,10 +6,13 @@
 #ifndef FS_RESETS_H
 #define FS_RESETS_H
 
+#include "fs_alignment.h"
 #include "fs_estimator_params.h"
 #include "fs_kalman.h"
 #include "fs_memory.h"
+#include "fs_rate_filter.h"
 #include "fs_rings.h"
+#include "fs_source_checks.h"
 #include "fs_types.h"
 
 /* Count a change of the yaw. resets.py:74 */

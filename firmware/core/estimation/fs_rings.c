@@ -10,20 +10,16 @@
 
 #define FS_GNSS_RING 0
 #define FS_GNSS_ROWS 8
-#define FS_LAST_S 6
-#define FS_COUNT 4
-#define FS_FIRST 7
-#define FS_PUSHED_S 5
 #define FS_ROUNDING_S FS_LIT(0.00025)
 
-/* rings.py:40 */
+/* rings.py:52 */
 int32_t fs_slot_of(const fs_rings *rings, int32_t ring, int32_t size, int32_t number)
 {
     const int32_t slot = rings->cursors[ring][0] + number;
     return slot >= size ? slot - size : slot;
 }
 
-/* rings.py:102 */
+/* rings.py:112 */
 fs_real fs_newest_fix_time(const fs_rings *rings)
 {
     const int32_t count = rings->cursors[FS_GNSS_RING][1];
@@ -34,14 +30,14 @@ fs_real fs_newest_fix_time(const fs_rings *rings)
     return newest_s;
 }
 
-/* rings.py:73 */
+/* rings.py:85 */
 void fs_pop(fs_rings *rings, int32_t ring, int32_t size)
 {
     rings->cursors[ring][0] = fs_slot_of(rings, ring, size, 1);
     rings->cursors[ring][1] -= 1;
 }
 
-/* rings.py:63 */
+/* rings.py:75 */
 int32_t fs_push(fs_rings *rings, int32_t ring, int32_t size)
 {
     if (rings->cursors[ring][1] >= size) {
@@ -52,7 +48,7 @@ int32_t fs_push(fs_rings *rings, int32_t ring, int32_t size)
     return slot;
 }
 
-/* rings.py:119 */
+/* rings.py:129 */
 void fs_write_row(fs_real row[], int32_t row_size, const fs_real values[])
 {
     for (int32_t column = 0; column < row_size; column++) {
@@ -60,43 +56,40 @@ void fs_write_row(fs_real row[], int32_t row_size, const fs_real values[])
     }
 }
 
-/* rings.py:80 */
-bool fs_take_mean(fs_real mean[], fs_real row[], int32_t row_size, fs_real period_s)
+/* rings.py:92 */
+bool fs_take_mean(fs_mean *mean, fs_real row[], int32_t row_size, fs_real period_s)
 {
-    if (row[0] - mean[FS_LAST_S] > period_s) { /* a gap: the older samples are outdated */
-        for (int32_t i = 0; i < 5; i++) {
-            mean[i] = FS_LIT(0.0);
-        }
+    if (row[0] - mean->last_s > period_s) { /* a gap: the older samples are outdated */
+        mean->number = FS_LIT(0.0);
     }
-    mean[FS_LAST_S] = row[0];
+    mean->last_s = row[0];
     for (int32_t i = 0; i < row_size; i++) {
-        if (mean[FS_COUNT] == FS_LIT(0.0)) {
-            mean[FS_FIRST + i] = row[i];
+        if (mean->number == FS_LIT(0.0)) {
+            mean->first[i] = row[i];
+            mean->sums[i] = FS_LIT(0.0);
         }
-        mean[i] += row[i] - mean[FS_FIRST + i];
+        mean->sums[i] += row[i] - mean->first[i];
     }
-    mean[FS_COUNT] += FS_LIT(1.0);
-    if (row[0] - mean[FS_PUSHED_S] < FS_LIT(0.9) * period_s) {
+    mean->number += FS_LIT(1.0);
+    if (row[0] - mean->pushed_s < FS_LIT(0.9) * period_s) {
         return false;
     }
-    mean[FS_PUSHED_S] = row[0];
+    mean->pushed_s = row[0];
     for (int32_t i = 0; i < row_size; i++) {
-        row[i] = mean[FS_FIRST + i] + mean[i] / mean[FS_COUNT];
+        row[i] = mean->first[i] + mean->sums[i] / mean->number;
     }
-    for (int32_t i = 0; i < 5; i++) {
-        mean[i] = FS_LIT(0.0);
-    }
+    mean->number = FS_LIT(0.0);
     return true;
 }
 
-/* rings.py:56 */
+/* rings.py:68 */
 bool fs_is_due(const fs_rings *rings, int32_t ring, fs_real row_s, fs_real now_s)
 {
     const int32_t count = rings->cursors[ring][1];
     return count > 0 && row_s <= now_s + FS_ROUNDING_S;
 }
 
-/* rings.py:112 */
+/* rings.py:122 */
 void fs_read_row(const fs_real row[], int32_t row_size, fs_real values[])
 {
     for (int32_t column = 0; column < row_size; column++) {

@@ -9,29 +9,53 @@
 #include "fs_kalman.h"
 #include "fs_types.h"
 
+/* What the checks remember of the sensors. */
+typedef struct {
+    fs_real speed;
+    fs_real height;
+    fs_real pressure;
+    fs_real accel_until_s;
+    fs_real baro_until_s;
+    fs_real altitude_m;
+    fs_real equal_since_s;
+    fs_real gnss_s;
+    fs_real place_m[3];
+    fs_real velocity_m_s[3];
+    fs_real drift_m[3];
+    fs_real fault[3];
+    fs_real baro_drift_m;
+    fs_real sideways[2];
+    fs_real onset_s[2];
+    fs_real altitude_s;
+    fs_real altitude_then_m;
+    fs_real altitude_now_m;
+    fs_real had_altitude;
+    fs_real height_drift_m;
+} fs_checks;
+
 /*
  * Add the uncertainty of the sensors that count as wrong, so that the filter learns their error anew.
- * source_checks.py:104
+ * source_checks.py:134
  */
-void fs_add_fault_noise(const fs_real c[30], fs_filter *f, fs_real dt_s);
+void fs_add_fault_noise(const fs_checks *c, fs_filter *f, fs_real dt_s);
 
 /*
  * Return True if the barometer has repeated its altitude for 1 s; its noise changes each measurement.
- * source_checks.py:116
+ * source_checks.py:146
  */
-bool fs_is_stuck(fs_real c[30], fs_real altitude_m, fs_real now_s);
+bool fs_is_stuck(fs_checks *c, fs_real altitude_m, fs_real now_s);
 
-/* Take the barometer's newest innovation, of an altitude measured at measured_s. source_checks.py:77 */
-void fs_take_pressure_innovation(fs_real c[30], const fs_filter *f, fs_real measured_s, fs_real altitude_m);
+/* Take the barometer's newest innovation, of an altitude measured at measured_s. source_checks.py:106 */
+void fs_take_pressure_innovation(fs_checks *c, const fs_filter *f, fs_real measured_s, fs_real altitude_m);
 
 /*
  * Compare the changes of height of GNSS and barometer with the vertical velocity of GNSS, over 20 s of flight.
  *
  * accuracy_m_s is that of the velocity, whose noise adds up.
  *
- * source_checks.py:154
+ * source_checks.py:184
  */
-void fs_follow_height_drift(fs_real c[30], const fs_real row[], bool flies, fs_real accuracy_m_s);
+void fs_follow_height_drift(fs_checks *c, const fs_real row[], bool flies, fs_real accuracy_m_s);
 
 /*
  * Compare the changes of the position of a GNSS measurement with its velocity, over 20 s.
@@ -40,19 +64,20 @@ void fs_follow_height_drift(fs_real c[30], const fs_real row[], bool flies, fs_r
  * that. A jump counts as a change of one accuracy: the gate of the innovation refuses it. The barometer watches the
  * height.
  *
- * source_checks.py:125
+ * source_checks.py:155
  */
-void fs_follow_drift(fs_real c[30], fs_filter *f, const fs_real row[], fs_real eph_m);
+void fs_follow_drift(fs_checks *c, fs_filter *f, const fs_real row[], fs_real eph_m);
 
-/* Take the vertical innovations of GNSS, and decide whether the accelerometer is wrong. source_checks.py:93 */
-void fs_take_gnss_innovations(fs_real c[30], const fs_filter *f, fs_real dt_s, bool has_baro);
+/* Take the vertical innovations of GNSS, and decide whether the accelerometer is wrong. source_checks.py:123 */
+void fs_take_gnss_innovations(fs_checks *c, const fs_filter *f, fs_real dt_s, bool has_baro);
 
 /*
- * Take the horizontal innovations of GNSS velocity, and note when they contradict the prediction. source_checks.py:84
+ * Take the horizontal innovations of GNSS velocity, and note when they contradict the prediction.
+ * source_checks.py:113
  */
-void fs_take_horizontal_innovations(fs_real c[30], const fs_filter *f, fs_real dt_s);
+void fs_take_horizontal_innovations(fs_checks *c, const fs_filter *f, fs_real dt_s);
 
-/* Return True if the GNSS position drifts from its velocity along an axis. source_checks.py:214 */
-bool fs_position_drifts(const fs_real c[30]);
+/* Return True if the GNSS position drifts from its velocity along an axis. source_checks.py:247 */
+bool fs_position_drifts(const fs_checks *c);
 
 #endif
