@@ -19,15 +19,10 @@ from flightstack.simulator_link.sensor_frames import BARO as BARO_FIELDS
 from flightstack.simulator_link.sensor_frames import MAG as MAG_FIELDS
 from flightstack.vehicle.estimation import Estimation
 from flightstack.vehicle.slow_kernel import (
-    AIRSPEED,
     BARO,
     MAG,
-    MEASURE_BARO,
-    MEASURE_MAG,
-    PUSH,
-    SLOW_CALLS,
     SLOW_MARKS,
-    TRUTH_US,
+    SlowCalls,
 )
 from sim_bridge.plant.compiled_plant import CompiledPlant
 from sim_bridge.plant.near_ground import airspeed
@@ -65,32 +60,31 @@ class QuietSlow:
         self._sensors = None if estimation is None else simulator.sensors
         self._estimation = estimation
         self._no_traces = [Trace(DEFAULT_CAPACITY, group.columns, lambda: None) for group in _GROUPS]
-        self._marks = np.zeros(SLOW_MARKS, np.int64)
-        self._marks[TRUTH_US] = NEVER_US
+        self._marks = np.zeros(1, SLOW_MARKS)
+        self._marks["truth_us"] = NEVER_US
         self._delay_s = np.zeros(2)
         self.calls = self._addresses(simulator)
         """Addresses of the kernels."""
         self.constant = self._constant(simulator, truth)
         """Argument ``slow`` of the kernel."""
 
-    def _addresses(self, simulator: Simulator) -> Any:
-        calls = np.zeros(SLOW_CALLS, np.int64)
+    def _addresses(self, simulator: Simulator) -> SlowCalls:
         sensors, estimation = self._sensors, self._estimation
         if sensors is None or estimation is None:
-            return calls
+            return SlowCalls()
         plant, frame = simulator.plant, simulator.frame
         assert isinstance(plant, CompiledPlant)
+        mag_call = baro_call = 0
         if sensors.mag is not None:
             mag = sensors.mag
-            calls[MEASURE_MAG] = address_of(measure_mag, mag.records, frame.state, 0.0, mag.noise.block[0])
+            mag_call = address_of(measure_mag, mag.records, frame.state, 0.0, mag.noise.block[0])
         if sensors.baro is not None:
             baro, speeds = sensors.baro, frame.rotor_speed_rad_s
-            calls[MEASURE_BARO] = address_of(
+            baro_call = address_of(
                 measure_baro, baro.records, 0, frame.state, 0.0, speeds, baro.noise.block[0]
             )
-        calls[AIRSPEED] = address_of(airspeed, plant.memory)
-        calls[PUSH] = address_of(push_kernel, estimation.estimators[0].memory, MAG_RING, np.zeros(4))
-        return calls
+        push = address_of(push_kernel, estimation.estimators[0].memory, MAG_RING, np.zeros(4))
+        return SlowCalls(mag_call, baro_call, address_of(airspeed, plant.memory), push)
 
     def _constant(self, simulator: Simulator, truth: FloatArray) -> tuple[Any, ...]:
         sensors, estimation = self._sensors, self._estimation
@@ -126,11 +120,13 @@ class QuietSlow:
         ``boot_us`` is the simulator's time at the start of the vehicle's, not 0 after a power cycle.
         """
         marks, estimation = self._marks, self._estimation
-        marks[:TRUTH_US] = 0
+        truth_us = marks["truth_us"][0]
+        marks[0] = 0
+        marks["truth_us"] = truth_us
         if estimation is not None:
             params = estimation.estimators[0].params
             self._delay_s[:] = params.mag_delay_s, params.baro_delay_s
-            marks[TRUTH_US] = estimation.recorder.truth_due_us
+            marks["truth_us"] = estimation.recorder.truth_due_us
         logs = ((trace.rows, trace.times_us, trace.n) for trace in self._open_traces())
         return (_RINGS, self._delay_s, *logs, boot_us)
 
@@ -146,7 +142,7 @@ class QuietSlow:
         estimation, sensors = self._estimation, self._sensors
         if estimation is None or sensors is None:
             return 0, None, None
-        mag_us, baro_us, is_mag_new, is_baro_new, *rows, truth_us = self._marks.tolist()
+        mag_us, baro_us, is_mag_new, is_baro_new, *rows, truth_us = self._marks[0].item()
         if truth_us != NEVER_US:
             estimation.recorder.pass_by(truth_us)
             for trace, new in zip(self._open_traces(), rows, strict=True):

@@ -6,23 +6,48 @@ It calls the kernels that simulator and estimator run in any other tick, on the 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
 from flightstack.core.kernel_calls import call_kernel, call_kernel_float
 from flightstack.core.periods import take_due
+from flightstack.core.record_types import dtype_of
 from flightstack.flight_log.sensor_rows import store_baro, store_mag, store_truth
 
-MEASURE_MAG, MEASURE_BARO, AIRSPEED, PUSH, SLOW_CALLS = range(5)
-"""Kernels by their index in ``calls``."""
 MAG, BARO = 0, 1
 """Sensors by the index of their times, cursors and new rows."""
-MAG_US, BARO_US, IS_MAG_NEW, IS_BARO_NEW, MAG_ROWS, BARO_ROWS, TRUTH_ROWS, TRUTH_US, SLOW_MARKS = range(9)
-"""Marks: times of the newest samples, or 0; 1 if the last tick measured; new rows of the logs; time from which the log
-of the truth takes a row."""
 _ALTITUDE, _TEMPERATURE = 2, 3
 """Values of the barometer in HIL_SENSOR; the first one is the pressure."""
+
+
+class SlowCalls(NamedTuple):
+    """Addresses of the kernels, 0 without one."""
+
+    measure_mag: int = 0
+    measure_baro: int = 0
+    airspeed: int = 0
+    push: int = 0
+
+
+class SlowMarks(NamedTuple):
+    """What the kernel notes."""
+
+    mag_us: int
+    """Time of the newest sample, or 0; the next one too."""
+    baro_us: int
+    is_mag_new: int
+    """1 if the last tick measured; the next one too."""
+    is_baro_new: int
+    mag_rows: int
+    """New rows of the log; the next two too."""
+    baro_rows: int
+    truth_rows: int
+    truth_us: int
+    """Time from which the log of the truth takes a row."""
+
+
+SLOW_MARKS = dtype_of(SlowMarks)
 
 
 @compiled
@@ -41,22 +66,23 @@ def measure_slow(
 
     ``memory`` has the bytes of the plant.
     """
-    due_us, period_us, marks, mag, baro, _row, _truth = slow
-    marks[IS_MAG_NEW], marks[IS_BARO_NEW] = 0, 0
+    due_us, period_us, marks_array, mag, baro, _row, _truth = slow
+    marks = marks_array[0]
+    marks["is_mag_new"], marks["is_baro_new"] = 0, 0
     if take_due(due_us, period_us, MAG, time_us):
         mags, out, noise, cursor, values, current_a = mag
-        call_kernel(calls[MEASURE_MAG], (mags, state, current_a[0], _next_row(noise, cursor)))
+        call_kernel(calls.measure_mag, (mags, state, current_a[0], _next_row(noise, cursor)))
         for i in range(3):
             values[i] = out[i]
-        marks[IS_MAG_NEW] = 1
+        marks["is_mag_new"] = 1
     if take_due(due_us, period_us, BARO, time_us):
         baros, out, noise, cursor, values = baro
-        airspeed_m_s = call_kernel_float(calls[AIRSPEED], (memory,))
+        airspeed_m_s = call_kernel_float(calls.airspeed, (memory,))
         call_kernel(
-            calls[MEASURE_BARO], (baros, time_us, state, airspeed_m_s, rotor_speeds, _next_row(noise, cursor))
+            calls.measure_baro, (baros, time_us, state, airspeed_m_s, rotor_speeds, _next_row(noise, cursor))
         )
         values[0], values[_ALTITUDE], values[_TEMPERATURE] = out[0], out[1], out[2]
-        marks[IS_BARO_NEW] = 1
+        marks["is_baro_new"] = 1
 
 
 @compiled
@@ -65,7 +91,7 @@ def _push(calls: Any, filters: Any, ring: int, values: FloatArray, row: FloatArr
     for k in range(len(filters)):
         for i in range(len(values)):
             row[i] = values[i]
-        call_kernel(calls[PUSH], (filters[k], ring, row))
+        call_kernel(calls.push, (filters[k], ring, row))
 
 
 @compiled
@@ -75,43 +101,46 @@ def take_slow(calls: Any, slow: Any, time_us: int, filters: Any, following: Any)
     Those that are not finite are none. ``following`` has rings, delays and logs, and the simulator's time at the start
     of the vehicle's.
     """
-    _due_us, _period_us, marks, mag, baro, rows, _truth = slow
+    _due_us, _period_us, marks_array, mag, baro, rows, _truth = slow
+    marks = marks_array[0]
     rings, delay_s, mag_log, baro_log, _truth_log, _boot_us = following
     mag_sample, mag_copy, baro_sample, baro_copy = rows
-    if marks[IS_MAG_NEW] != 0:
+    if marks["is_mag_new"] != 0:
         x, y, z = float(mag[4][0]), float(mag[4][1]), float(mag[4][2])
         if math.isfinite(x + y + z):
             mag_sample[0] = time_us * 1e-6 - delay_s[MAG]
             mag_sample[1], mag_sample[2], mag_sample[3] = x, y, z
             _push(calls, filters, rings[MAG], mag_sample, mag_copy)
-            store_mag(_log_row(mag_log, marks, MAG_ROWS, time_us), time_us, x, y, z)
-            marks[MAG_US] = time_us
-    if marks[IS_BARO_NEW] != 0:
+            store_mag(_log_row(mag_log, marks["mag_rows"], time_us), time_us, x, y, z)
+            marks["mag_rows"] += 1
+            marks["mag_us"] = time_us
+    if marks["is_baro_new"] != 0:
         altitude_m = float(baro[4][_ALTITUDE])
         if math.isfinite(altitude_m):
             baro_sample[0], baro_sample[1] = time_us * 1e-6 - delay_s[BARO], altitude_m
             _push(calls, filters, rings[BARO], baro_sample, baro_copy)
-            row = _log_row(baro_log, marks, BARO_ROWS, time_us)
+            row = _log_row(baro_log, marks["baro_rows"], time_us)
+            marks["baro_rows"] += 1
             store_baro(row, time_us, float(baro[4][0]), altitude_m, float(baro[4][_TEMPERATURE]))
-            marks[BARO_US] = time_us
+            marks["baro_us"] = time_us
 
 
 @compiled
-def _log_row(log: Any, marks: Any, counter: int, time_us: int) -> Any:
-    """Return the next row of a log."""
+def _log_row(log: Any, count: int, time_us: int) -> Any:
+    """Return the row of a log behind ``count`` new ones."""
     rows, times_us, begin = log
-    at = begin + marks[counter]
+    at = begin + count
     times_us[at] = time_us
-    marks[counter] += 1
     return rows[at]
 
 
 @compiled
 def log_truth(slow: Any, time_us: int, following: Any) -> None:
     """Record the true state if it is due."""
-    marks = slow[2]
-    if time_us < marks[TRUTH_US]:
+    marks = slow[2][0]
+    if time_us < marks["truth_us"]:
         return
     state, offset_m, interval_us = slow[6]
-    marks[TRUTH_US] = (time_us // interval_us + 1) * interval_us
-    store_truth(_log_row(following[4], marks, TRUTH_ROWS, time_us), state, offset_m)
+    marks["truth_us"] = (time_us // interval_us + 1) * interval_us
+    store_truth(_log_row(following[4], marks["truth_rows"], time_us), state, offset_m)
+    marks["truth_rows"] += 1
