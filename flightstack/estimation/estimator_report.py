@@ -17,16 +17,13 @@ from flightstack.estimation.error_state import ATTITUDE, POSITION, WIND, Nominal
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import (
     BARO,
-    FUSED_S,
     GNSS_POSITION,
     GNSS_VELOCITY,
     HOLD_POSITION,
-    INNOVATION,
-    INNOVATION_VARIANCE,
     MAG,
     RANGE,
     REST_VELOCITY,
-    TEST_RATIO,
+    Observed,
 )
 from flightstack.estimation.memory import Flags
 from flightstack.mavlink.dialect import mavlink
@@ -175,7 +172,7 @@ def estimator_report(memory: Record, time_s: float, imu_has_failed: bool) -> Est
 
     The flags compare with the time at which the horizon is if no sample is late: without samples the horizon stays.
     """
-    rows = [_observation(row) for row in memory["observations"].tolist()]
+    rows = [_observation(Observed(*row)) for row in memory["observations"].tolist()]
     variances = tuple(np.diagonal(memory["covariance"]).tolist())
     now_s, flags = time_s - float(memory["params"][_DELAY]), Flags(*memory["flags"].tolist())
     velocity, position = rows[GNSS_VELOCITY : GNSS_VELOCITY + 3], rows[GNSS_POSITION : GNSS_POSITION + 3]
@@ -203,8 +200,8 @@ def estimator_report(memory: Record, time_s: float, imu_has_failed: bool) -> Est
     )
 
 
-def _observation(row: Sequence[float]) -> Observation:
-    return Observation(row[INNOVATION], row[INNOVATION_VARIANCE], _root(row[TEST_RATIO]), row[FUSED_S])
+def _observation(row: Observed) -> Observation:
+    return Observation(row.innovation, row.variance, _root(row.test_ratio), row.fused_s)
 
 
 def _root(square: float) -> float:

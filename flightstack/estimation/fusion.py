@@ -27,16 +27,12 @@ from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import (
     BARO,
     DRAG,
-    FUSED_S,
     GNSS_POSITION,
     GNSS_VELOCITY,
     HOLD_POSITION,
     HOLDS_HORIZONTAL,
-    INNOVATION,
-    INNOVATION_VARIANCE,
     MAG,
     RANGE,
-    REFUSED,
     REST_RATE,
     REST_VELOCITY,
     Filter,
@@ -103,7 +99,7 @@ def drift_gnss_bias(f: Filter, row: GnssRow, elapsed_s: float, params: Estimator
     """
     eph_m, epv_m = horizontal_accuracy(row), vertical_accuracy(row)
     kept = max(0.0, 1.0 - elapsed_s / params.gnss_bias_s)
-    has_baro = f.clock[0] - f.observations[BARO, FUSED_S] < _BARO_LOST_S
+    has_baro = f.clock[0] - f.observations[BARO]["fused_s"] < _BARO_LOST_S
     for at in range(GNSS_BIAS, ERROR_STATES):
         spread = gnss_bias_share(params, at - GNSS_BIAS) * (epv_m if at == GNSS_BIAS + 2 else eph_m)
         return_s = _HEIGHT_RETURN_S if has_baro and at == GNSS_BIAS + 2 else params.gnss_bias_s
@@ -122,8 +118,8 @@ def _confirm_imu_noise(f: Filter, row: int) -> None:
 
     Fast motion and vibration look like noise of the IMU, but do not add up to an error of the velocity.
     """
-    o = f.observations
-    ratio = min(o[row, INNOVATION] * o[row, INNOVATION] / o[row, INNOVATION_VARIANCE], 6.0)
+    o = f.observations[row]
+    ratio = min(o["innovation"] * o["innovation"] / o["variance"], 6.0)
     f.clock[1] = min(max(f.clock[1] * (1.0 + _CONFIRMATION * (ratio - 1.0)), _LEAST_SHARE), 1.0)
 
 
@@ -146,7 +142,7 @@ def fuse_gnss_position(
 ) -> None:
     """Fuse the position along an axis, measured ``age_s`` before the time of the state; refuse one that drifts."""
     if fault == POSITION_DRIFTS:
-        f.observations[GNSS_POSITION + axis, REFUSED] += 1.0
+        f.observations[GNSS_POSITION + axis]["refused"] += 1.0
         return
     accuracy_m = vertical_accuracy(row) if axis == 2 else horizontal_accuracy(row)
     least = params.gnss_position_noise_m
@@ -165,7 +161,7 @@ def fuse_baro(f: Filter, altitude_m: float, age_s: float, params: EstimatorParam
     It leaves horizontal position and velocity alone in dead reckoning: their errors are then so much larger than that
     of the height that pressure in turns and gusts, which is not white noise, moves them by metres.
     """
-    is_aided = f.clock[0] - f.observations[GNSS_VELOCITY, FUSED_S] < _AIDED_S
+    is_aided = f.clock[0] - f.observations[GNSS_VELOCITY]["fused_s"] < _AIDED_S
     clear(f.h)
     f.h[POSITION + 2] = -1.0
     f.h[BARO_BIAS] = 1.0

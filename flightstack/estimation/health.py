@@ -12,14 +12,11 @@ from flightstack.core.contract import FloatArray, Record, RecordArray
 from flightstack.estimation.error_state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY
 from flightstack.estimation.kalman import (
     BARO,
-    FUSED_S,
     GNSS_POSITION,
     GNSS_VELOCITY,
     MAG,
-    TEST_RATIO,
-    Observations,
 )
-from flightstack.estimation.memory import MemoryArray
+from flightstack.estimation.memory import MemoryArray, MemoryRecord
 from flightstack.estimation.sensor_feed import NewestSamples
 from flightstack.estimation.sensor_samples import BaroSample, GnssFix
 
@@ -95,11 +92,11 @@ def _largest(values: FloatArray, first: int, count: int) -> float:
 
 
 @compiled
-def _mean_ratio(mean: float, observations: Observations, first: int, count: int) -> float:
+def _mean_ratio(mean: float, m: MemoryRecord, first: int, count: int) -> float:
     """Return a mean of test ratios after the newest one, the largest of ``count`` rows."""
     largest = 0.0
     for row in range(first, first + count):
-        largest = max(largest, abs(observations[row, TEST_RATIO]))
+        largest = max(largest, abs(m["observations"][row]["test_ratio"]))
     return mean + SMOOTHING * (math.sqrt(largest) - mean)
 
 
@@ -108,8 +105,8 @@ def health_kernel(memory: MemoryArray, summary: Summary) -> None:
     """Write the summary of an estimator's record, shape (12,); it holds the mean ratios of the last call."""
     m = memory[0]
     p, o, x = m["covariance"], m["observations"], m["nominal"]
-    position_s = min(o[GNSS_POSITION, FUSED_S], o[GNSS_POSITION + 1, FUSED_S])
-    velocity_s = min(o[GNSS_VELOCITY, FUSED_S], o[GNSS_VELOCITY + 1, FUSED_S])
+    position_s = min(o[GNSS_POSITION]["fused_s"], o[GNSS_POSITION + 1]["fused_s"])
+    velocity_s = min(o[GNSS_VELOCITY]["fused_s"], o[GNSS_VELOCITY + 1]["fused_s"])
     summary[0] = m["clock"][0] - max(position_s, velocity_s)
     summary[1] = max(m["refused_s"][3], m["refused_s"][4], m["refused_s"][5])
     summary[2] = m["output"][0] - m["clock"][0]
@@ -117,10 +114,10 @@ def health_kernel(memory: MemoryArray, summary: Summary) -> None:
     summary[4] = math.sqrt(p[VELOCITY, VELOCITY] + p[VELOCITY + 1, VELOCITY + 1])
     summary[5] = math.sqrt(max(p[ATTITUDE, ATTITUDE], p[ATTITUDE + 1, ATTITUDE + 1]))
     summary[6], summary[7] = _largest(x, GYRO_BIAS + 1, 3), _largest(x, ACCEL_BIAS + 1, 3)
-    summary[8] = _mean_ratio(summary[8], o, GNSS_VELOCITY, 3)
-    summary[9] = _mean_ratio(summary[9], o, GNSS_POSITION, 2)
-    summary[10] = _mean_ratio(summary[10], o, BARO, 1)
-    summary[11] = _mean_ratio(summary[11], o, MAG, 3)
+    summary[8] = _mean_ratio(summary[8], m, GNSS_VELOCITY, 3)
+    summary[9] = _mean_ratio(summary[9], m, GNSS_POSITION, 2)
+    summary[10] = _mean_ratio(summary[10], m, BARO, 1)
+    summary[11] = _mean_ratio(summary[11], m, MAG, 3)
 
 
 class PressureTrack(NamedTuple):

@@ -7,7 +7,7 @@ from flightstack.core.contract import FloatArray
 from flightstack.estimation.error_state import BARO_BIAS, ERROR_STATES, POSITION
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.fusion import LEAST_COS_TILT, cos_tilt_of, fuse_baro, fuse_range
-from flightstack.estimation.kalman import BARO, FUSED_S, GNSS_VELOCITY, RANGE, Filter
+from flightstack.estimation.kalman import BARO, GNSS_VELOCITY, RANGE, Filter
 from flightstack.estimation.memory import MemoryRecord
 from flightstack.estimation.resets import reset_position
 from flightstack.estimation.source_checks import is_stuck, take_pressure_innovation
@@ -30,8 +30,8 @@ def take_baro(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorPara
     if has_stopped:
         m["flags"]["has_baro"] = 0
         return
-    last_s = f.observations[BARO, FUSED_S]
-    speed_s = f.observations[GNSS_VELOCITY + 2, FUSED_S]
+    last_s = f.observations[BARO]["fused_s"]
+    speed_s = f.observations[GNSS_VELOCITY + 2]["fused_s"]
     if f.clock[0] - last_s > params.reset_s and f.clock[0] - speed_s < _AIDED_S:
         m["flags"]["has_baro"] = 0
     if m["flags"]["has_baro"] == 0:
@@ -62,7 +62,7 @@ def take_range(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorPar
     cos_tilt = cos_tilt_of(f)
     if cos_tilt < LEAST_COS_TILT:
         return
-    if m["flags"]["has_range"] == 1 and f.clock[0] - f.observations[RANGE, FUSED_S] > _RANGE_LOST_S:
+    if m["flags"]["has_range"] == 1 and f.clock[0] - f.observations[RANGE]["fused_s"] > _RANGE_LOST_S:
         m["flags"]["has_range"] = 0
     age_s = f.clock[0] - row[0]
     if m["flags"]["has_range"] == 0:

@@ -8,7 +8,7 @@ from typing import Annotated, NamedTuple, TypeAlias
 import numpy as np
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray
+from flightstack.core.contract import FloatArray, Record, RecordArray
 from flightstack.estimation.error_state import (
     ERROR_STATES,
     Covariance,
@@ -23,22 +23,6 @@ GNSS_VELOCITY, GNSS_POSITION, BARO, MAG, RANGE = 0, 3, 6, 7, 10
 REST_VELOCITY, REST_RATE, HOLD_POSITION, KNOWN_FIELD, DECLINATION, DRAG = 11, 14, 17, 19, 22, 23
 """First row of each sensor in ``Filter.observations``."""
 
-INNOVATION, INNOVATION_VARIANCE, TEST_RATIO, FUSED_S, NOISE, LAGGED, FUSED, REFUSED, NIS_SUM = (
-    0,
-    1,
-    2,
-    3,
-    4,
-    5,
-    6,
-    7,
-    8,
-)
-OBSERVATION_COLUMNS = 9
-"""Columns: innovation, its variance, squared ratio to the gate, time of the last accepted one, noise variance, mean
-product of successive innovations; numbers of accepted and of refused measurements; sum of the squares of accepted
-innovations by their variance."""
-
 _ADAPTATION = 0.01
 """Share of an innovation in the estimate of the noise variance."""
 
@@ -51,7 +35,29 @@ HOLDS_HORIZONTAL = 2.0
 
 BEHIND_SIZE = 7
 
-Observations: TypeAlias = Annotated[FloatArray, OBSERVATIONS, OBSERVATION_COLUMNS]
+
+class Observed(NamedTuple):
+    """What the filter knows of the measurements of one quantity."""
+
+    innovation: float
+    """The newest one; the next two are of it."""
+    variance: float
+    test_ratio: float
+    """Squared ratio to the gate."""
+    fused_s: float
+    """Time of the last accepted one."""
+    noise: float
+    """Variance of the noise."""
+    lagged: float
+    """Mean product of successive innovations."""
+    fused: float
+    """Number of accepted measurements."""
+    refused: float
+    nis_sum: float
+    """Sum of the squares of accepted innovations by their variance."""
+
+
+ObservedRecord: TypeAlias = Annotated[Record, Observed]
 
 
 class Filter(NamedTuple):
@@ -71,7 +77,7 @@ class Filter(NamedTuple):
     """What the covariance has not followed yet: time, rotation vector of the body, velocity change NED by forces."""
     covariance: Covariance
     """Only the elements on and above the diagonal count."""
-    observations: Observations
+    observations: Annotated[RecordArray, Observed, OBSERVATIONS]
 
 
 class Noise(NamedTuple):
@@ -139,22 +145,22 @@ def _correct(f: Filter, innovation: float) -> None:
 
 
 @compiled
-def _adapt_noise(o: Observations, row: int, r: float, projected: float, last: float, noise: Noise) -> None:
+def _adapt_noise(o: ObservedRecord, r: float, projected: float, last: float, noise: Noise) -> None:
     """Move the noise variance ``r`` towards that of the accepted innovation; the first ones count for more.
 
     Each of these has twice its share of a mean: the noise stated at the start is forgotten with their number's square.
     Half the squared difference of two successive innovations has the variance of white noise, and an error of the
     model, which both have, does not count. A slow sensor has the whole variance, as its correlation is counted apart.
     """
-    innovation = o[row, INNOVATION]
-    o[row, LAGGED] += _ADAPTATION * (innovation * last - o[row, LAGGED])
+    innovation = o["innovation"]
+    o["lagged"] += _ADAPTATION * (innovation * last - o["lagged"])
     share, square = _ADAPTATION, innovation * innovation
-    if noise.is_slow == 0.0 and o[row, FUSED] > 1.0:
-        share = max(share, 2.0 / (o[row, FUSED] + _PRIOR))
+    if noise.is_slow == 0.0 and o["fused"] > 1.0:
+        share = max(share, 2.0 / (o["fused"] + _PRIOR))
         square = 0.5 * (innovation - last) * (innovation - last)
     estimate = square - projected
     least, largest = noise.least * noise.least, noise.largest * noise.largest
-    o[row, NOISE] = min(max(r + share * (estimate - r), least), largest)
+    o["noise"] = min(max(r + share * (estimate - r), least), largest)
 
 
 @compiled
@@ -164,23 +170,23 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
     With ``holds`` above zero, tilt, velocity, position and accelerometer bias keep their values and their
     uncertainty (a Schmidt-Kalman update); with ``HOLDS_HORIZONTAL``, horizontal velocity and position.
     """
-    o = f.observations
+    o = f.observations[row]
     least, largest = noise.least * noise.least, noise.largest * noise.largest
-    r = min(max(o[row, NOISE] if o[row, NOISE] > 0.0 else noise.start * noise.start, least), largest)
+    r = min(max(o["noise"] if o["noise"] > 0.0 else noise.start * noise.start, least), largest)
     projected = _project(f)
     variance = projected + r
     if noise.is_slow > 0.0:
-        correlation = min(max(o[row, LAGGED] / variance, 0.0), _LARGEST_CORRELATION)
+        correlation = min(max(o["lagged"] / variance, 0.0), _LARGEST_CORRELATION)
         variance = projected + r * (1.0 + correlation) / (1.0 - correlation)
-    last = o[row, INNOVATION]
+    last = o["innovation"]
     ratio = innovation * innovation / (noise.gate * noise.gate * variance)
-    o[row, INNOVATION], o[row, INNOVATION_VARIANCE], o[row, TEST_RATIO] = innovation, variance, ratio
+    o["innovation"], o["variance"], o["test_ratio"] = innovation, variance, ratio
     if not ratio <= 1.0:
-        o[row, REFUSED] += 1.0
+        o["refused"] += 1.0
         return False
-    o[row, FUSED] += 1.0
-    o[row, NIS_SUM] += innovation * innovation / variance
-    _adapt_noise(o, row, r, projected, last, noise)
+    o["fused"] += 1.0
+    o["nis_sum"] += innovation * innovation / variance
+    _adapt_noise(o, r, projected, last, noise)
     for i in range(ERROR_STATES):
         f.gain[i] = f.ph[i] / variance
     if holds == HOLDS_HORIZONTAL:
@@ -193,7 +199,7 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
         for i in range(12, 15):
             f.gain[i] = 0.0
     _correct(f, innovation)
-    o[row, FUSED_S] = f.clock[0]
+    o["fused_s"] = f.clock[0]
     return True
 
 

@@ -20,7 +20,6 @@ from flightstack.estimation.fusion import (
 )
 from flightstack.estimation.height_sources import reset_height
 from flightstack.estimation.kalman import (
-    FUSED_S,
     GNSS_POSITION,
     GNSS_VELOCITY,
     Filter,
@@ -78,7 +77,7 @@ def _begin_gnss(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorPa
         _start_gnss(m, f, row, params)
     before = m["before_gnss"]
     before["elapsed_s"] = max(0.0, row[0] - m["last_gnss_s"])
-    before["outage_s"] = f.clock[0] - f.observations[GNSS_POSITION, FUSED_S]
+    before["outage_s"] = f.clock[0] - f.observations[GNSS_POSITION]["fused_s"]
     for axis in range(2):
         before["place_m"][axis], before["velocity_m_s"][axis] = f.nominal[7 + axis], f.nominal[4 + axis]
     m["last_gnss_s"] = row[0]
@@ -122,7 +121,7 @@ def _count_refused(m: MemoryRecord, f: Filter, first: int, elapsed_s: float) -> 
     refused = m["refused_s"]
     for i in range(6):
         axis = i - 3 if i >= 3 else i
-        if axis < first or f.observations[GNSS_VELOCITY + i, FUSED_S] == f.clock[0]:
+        if axis < first or f.observations[GNSS_VELOCITY + i]["fused_s"] == f.clock[0]:
             refused[i] = 0.0
         elif refused[i] == 0.0:
             refused[i] = 1e-6  # the series begins
@@ -158,7 +157,7 @@ def _start_gnss(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorPa
 @compiled
 def is_velocity_measured(f: Filter) -> bool:
     """Return True if a GNSS velocity was accepted within the last second."""
-    fused_s: float = f.observations[GNSS_VELOCITY, FUSED_S]
+    fused_s: float = f.observations[GNSS_VELOCITY]["fused_s"]
     return fused_s > 0.0 and f.clock[0] - fused_s < _GNSS_LOST_S
 
 

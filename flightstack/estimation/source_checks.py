@@ -19,8 +19,6 @@ from flightstack.estimation.kalman import (
     BARO,
     GNSS_POSITION,
     GNSS_VELOCITY,
-    INNOVATION,
-    INNOVATION_VARIANCE,
     Filter,
 )
 
@@ -95,8 +93,9 @@ ChecksRecord: TypeAlias = Annotated[Record, Checks]
 @compiled
 def _mean(mean: float, f: Filter, row: int, sign: float, dt_s: float) -> float:
     """Return a mean of innovations upwards with the newest one of a row."""
-    variance = max(f.observations[row, INNOVATION_VARIANCE], _LEAST_VARIANCE)  # 0 before the first fusion
-    value = sign * f.observations[row, INNOVATION] / math.sqrt(variance)
+    o = f.observations[row]
+    variance = max(o["variance"], _LEAST_VARIANCE)  # 0 before the first fusion
+    value = sign * o["innovation"] / math.sqrt(variance)
     value = min(max(value, -_LARGEST), _LARGEST)
     made: float = mean + min(dt_s / _MEAN_S, 1.0) * (value - mean)
     return made

@@ -345,4 +345,6 @@ def fill_estimator(row: FloatArray, sensed: Sensed) -> None:
     )  # fmt: skip
     row[AT.nominal : AT.variances] = sensed.memory["nominal"]
     row[AT.variances : AT.variances + _KNOWN_VARIANCES] = report.variances[:_KNOWN_VARIANCES]
-    row[AT.innovations :].reshape(3, OBSERVATIONS)[:] = sensed.memory["observations"][:, :3].T
+    observed = sensed.memory["observations"]
+    columns = row[AT.innovations :].reshape(3, OBSERVATIONS)
+    columns[0], columns[1], columns[2] = observed["innovation"], observed["variance"], observed["test_ratio"]

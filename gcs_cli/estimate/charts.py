@@ -13,8 +13,6 @@ from flightstack.estimation.kalman import (
     BARO,
     GNSS_POSITION,
     GNSS_VELOCITY,
-    INNOVATION,
-    INNOVATION_VARIANCE,
     MAG,
 )
 from gcs_cli.charts.colours import nth_colour
@@ -157,9 +155,9 @@ def _innovations(estimate: Estimate, start_s: float) -> Iterator[Figure]:
         panels = []
         for number, axis in enumerate(axes):
             values = estimate.observations[:, row + number]
-            size = 3.0 * np.sqrt(values[:, INNOVATION_VARIANCE])
+            size = 3.0 * np.sqrt(values["variance"])
             curves = [
-                _curve("innovation", 0, times, values[:, INNOVATION]),
+                _curve("innovation", 0, times, values["innovation"]),
                 _curve("3σ", 7, times, size, "dot"),
                 _curve("3σ", 7, times, -size, "dot"),
             ]

@@ -13,12 +13,9 @@ import numpy as np
 from flightstack.estimation.error_state import ATTITUDE, POSITION, VELOCITY
 from flightstack.estimation.kalman import (
     BARO,
-    FUSED,
     GNSS_POSITION,
     GNSS_VELOCITY,
     MAG,
-    NIS_SUM,
-    REFUSED,
 )
 from gcs_cli.charts.pages import render_page, shown
 from gcs_cli.estimate.charts import figures
@@ -110,8 +107,8 @@ def consistency(
     found: dict[str, float | None] = {}
     for name, row, count in _SENSORS:
         last = estimate.observations[-1, row : row + count]
-        fused, refused = float(np.sum(last[:, FUSED])), float(np.sum(last[:, REFUSED]))
-        found[f"{name}_nis"] = float(np.sum(last[:, NIS_SUM])) / fused if fused else None
+        fused, refused = float(np.sum(last["fused"])), float(np.sum(last["refused"]))
+        found[f"{name}_nis"] = float(np.sum(last["nis_sum"])) / fused if fused else None
         found[f"{name}_refused_share"] = refused / (fused + refused) if fused + refused else None
     return {**found, **_nees(estimate, truth, span_s)}
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from flightstack.core.contract import FloatArray
+from flightstack.core.contract import FloatArray, RecordArray
 from flightstack.core.geodesy import FIELD_YEAR, earth_field_ned_gauss
 from flightstack.estimation.error_state import ERROR_STATES, NOMINAL_SIZE
 from flightstack.estimation.estimator import Estimator
-from flightstack.estimation.kalman import OBSERVATION_COLUMNS, OBSERVATIONS, symmetric
+from flightstack.estimation.kalman import OBSERVATIONS, symmetric
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, ImuSample, MagSample, RangeSample
 from flightstack.estimation.snapshot import ESTIMATOR_START, restored
 from gcs_cli.errors import CliError
@@ -32,7 +32,8 @@ class Estimate:
     """The output of the filter at each IMU sample, and its inner state at intervals.
 
     ``state_s`` (m,) has the times of ``nominal`` (m, 28), ``deviations`` (m, 27), ``covariance`` of attitude, velocity
-    and position (m, 9, 9) and ``observations`` (m, 23, 9): those of the horizon, which is behind the output.
+    and position (m, 9, 9) and ``observations`` (m, 25), records of ``Observed``: those of the horizon, which is behind
+    the output.
     """
 
     track: Track
@@ -40,7 +41,7 @@ class Estimate:
     nominal: FloatArray
     deviations: FloatArray
     covariance: FloatArray
-    observations: FloatArray
+    observations: RecordArray
     samples: dict[str, int]
 
 
@@ -139,6 +140,6 @@ class _Keeper:
             np.array(nominal).reshape(-1, NOMINAL_SIZE),
             np.array(deviations).reshape(-1, ERROR_STATES),
             np.array(covariance).reshape(-1, MOTION_SIZE, MOTION_SIZE),
-            np.array(observations).reshape(-1, OBSERVATIONS, OBSERVATION_COLUMNS),
+            np.array(observations).reshape(-1, OBSERVATIONS),
             self._samples,
         )

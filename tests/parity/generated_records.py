@@ -94,12 +94,12 @@ def write_log(log: LogRecord, time_s: float, value: float) -> float:
 
 @compiled
 def weigh(sensors: Sensors, value: float) -> float:
-    total = 0.0
+    total, readings = 0.0, sensors.readings
     for number in range(SENSORS):
-        reading = sensors.readings[number]
+        reading = readings[number]
         total += sensors.weights[number] * reading["mean"]
         _take(sensors.readings[number], value)
-    sensors.readings[0]["value"] = total
+    readings[0]["value"] = total
     return total
 
 

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 from flightstack.core.contract import Vector3
+from flightstack.core.record_types import dtype_of
 from flightstack.estimation import prediction
 from flightstack.estimation.error_state import (
     ACCEL_BIAS,
@@ -32,10 +33,9 @@ from flightstack.estimation.fusion import drift_gnss_bias
 from flightstack.estimation.kalman import (
     BARO,
     BEHIND_SIZE,
-    FUSED_S,
-    OBSERVATION_COLUMNS,
     OBSERVATIONS,
     Filter,
+    Observed,
 )
 from flightstack.estimation.prediction import DeltaSample, ImuNoise
 from tests.support.generated_c import in_python
@@ -66,7 +66,7 @@ def still(seconds: float, params: EstimatorParams, gyro_bias: float = 0.0, accel
         clock=np.zeros(2),
         behind=np.zeros(BEHIND_SIZE),
         covariance=np.zeros((ERROR_STATES, ERROR_STATES)),
-        observations=np.zeros((OBSERVATIONS, OBSERVATION_COLUMNS)),
+        observations=np.zeros(OBSERVATIONS, dtype_of(Observed)),
     )
     f.nominal[0] = 1.0
     for axis in range(3):
@@ -125,7 +125,7 @@ def test_state_moves_by_a_bias_as_the_covariance_says() -> None:
 @pytest.mark.parametrize(("baro_s", "kept"), [(100.0, math.exp(-60.0 / 1800.0)), (90.0, math.exp(-1.0))])
 def test_height_error_of_gnss_returns_slowly_with_a_barometer_only(baro_s: float, kept: float) -> None:
     f = still(0.1, EstimatorParams())
-    f.clock[0], f.observations[BARO, FUSED_S] = 100.0, baro_s
+    f.clock[0], f.observations[BARO]["fused_s"] = 100.0, baro_s
     f.nominal[27], f.nominal[26] = 1.0, 1.0
     row = np.array([100.0, *[0.0] * 6, 1.0, 1.0, 0.1])
     for _ in range(600):

@@ -17,11 +17,7 @@ from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import (
     BARO,
-    FUSED,
     GNSS_VELOCITY,
-    INNOVATION,
-    INNOVATION_VARIANCE,
-    REFUSED,
 )
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, ImuSample, MagSample
 from tests.support import flown_sensors as flown
@@ -54,7 +50,7 @@ def fly(faults: Faults = NO_FAULTS) -> Flight:
         flown.feed(estimator, sample)
         if isinstance(sample, GnssSample):
             rows = estimator.memory["observations"][0, GNSS_VELOCITY : GNSS_VELOCITY + 3]
-            nis.append(rows[:, INNOVATION] ** 2 / np.maximum(rows[:, INNOVATION_VARIANCE], 1e-9))
+            nis.append(rows["innovation"] ** 2 / np.maximum(rows["variance"], 1e-9))
         if isinstance(sample, ImuSample) and estimator.frame and round(sample.time_s / flown.DT_S) % 25 == 0:
             errors.append(_errors(estimator, sample.time_s))
             deviations.append(estimator.deviations())
@@ -154,17 +150,17 @@ def test_sample_of_the_imu_fuses_one_scalar_at_most_and_keeps_pace() -> None:
         if tick % 50 == 0:
             point = frame.to_geo(Vector3(0.01 * (tick % 7), 0.0, 0.0))
             estimator.gnss(GnssSample(time_s, *point, Vector3(0.01, 0.0, 0.0), 0.5, 0.8, 0.1, 3, 14))
-        before = observations[:, FUSED].sum() + observations[:, REFUSED].sum()
+        before = observations["fused"].sum() + observations["refused"].sum()
         was_aligned = estimator.aligned
         estimator.imu(ImuSample(time_s, 0.002, still, force))
         if was_aligned:
-            after = observations[:, FUSED].sum() + observations[:, REFUSED].sum()
+            after = observations["fused"].sum() + observations["refused"].sum()
             most = max(most, after - before)
             lag_s = max(lag_s, time_s - estimator.memory["clock"][0, 0])
     assert most == 1.0
     assert lag_s < EstimatorParams().delay_s + 0.045  # within the backlog of 0.03 s, a step and a sample
-    assert observations[GNSS_VELOCITY, FUSED] > 85.0  # of 94 after the alignment and the delay
-    assert observations[BARO, FUSED] > 150.0  # of 158: it is not stuck
+    assert observations[GNSS_VELOCITY]["fused"] > 85.0  # of 94 after the alignment and the delay
+    assert observations[BARO]["fused"] > 150.0  # of 158: it is not stuck
 
 
 def test_equal_samples_give_equal_bytes() -> None:

@@ -15,7 +15,7 @@ from flightstack.core.geometry import conjugate, quaternion_product, rotate
 from flightstack.estimation.error_state import POSITION, VELOCITY, turn_between
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits, tuning_of
-from flightstack.estimation.kalman import FUSED, FUSED_S, GNSS_POSITION, GNSS_VELOCITY, MAG, RANGE, REFUSED
+from flightstack.estimation.kalman import GNSS_POSITION, GNSS_VELOCITY, MAG, RANGE
 from flightstack.estimation.sensor_samples import (
     BaroSample,
     GnssSample,
@@ -122,7 +122,7 @@ def test_magnetometer_that_starts_late_gives_the_yaw() -> None:
     estimator = fly(12.0, Faults(mag_from_s=3.0))
     assert estimator.memory["flags"][0]["has_yaw"] == 1
     assert abs(yaw_error_deg(estimator, 12.0)) < 3.0
-    assert estimator.memory["observations"][0, MAG, REFUSED] == 0.0
+    assert estimator.memory["observations"][0][MAG]["refused"] == 0.0
     assert resets(estimator, "yaw") == 1.0
 
 
@@ -232,7 +232,7 @@ def test_resets_of_all_axes_in_one_step_are_added_up() -> None:
 def test_refused_fix_after_an_outage_is_not_reset_to() -> None:
     faults = Faults(no_gnss_s=(12.0, 24.0), jump_s=(24.0, 25.0), jump_m=300.0)
     estimator = fly(26.0, faults)
-    assert estimator.memory["observations"][0, GNSS_POSITION, REFUSED] > 0.0
+    assert estimator.memory["observations"][0][GNSS_POSITION]["refused"] > 0.0
     # the first accepted one corrects the error of dead reckoning, not the jump of 300 m
     assert abs(last_change(estimator, "position")[0]) < 10.0  # measured 1.7
     assert abs(last_change(estimator, "velocity")[0]) < 2.0  # measured 0.3
@@ -249,7 +249,7 @@ def test_fix_that_repeats_itself_in_motion_is_dropped() -> None:
         return held[0]._replace(time_s=sample.time_s)
 
     estimator = fly(35.0, Faults(), freeze)
-    assert estimator.memory["observations"][0, GNSS_VELOCITY, FUSED_S] == pytest.approx(20.0, abs=0.2)
+    assert estimator.memory["observations"][0][GNSS_VELOCITY]["fused_s"] == pytest.approx(20.0, abs=0.2)
     assert resets(estimator, "position") == 0.0
     assert (
         np.abs(estimator.state().position_ned_m - flown.position(35.0)).max() < 2.0
@@ -267,13 +267,13 @@ def test_fast_sensors_do_not_displace_samples_that_wait(rate_hz: int) -> None:
         estimator.mag(MagSample(time_s, flown.EARTH))
         estimator.baro(BaroSample(time_s, 955.0, 500.0, 20.0))
         estimator.imu(ImuSample(time_s, period_s, STILL, GRAVITY))
-    used = estimator.memory["observations"][0, MAG, FUSED]
+    used = estimator.memory["observations"][0][MAG]["fused"]
     assert used > 45.0  # 50 Hz, less alignment and delay; each was 10 ms older than the horizon before
 
 
 def test_fast_gnss_does_not_displace_samples_that_wait() -> None:
     estimator = fly(14.0, Faults(gnss_period=3))  # 83 Hz
-    assert estimator.memory["observations"][0, GNSS_VELOCITY, FUSED] > 250.0
+    assert estimator.memory["observations"][0][GNSS_VELOCITY]["fused"] > 250.0
     assert abs(estimator.memory["last_gnss_s"][0] - (14.0 - flown.GNSS_DELAY_S)) < 0.08  # measured 0.056
 
 
@@ -342,7 +342,7 @@ def test_ground_is_measured_again_after_a_loss_of_range() -> None:
         if tick % 5 == 0 and not 3.0 < time_s < 5.0:
             estimator.range(RangeSample(time_s, 2.0 if time_s < 4.0 else 9.0, 1.0))
     assert estimator.memory["ground_m"][0] == pytest.approx(9.0, abs=0.3)
-    assert estimator.memory["observations"][0, RANGE, REFUSED] == 0.0
+    assert estimator.memory["observations"][0][RANGE]["refused"] == 0.0
 
 
 def test_boat_that_drifts_is_not_held_at_rest() -> None:

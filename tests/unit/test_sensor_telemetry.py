@@ -335,7 +335,8 @@ def test_messages_of_absurd_measurements_are_sent(values: list[float]) -> None:
     _, estimator = sensed_after(SECONDS)
     memory = {name: estimator.memory[0][name].copy() for name in estimator.memory.dtype.names}
     memory["covariance"][:] = np.resize(values, (27, 27))
-    memory["observations"][:, :3] = np.resize(values, memory["observations"][:, :3].shape)
+    for at, name in enumerate(("innovation", "variance", "test_ratio")):
+        memory["observations"][name] = np.resize(np.roll(values, -at), len(memory["observations"]))
     memory["nominal"][:] = np.resize(values, 28)
     a, b = Vector3(*values[:3]), Vector3(*values[3:6])
     samples = NewestSamples(

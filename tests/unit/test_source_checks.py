@@ -18,11 +18,8 @@ from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import (
     BARO,
-    FUSED_S,
     GNSS_POSITION,
     MAG,
-    REFUSED,
-    TEST_RATIO,
 )
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, ImuSample, MagSample
 from flightstack.estimation.source_checks import (
@@ -98,8 +95,8 @@ def test_stuck_barometer_is_left_out_until_it_changes() -> None:
     error, estimator = errors_m(change)
     assert error[2] < 0.5  # measured 0.1
     observations = estimator.memory["observations"][0]
-    assert observations[BARO, REFUSED] < 60.0
-    assert observations[BARO, FUSED_S] > END_S - 0.5
+    assert observations[BARO]["refused"] < 60.0
+    assert observations[BARO]["fused_s"] > END_S - 0.5
 
 
 def test_barometer_that_jumps_is_used_again_with_a_new_bias() -> None:
@@ -110,7 +107,7 @@ def test_barometer_that_jumps_is_used_again_with_a_new_bias() -> None:
 
     error, estimator = errors_m(change)
     assert error[2] < 0.5  # measured 0.1
-    assert estimator.memory["observations"][0, BARO, FUSED_S] > END_S - 0.5
+    assert estimator.memory["observations"][0][BARO]["fused_s"] > END_S - 0.5
 
 
 def moved(sample: GnssSample, north_m: float, north_m_s: float) -> GnssSample:
@@ -159,7 +156,7 @@ def test_gnss_position_that_drifts_from_its_velocity_is_refused(drift_m_s: float
     error, estimator = errors_m(change)
     assert error[0] < 2.0  # measured 1.0 and 0.5, of 6 and 30 m
     assert estimator.memory["refused_s"][0, 3] > 10.0  # GNSS counts as refused
-    assert estimator.memory["observations"][0, GNSS_POSITION + 1, REFUSED] == 0.0
+    assert estimator.memory["observations"][0][GNSS_POSITION + 1]["refused"] == 0.0
 
 
 @pytest.mark.parametrize("wrong_m_s", [0.3, -0.3, 1.0])
@@ -169,7 +166,7 @@ def test_sudden_error_of_gnss_velocity_is_outvoted_by_gnss_position(wrong_m_s: f
 
     error, estimator = errors_m(change, 80.0)
     assert error[0] < 2.5  # measured 1.5, 1.4 and 0.3, of 18 and 60 m; 17 m if the position is blamed
-    assert estimator.memory["observations"][0, GNSS_POSITION, REFUSED] < 40.0
+    assert estimator.memory["observations"][0][GNSS_POSITION]["refused"] < 40.0
 
 
 def test_position_becomes_uncertain_while_gnss_contradicts_itself() -> None:
@@ -191,7 +188,7 @@ def test_error_of_velocity_beside_an_accuracy_of_centimetres_is_no_drift() -> No
 
     error, estimator = errors_m(change)
     assert error[0] < 2.0  # measured 1.4
-    assert estimator.memory["observations"][0, GNSS_POSITION, REFUSED] < 20.0  # measured 3
+    assert estimator.memory["observations"][0][GNSS_POSITION]["refused"] < 20.0  # measured 3
 
 
 # ------------------------------------------------------------------ which sensor is blamed
@@ -248,7 +245,7 @@ def blamed(estimator: Estimator) -> set[str]:
         "climb of GNSS": checks["fault"][2] == VELOCITY_IS_WRONG,
         "position of GNSS": POSITION_DRIFTS in faults,
         "velocity of GNSS": VELOCITY_IS_WRONG in faults,
-        "magnetometer": max(o[MAG, TEST_RATIO], o[MAG + 1, TEST_RATIO]) > 1.0,
+        "magnetometer": max(o[MAG]["test_ratio"], o[MAG + 1]["test_ratio"]) > 1.0,
     }
     return {name for name, holds in signs.items() if holds}
 

@@ -13,7 +13,7 @@ from flightstack.core.geodesy import LocalFrame
 from flightstack.estimation.error_state import ATTITUDE, VELOCITY
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams, tuning_of
-from flightstack.estimation.kalman import FUSED, GNSS_VELOCITY, KNOWN_FIELD, REFUSED
+from flightstack.estimation.kalman import GNSS_VELOCITY, KNOWN_FIELD
 from flightstack.estimation.rings import Mean, take_mean
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, ImuSample, MagSample
 from flightstack.firmware.c_filter import c_layout
@@ -82,7 +82,7 @@ def test_gnss_velocity_is_believed_after_a_gap_with_unseen_acceleration(gap_s: f
     accel = np.tile([2.5, 0.0, 0.0], (round(gap_s / STEP_S), 1))
     estimator = list(fed(START_S + gap_s + 2.0, accel, gap_s))[-1]
     observed = estimator.memory["observations"][0, GNSS_VELOCITY]
-    assert observed[REFUSED] == 0.0  # of 0.4 s: 14 while an earlier step had the uncertainty
+    assert observed["refused"] == 0.0  # of 0.4 s: 14 while an earlier step had the uncertainty
     assert abs(estimator.state().velocity_ned_m_s.x - 2.5 * gap_s) < 0.1  # measured 0.04
 
 
@@ -149,7 +149,7 @@ def test_earth_field_is_fused_with_a_covariance_of_that_time() -> None:
         ):
             break
     assert estimator is not None
-    fused = estimator.memory["observations"][0, KNOWN_FIELD, FUSED]
+    fused = estimator.memory["observations"][0][KNOWN_FIELD]["fused"]
     turned, count = estimator.state().attitude, estimator.memory["resets"]["yaw"]["number"][0]
     east = Vector3(flown.EARTH.x, flown.EARTH.y + 0.05, flown.EARTH.z)
     estimator.set_earth_field(east)
@@ -160,7 +160,7 @@ def test_earth_field_is_fused_with_a_covariance_of_that_time() -> None:
         estimator.imu(ImuSample(time_s + tick * STEP_S, STEP_S, STILL, GRAVITY))
         if estimator.memory["resets"]["yaw"]["number"][0] > count:
             break
-    assert estimator.memory["observations"][0, KNOWN_FIELD, FUSED] == fused + 1.0
+    assert estimator.memory["observations"][0][KNOWN_FIELD]["fused"] == fused + 1.0
     assert float(estimator.memory["behind"][0, 0]) == 0.0
     assert abs(estimator.state().attitude.z - turned.z) > 0.01
 

@@ -18,7 +18,6 @@
 #define FS_AIR_KG_M3 FS_LIT(1.225)
 #define FS_DRAG 23
 #define FS_GNSS_VELOCITY 0
-#define FS_FUSED_S 3
 #define FS_AIDED_S FS_LIT(1.0)
 #define FS_BARO_BIAS 23
 #define FS_BARO 6
@@ -32,15 +31,12 @@
 #define FS_HEIGHT_RETURN_S FS_LIT(1800.0)
 #define FS_VELOCITY_IS_WRONG FS_LIT(2.0)
 #define FS_WRONG_VELOCITY_M_S FS_LIT(2.0)
-#define FS_INNOVATION 0
-#define FS_INNOVATION_VARIANCE 1
 #define FS_CONFIRMATION FS_LIT(0.02)
 #define FS_LEAST_SHARE FS_LIT(0.01)
 #define FS_POSITION_DRIFTS FS_LIT(1.0)
 #define FS_GNSS_POSITION 3
-#define FS_REFUSED 7
 
-/* fusion.py:196 */
+/* fusion.py:192 */
 void fs_fuse_field_axis(fs_filter *f, int32_t axis, const fs_vector3 *measured, const fs_estimator_params *params)
 {
     const fs_real largest = params->mag_largest_noise_gauss;
@@ -72,7 +68,7 @@ void fs_fuse_field_axis(fs_filter *f, int32_t axis, const fs_vector3 *measured, 
     (void)fs_fuse(f, FS_MAG + axis, innovation, &noise, FS_LIT(1.0) - params->mag_corrects_tilt);
 }
 
-/* fusion.py:216 */
+/* fusion.py:212 */
 void fs_fuse_field(fs_filter *f, const fs_vector3 *measured, const fs_estimator_params *params)
 {
     for (int32_t axis = 0; axis < 3; axis++) {
@@ -80,7 +76,7 @@ void fs_fuse_field(fs_filter *f, const fs_vector3 *measured, const fs_estimator_
     }
 }
 
-/* fusion.py:248 */
+/* fusion.py:244 */
 void fs_fuse_rest_velocity(fs_filter *f, int32_t axis, const fs_estimator_params *params)
 {
     const fs_real velocity = params->rest_velocity_noise_m_s;
@@ -90,7 +86,7 @@ void fs_fuse_rest_velocity(fs_filter *f, int32_t axis, const fs_estimator_params
     (void)fs_fuse(f, FS_REST_VELOCITY + axis, -f->nominal[4 + axis], &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:258 */
+/* fusion.py:254 */
 void fs_fuse_rest_rate(fs_filter *f, int32_t axis, const fs_vector3 *rate_rad_s, fs_real variance,
                        const fs_estimator_params *params)
 {
@@ -102,7 +98,7 @@ void fs_fuse_rest_rate(fs_filter *f, int32_t axis, const fs_vector3 *rate_rad_s,
     (void)fs_fuse(f, FS_REST_RATE + axis, value - f->nominal[10 + axis], &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:274 */
+/* fusion.py:270 */
 void fs_fuse_hold(fs_filter *f, int32_t axis, fs_real held_m, const fs_estimator_params *params)
 {
     const fs_noise noise = {
@@ -117,7 +113,7 @@ void fs_fuse_hold(fs_filter *f, int32_t axis, fs_real held_m, const fs_estimator
     (void)fs_fuse(f, FS_HOLD_POSITION + axis, held_m - f->nominal[7 + axis], &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:223 */
+/* fusion.py:219 */
 void fs_fuse_drag(fs_filter *f, int32_t axis, const fs_vector3 *force, const fs_estimator_params *params)
 {
     const fs_real deviation = fs_sqrt(params->drag_variance);
@@ -144,10 +140,10 @@ void fs_fuse_drag(fs_filter *f, int32_t axis, const fs_vector3 *force, const fs_
     (void)fs_fuse(f, FS_DRAG + axis, innovation, &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:162 */
+/* fusion.py:158 */
 void fs_fuse_baro(fs_filter *f, fs_real altitude_m, fs_real age_s, const fs_estimator_params *params)
 {
-    const bool is_aided = f->clock[0] - f->observations[FS_GNSS_VELOCITY][FS_FUSED_S] < FS_AIDED_S;
+    const bool is_aided = f->clock[0] - f->observations[FS_GNSS_VELOCITY].fused_s < FS_AIDED_S;
     fs_clear(f->h);
     f->h[FS_POSITION + 2] = FS_LIT(-1.0);
     f->h[FS_BARO_BIAS] = FS_LIT(1.0);
@@ -162,7 +158,7 @@ void fs_fuse_baro(fs_filter *f, fs_real altitude_m, fs_real age_s, const fs_esti
     (void)fs_fuse(f, FS_BARO, altitude_m - predicted_m, &noise, is_aided ? FS_LIT(0.0) : FS_HOLDS_HORIZONTAL);
 }
 
-/* fusion.py:178 */
+/* fusion.py:174 */
 fs_real fs_cos_tilt_of(const fs_filter *f)
 {
     const fs_real x = f->nominal[1];
@@ -171,7 +167,7 @@ fs_real fs_cos_tilt_of(const fs_filter *f)
     return cosine;
 }
 
-/* fusion.py:186 */
+/* fusion.py:182 */
 void fs_fuse_range(fs_filter *f, fs_real vertical_m, fs_real ground_m, fs_real age_s,
                    const fs_estimator_params *params)
 {
@@ -188,43 +184,43 @@ void fs_fuse_range(fs_filter *f, fs_real vertical_m, fs_real ground_m, fs_real a
     (void)fs_fuse(f, FS_RANGE, vertical_m - height_m, &noise, FS_LIT(0.0));
 }
 
-/* Return an accuracy that a receiver states; unknown if it states none. Zero is an ideal receiver's. fusion.py:67 */
+/* Return an accuracy that a receiver states; unknown if it states none. Zero is an ideal receiver's. fusion.py:63 */
 static fs_real stated(fs_real accuracy, fs_real unknown)
 {
     return fs_is_finite(accuracy) && accuracy >= FS_LIT(0.0) ? accuracy : unknown;
 }
 
-/* fusion.py:85 */
+/* fusion.py:81 */
 fs_real fs_speed_accuracy(const fs_real row[10])
 {
     return stated(row[9], FS_UNKNOWN_M_S);
 }
 
-/* fusion.py:79 */
+/* fusion.py:75 */
 fs_real fs_vertical_accuracy(const fs_real row[10])
 {
     return stated(row[8], FS_UNKNOWN_VERTICAL_M);
 }
 
-/* fusion.py:73 */
+/* fusion.py:69 */
 fs_real fs_horizontal_accuracy(const fs_real row[10])
 {
     return stated(row[7], FS_UNKNOWN_M);
 }
 
-/* fusion.py:91 */
+/* fusion.py:87 */
 fs_real fs_gnss_bias_share(const fs_estimator_params *params, int32_t axis)
 {
     return params->gnss_bias_share * (axis == 2 ? fs_sqrt(FS_LIT(2.0)) : FS_LIT(1.0));
 }
 
-/* fusion.py:97 */
+/* fusion.py:93 */
 void fs_drift_gnss_bias(fs_filter *f, const fs_real row[10], fs_real elapsed_s, const fs_estimator_params *params)
 {
     const fs_real eph_m = fs_horizontal_accuracy(row);
     const fs_real epv_m = fs_vertical_accuracy(row);
     const fs_real kept = fs_max(FS_LIT(0.0), FS_LIT(1.0) - elapsed_s / params->gnss_bias_s);
-    const bool has_baro = f->clock[0] - f->observations[FS_BARO][FS_FUSED_S] < FS_BARO_LOST_S;
+    const bool has_baro = f->clock[0] - f->observations[FS_BARO].fused_s < FS_BARO_LOST_S;
     for (int32_t at = 24; at < 27; at++) {
         const fs_real spread = fs_gnss_bias_share(params, at - FS_GNSS_BIAS) *
                                (at == FS_GNSS_BIAS + 2 ? epv_m : eph_m);
@@ -246,17 +242,17 @@ void fs_drift_gnss_bias(fs_filter *f, const fs_real row[10], fs_real elapsed_s, 
  *
  * Fast motion and vibration look like noise of the IMU, but do not add up to an error of the velocity.
  *
- * fusion.py:120
+ * fusion.py:116
  */
 static void confirm_imu_noise(fs_filter *f, int32_t row)
 {
-    const fs_real ratio = fs_min(f->observations[row][FS_INNOVATION] * f->observations[row][FS_INNOVATION] /
-                                 f->observations[row][FS_INNOVATION_VARIANCE], FS_LIT(6.0));
+    fs_observed *o = &f->observations[row];
+    const fs_real ratio = fs_min(o->innovation * o->innovation / o->variance, FS_LIT(6.0));
     f->clock[1] = fs_min(fs_max(f->clock[1] * (FS_LIT(1.0) + FS_CONFIRMATION * (ratio - FS_LIT(1.0))),
                                 FS_LEAST_SHARE), FS_LIT(1.0));
 }
 
-/* fusion.py:131 */
+/* fusion.py:127 */
 void fs_fuse_gnss_velocity(fs_filter *f, const fs_real row[10], int32_t axis, fs_real fault,
                            const fs_estimator_params *params)
 {
@@ -278,12 +274,12 @@ void fs_fuse_gnss_velocity(fs_filter *f, const fs_real row[10], int32_t axis, fs
     }
 }
 
-/* fusion.py:144 */
+/* fusion.py:140 */
 void fs_fuse_gnss_position(fs_filter *f, const fs_real row[10], fs_real age_s, int32_t axis, fs_real fault,
                            const fs_estimator_params *params)
 {
     if (fault == FS_POSITION_DRIFTS) {
-        f->observations[FS_GNSS_POSITION + axis][FS_REFUSED] += FS_LIT(1.0);
+        f->observations[FS_GNSS_POSITION + axis].refused += FS_LIT(1.0);
         return;
     }
     const fs_real accuracy_m = axis == 2 ? fs_vertical_accuracy(row) : fs_horizontal_accuracy(row);

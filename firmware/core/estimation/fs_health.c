@@ -5,19 +5,17 @@
 #include "fs_math.h"
 
 #define FS_GNSS_POSITION 3
-#define FS_FUSED_S 3
 #define FS_GNSS_VELOCITY 0
 #define FS_POSITION 6
 #define FS_VELOCITY 3
 #define FS_ATTITUDE 0
 #define FS_GYRO_BIAS 9
 #define FS_ACCEL_BIAS 12
-#define FS_TEST_RATIO 2
 #define FS_SMOOTHING FS_LIT(0.1)
 #define FS_BARO 6
 #define FS_MAG 7
 
-/* health.py:90 */
+/* health.py:87 */
 static fs_real largest(const fs_real values[], int32_t first, int32_t count)
 {
     fs_real largest_ = FS_LIT(0.0);
@@ -27,24 +25,24 @@ static fs_real largest(const fs_real values[], int32_t first, int32_t count)
     return largest_;
 }
 
-/* Return a mean of test ratios after the newest one, the largest of count rows. health.py:98 */
-static fs_real mean_ratio(fs_real mean, const fs_real observations[25][9], int32_t first, int32_t count)
+/* Return a mean of test ratios after the newest one, the largest of count rows. health.py:95 */
+static fs_real mean_ratio(fs_real mean, const fs_estimator_memory *m, int32_t first, int32_t count)
 {
     fs_real largest_ = FS_LIT(0.0);
     for (int32_t row = first; row < first + count; row++) {
-        largest_ = fs_max(largest_, fs_abs(observations[row][FS_TEST_RATIO]));
+        largest_ = fs_max(largest_, fs_abs(m->filter.observations[row].test_ratio));
     }
     return mean + FS_SMOOTHING * (fs_sqrt(largest_) - mean);
 }
 
-/* health.py:107 */
+/* health.py:104 */
 void fs_health_kernel(const fs_estimator_memory *memory, fs_real summary[12])
 {
     const fs_estimator_memory *m = memory;
-    const fs_real position_s = fs_min(m->filter.observations[FS_GNSS_POSITION][FS_FUSED_S],
-                                      m->filter.observations[FS_GNSS_POSITION + 1][FS_FUSED_S]);
-    const fs_real velocity_s = fs_min(m->filter.observations[FS_GNSS_VELOCITY][FS_FUSED_S],
-                                      m->filter.observations[FS_GNSS_VELOCITY + 1][FS_FUSED_S]);
+    const fs_real position_s = fs_min(m->filter.observations[FS_GNSS_POSITION].fused_s,
+                                      m->filter.observations[FS_GNSS_POSITION + 1].fused_s);
+    const fs_real velocity_s = fs_min(m->filter.observations[FS_GNSS_VELOCITY].fused_s,
+                                      m->filter.observations[FS_GNSS_VELOCITY + 1].fused_s);
     summary[0] = m->filter.clock[0] - fs_max(position_s, velocity_s);
     summary[1] = fs_max(fs_max(m->refused_s[3], m->refused_s[4]), m->refused_s[5]);
     summary[2] = m->output[0] - m->filter.clock[0];
@@ -56,8 +54,8 @@ void fs_health_kernel(const fs_estimator_memory *memory, fs_real summary[12])
                                 m->filter.covariance[FS_ATTITUDE + 1][FS_ATTITUDE + 1]));
     summary[6] = largest(m->filter.nominal, FS_GYRO_BIAS + 1, 3);
     summary[7] = largest(m->filter.nominal, FS_ACCEL_BIAS + 1, 3);
-    summary[8] = mean_ratio(summary[8], (const fs_real(*)[9])m->filter.observations, FS_GNSS_VELOCITY, 3);
-    summary[9] = mean_ratio(summary[9], (const fs_real(*)[9])m->filter.observations, FS_GNSS_POSITION, 2);
-    summary[10] = mean_ratio(summary[10], (const fs_real(*)[9])m->filter.observations, FS_BARO, 1);
-    summary[11] = mean_ratio(summary[11], (const fs_real(*)[9])m->filter.observations, FS_MAG, 3);
+    summary[8] = mean_ratio(summary[8], m, FS_GNSS_VELOCITY, 3);
+    summary[9] = mean_ratio(summary[9], m, FS_GNSS_POSITION, 2);
+    summary[10] = mean_ratio(summary[10], m, FS_BARO, 1);
+    summary[11] = mean_ratio(summary[11], m, FS_MAG, 3);
 }

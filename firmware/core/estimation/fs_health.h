@@ -13,7 +13,7 @@
 #include "fs_types.h"
 
 /*
- * Write the summary of an estimator's record, shape (12,); it holds the mean ratios of the last call. health.py:107
+ * Write the summary of an estimator's record, shape (12,); it holds the mean ratios of the last call. health.py:104
  */
 void fs_health_kernel(const fs_estimator_memory *memory, fs_real summary[12]);
 

@@ -11,7 +11,6 @@
 #include "fs_source_checks.h"
 
 #define FS_BARO 6
-#define FS_FUSED_S 3
 #define FS_GNSS_VELOCITY 0
 #define FS_AIDED_S FS_LIT(1.0)
 #define FS_POSITION 6
@@ -51,8 +50,8 @@ void fs_take_baro(fs_estimator_memory *m, fs_filter *f, const fs_real row[], con
         m->flags.has_baro = 0;
         return;
     }
-    const fs_real last_s = f->observations[FS_BARO][FS_FUSED_S];
-    const fs_real speed_s = f->observations[FS_GNSS_VELOCITY + 2][FS_FUSED_S];
+    const fs_real last_s = f->observations[FS_BARO].fused_s;
+    const fs_real speed_s = f->observations[FS_GNSS_VELOCITY + 2].fused_s;
     if (f->clock[0] - last_s > params->reset_s && f->clock[0] - speed_s < FS_AIDED_S) {
         m->flags.has_baro = 0;
     }
@@ -70,7 +69,7 @@ void fs_take_range(fs_estimator_memory *m, fs_filter *f, const fs_real row[], co
     if (cos_tilt < FS_LEAST_COS_TILT) {
         return;
     }
-    if (m->flags.has_range == 1 && f->clock[0] - f->observations[FS_RANGE][FS_FUSED_S] > FS_RANGE_LOST_S) {
+    if (m->flags.has_range == 1 && f->clock[0] - f->observations[FS_RANGE].fused_s > FS_RANGE_LOST_S) {
         m->flags.has_range = 0;
     }
     const fs_real age_s = f->clock[0] - row[0];

@@ -8,21 +8,12 @@
 #include "fs_error_state.h"
 #include "fs_math.h"
 
-#define FS_NOISE 4
-#define FS_LAGGED 5
 #define FS_LARGEST_CORRELATION FS_LIT(0.95)
-#define FS_INNOVATION 0
-#define FS_INNOVATION_VARIANCE 1
-#define FS_TEST_RATIO 2
-#define FS_REFUSED 7
-#define FS_FUSED 6
-#define FS_NIS_SUM 8
 #define FS_ADAPTATION FS_LIT(0.01)
 #define FS_PRIOR FS_LIT(2.0)
 #define FS_HOLDS_HORIZONTAL FS_LIT(2.0)
-#define FS_FUSED_S 3
 
-/* kalman.py:201 */
+/* kalman.py:207 */
 void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
 {
     for (int32_t i = at; i < at + count; i++) {
@@ -36,7 +27,7 @@ void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real var
     }
 }
 
-/* kalman.py:89 */
+/* kalman.py:95 */
 void fs_clear(fs_real x[27])
 {
     for (int32_t i = 0; i < 27; i++) {
@@ -44,7 +35,7 @@ void fs_clear(fs_real x[27])
     }
 }
 
-/* Write P h' to ph and return h P h'. kalman.py:102 */
+/* Write P h' to ph and return h P h'. kalman.py:108 */
 static fs_real project(fs_filter *f)
 {
     fs_clear(f->ph);
@@ -73,23 +64,22 @@ static fs_real project(fs_filter *f)
  * Half the squared difference of two successive innovations has the variance of white noise, and an error of the
  * model, which both have, does not count. A slow sensor has the whole variance, as its correlation is counted apart.
  *
- * kalman.py:142
+ * kalman.py:148
  */
-static void adapt_noise(fs_real o[25][9], int32_t row, fs_real r, fs_real projected, fs_real last,
-                        const fs_noise *noise)
+static void adapt_noise(fs_observed *o, fs_real r, fs_real projected, fs_real last, const fs_noise *noise)
 {
-    const fs_real innovation = o[row][FS_INNOVATION];
-    o[row][FS_LAGGED] += FS_ADAPTATION * (innovation * last - o[row][FS_LAGGED]);
+    const fs_real innovation = o->innovation;
+    o->lagged += FS_ADAPTATION * (innovation * last - o->lagged);
     fs_real share = FS_ADAPTATION;
     fs_real square = innovation * innovation;
-    if (noise->is_slow == FS_LIT(0.0) && o[row][FS_FUSED] > FS_LIT(1.0)) {
-        share = fs_max(share, FS_LIT(2.0) / (o[row][FS_FUSED] + FS_PRIOR));
+    if (noise->is_slow == FS_LIT(0.0) && o->fused > FS_LIT(1.0)) {
+        share = fs_max(share, FS_LIT(2.0) / (o->fused + FS_PRIOR));
         square = FS_LIT(0.5) * (innovation - last) * (innovation - last);
     }
     const fs_real estimate = square - projected;
     const fs_real least = noise->least * noise->least;
     const fs_real largest = noise->largest * noise->largest;
-    o[row][FS_NOISE] = fs_min(fs_max(r + share * (estimate - r), least), largest);
+    o->noise = fs_min(fs_max(r + share * (estimate - r), least), largest);
 }
 
 /*
@@ -98,7 +88,7 @@ static void adapt_noise(fs_real o[25][9], int32_t row, fs_real r, fs_real projec
  * Joseph's form with such a gain subtracts P h' h P / variance from the covariance, except between two states that
  * both keep their values: one product for each element instead of two.
  *
- * kalman.py:119
+ * kalman.py:125
  */
 static void correct(fs_filter *f, fs_real innovation)
 {
@@ -127,32 +117,31 @@ static void correct(fs_filter *f, fs_real innovation)
     fs_write_nominal(f->nominal, &corrected);
 }
 
-/* kalman.py:161 */
+/* kalman.py:167 */
 bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *noise, fs_real holds)
 {
+    fs_observed *o = &f->observations[row];
     const fs_real least = noise->least * noise->least;
     const fs_real largest = noise->largest * noise->largest;
-    const fs_real r = fs_min(fs_max(f->observations[row][FS_NOISE] > FS_LIT(0.0) ? f->observations[row][FS_NOISE] :
-                                    noise->start * noise->start, least), largest);
+    const fs_real r = fs_min(fs_max(o->noise > FS_LIT(0.0) ? o->noise : noise->start * noise->start, least), largest);
     const fs_real projected = project(f);
     fs_real variance = projected + r;
     if (noise->is_slow > FS_LIT(0.0)) {
-        const fs_real correlation = fs_min(fs_max(f->observations[row][FS_LAGGED] / variance, FS_LIT(0.0)),
-                                           FS_LARGEST_CORRELATION);
+        const fs_real correlation = fs_min(fs_max(o->lagged / variance, FS_LIT(0.0)), FS_LARGEST_CORRELATION);
         variance = projected + r * (FS_LIT(1.0) + correlation) / (FS_LIT(1.0) - correlation);
     }
-    const fs_real last = f->observations[row][FS_INNOVATION];
+    const fs_real last = o->innovation;
     const fs_real ratio = innovation * innovation / (noise->gate * noise->gate * variance);
-    f->observations[row][FS_INNOVATION] = innovation;
-    f->observations[row][FS_INNOVATION_VARIANCE] = variance;
-    f->observations[row][FS_TEST_RATIO] = ratio;
+    o->innovation = innovation;
+    o->variance = variance;
+    o->test_ratio = ratio;
     if (!(ratio <= FS_LIT(1.0))) {
-        f->observations[row][FS_REFUSED] += FS_LIT(1.0);
+        o->refused += FS_LIT(1.0);
         return false;
     }
-    f->observations[row][FS_FUSED] += FS_LIT(1.0);
-    f->observations[row][FS_NIS_SUM] += innovation * innovation / variance;
-    adapt_noise(f->observations, row, r, projected, last, noise);
+    o->fused += FS_LIT(1.0);
+    o->nis_sum += innovation * innovation / variance;
+    adapt_noise(o, r, projected, last, noise);
     for (int32_t i = 0; i < 27; i++) {
         f->gain[i] = f->ph[i] / variance;
     }
@@ -174,11 +163,11 @@ bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *nois
         }
     }
     correct(f, innovation);
-    f->observations[row][FS_FUSED_S] = f->clock[0];
+    o->fused_s = f->clock[0];
     return true;
 }
 
-/* kalman.py:212 */
+/* kalman.py:218 */
 fs_real fs_deviation(const fs_filter *f, int32_t at, int32_t count)
 {
     fs_real total = FS_LIT(0.0);

@@ -8,6 +8,19 @@
 
 #include "fs_types.h"
 
+/* What the filter knows of the measurements of one quantity. */
+typedef struct {
+    fs_real innovation;
+    fs_real variance;
+    fs_real test_ratio;
+    fs_real fused_s;
+    fs_real noise;
+    fs_real lagged;
+    fs_real fused;
+    fs_real refused;
+    fs_real nis_sum;
+} fs_observed;
+
 /* The filter's arrays, all written in place. */
 typedef struct {
     fs_real nominal[28];
@@ -17,7 +30,7 @@ typedef struct {
     fs_real clock[2];
     fs_real behind[7];
     fs_real covariance[27][27];
-    fs_real observations[25][9];
+    fs_observed observations[25];
 } fs_filter;
 
 /* Range of a measurement's noise [1sigma]. The filter estimates the noise within it from its innovations. */
@@ -29,10 +42,10 @@ typedef struct {
     fs_real is_slow;
 } fs_noise;
 
-/* Make count states from at independent of all others, each with variance. kalman.py:201 */
+/* Make count states from at independent of all others, each with variance. kalman.py:207 */
 void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real variance);
 
-/* Set every item to zero. kalman.py:89 */
+/* Set every item to zero. kalman.py:95 */
 void fs_clear(fs_real x[27]);
 
 /*
@@ -41,11 +54,11 @@ void fs_clear(fs_real x[27]);
  * With holds above zero, tilt, velocity, position and accelerometer bias keep their values and their uncertainty (a
  * Schmidt-Kalman update); with HOLDS_HORIZONTAL, horizontal velocity and position.
  *
- * kalman.py:161
+ * kalman.py:167
  */
 bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *noise, fs_real holds);
 
-/* Return the root of the summed variances of count states from at. kalman.py:212 */
+/* Return the root of the summed variances of count states from at. kalman.py:218 */
 fs_real fs_deviation(const fs_filter *f, int32_t at, int32_t count);
 
 #endif

@@ -13,7 +13,6 @@
 #include "fs_source_checks.h"
 
 #define FS_GNSS_VELOCITY 0
-#define FS_FUSED_S 3
 #define FS_GNSS_LOST_S FS_LIT(1.0)
 #define FS_MOVES_M_S FS_LIT(0.15)
 #define FS_VELOCITY 3
@@ -27,14 +26,14 @@
 #define FS_LONGEST_INTERVAL_S FS_LIT(2.5)
 #define FS_SPEED_SMOOTHING_S FS_LIT(2.0)
 
-/* position_sources.py:159 */
+/* position_sources.py:158 */
 bool fs_is_velocity_measured(const fs_filter *f)
 {
-    const fs_real fused_s = f->observations[FS_GNSS_VELOCITY][FS_FUSED_S];
+    const fs_real fused_s = f->observations[FS_GNSS_VELOCITY].fused_s;
     return fused_s > FS_LIT(0.0) && f->clock[0] - fused_s < FS_GNSS_LOST_S;
 }
 
-/* position_sources.py:166 */
+/* position_sources.py:165 */
 bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f)
 {
     const fs_real north = m->gnss_speed_m_s[0];
@@ -43,7 +42,7 @@ bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f)
     return !is_measured || fs_sqrt(north * north + east * east) < FS_MOVES_M_S;
 }
 
-/* position_sources.py:174 */
+/* position_sources.py:173 */
 int32_t fs_hold_position(fs_estimator_memory *m, fs_filter *f, int32_t axis, const fs_estimator_params *params)
 {
     fs_hold *hold = &m->hold;
@@ -72,7 +71,7 @@ int32_t fs_hold_position(fs_estimator_memory *m, fs_filter *f, int32_t axis, con
  *
  * The slow part of that error is the bias of the next ones too: position and bias have opposite errors.
  *
- * position_sources.py:134
+ * position_sources.py:133
  */
 static void start_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params)
 {
@@ -96,7 +95,7 @@ static void start_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[]
 }
 
 /*
- * Propagate what belongs to GNSS to the time of the measurement, and note the state before it. position_sources.py:75
+ * Propagate what belongs to GNSS to the time of the measurement, and note the state before it. position_sources.py:74
  */
 static void begin_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], const fs_estimator_params *params)
 {
@@ -105,7 +104,7 @@ static void begin_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[]
     }
     fs_before_gnss *before = &m->before_gnss;
     before->elapsed_s = fs_max(FS_LIT(0.0), row[0] - m->last_gnss_s);
-    before->outage_s = f->clock[0] - f->observations[FS_GNSS_POSITION][FS_FUSED_S];
+    before->outage_s = f->clock[0] - f->observations[FS_GNSS_POSITION].fused_s;
     for (int32_t axis = 0; axis < 2; axis++) {
         const fs_real value = f->nominal[7 + axis];
         const fs_real value_2 = f->nominal[4 + axis];
@@ -120,13 +119,13 @@ static void begin_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[]
 
 /*
  * Add up the time between refused measurements; an accepted one ends it. Time without any does not count.
- * position_sources.py:120
+ * position_sources.py:119
  */
 static void count_refused(fs_estimator_memory *m, const fs_filter *f, int32_t first, fs_real elapsed_s)
 {
     for (int32_t i = 0; i < 6; i++) {
         const int32_t axis = i >= 3 ? i - 3 : i;
-        if (axis < first || f->observations[FS_GNSS_VELOCITY + i][FS_FUSED_S] == f->clock[0]) {
+        if (axis < first || f->observations[FS_GNSS_VELOCITY + i].fused_s == f->clock[0]) {
             m->refused_s[i] = FS_LIT(0.0);
         } else {
             if (m->refused_s[i] == FS_LIT(0.0)) {
@@ -138,7 +137,7 @@ static void count_refused(fs_estimator_memory *m, const fs_filter *f, int32_t fi
     }
 }
 
-/* Judge the measurement by its innovations, and reset what was refused too long. position_sources.py:91 */
+/* Judge the measurement by its innovations, and reset what was refused too long. position_sources.py:90 */
 static void end_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t first,
                      const fs_estimator_params *params)
 {
@@ -179,7 +178,7 @@ static void end_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], 
     }
 }
 
-/* position_sources.py:53 */
+/* position_sources.py:52 */
 int32_t fs_take_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t stage,
                      const fs_estimator_params *params)
 {

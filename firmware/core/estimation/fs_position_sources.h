@@ -15,15 +15,15 @@
 #include "fs_source_checks.h"
 #include "fs_types.h"
 
-/* Return True if a GNSS velocity was accepted within the last second. position_sources.py:159 */
+/* Return True if a GNSS velocity was accepted within the last second. position_sources.py:158 */
 bool fs_is_velocity_measured(const fs_filter *f);
 
-/* Return False if GNSS measures that what the vehicle stands on moves, as a boat does. position_sources.py:166 */
+/* Return False if GNSS measures that what the vehicle stands on moves, as a boat does. position_sources.py:165 */
 bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f);
 
 /*
  * Hold the horizontal position while the velocity is not measured, north before east; return the next axis.
- * position_sources.py:174
+ * position_sources.py:173
  */
 int32_t fs_hold_position(fs_estimator_memory *m, fs_filter *f, int32_t axis, const fs_estimator_params *params);
 
@@ -32,7 +32,7 @@ int32_t fs_hold_position(fs_estimator_memory *m, fs_filter *f, int32_t axis, con
  *
  * Without a known yaw only the vertical parts count. The last one resets what was refused too long.
  *
- * position_sources.py:53
+ * position_sources.py:52
  */
 int32_t fs_take_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t stage,
                      const fs_estimator_params *params);

@@ -17,9 +17,7 @@
 #define FS_POSITION 6
 #define FS_EQUAL_M FS_LIT(1e-09)
 #define FS_STUCK_S FS_LIT(1.0)
-#define FS_INNOVATION_VARIANCE 1
 #define FS_LEAST_VARIANCE FS_LIT(1e-12)
-#define FS_INNOVATION 0
 #define FS_LARGEST FS_LIT(3.0)
 #define FS_MEAN_S FS_LIT(1.0)
 #define FS_BARO 6
@@ -44,7 +42,7 @@
 #define FS_LIMIT FS_LIT(1.0)
 #define FS_ACCEL_HOLD_S FS_LIT(1.0)
 
-/* source_checks.py:134 */
+/* source_checks.py:133 */
 void fs_add_fault_noise(const fs_checks *c, fs_filter *f, fs_real dt_s)
 {
     if (f->clock[0] < c->accel_until_s) {
@@ -58,7 +56,7 @@ void fs_add_fault_noise(const fs_checks *c, fs_filter *f, fs_real dt_s)
     }
 }
 
-/* source_checks.py:146 */
+/* source_checks.py:145 */
 bool fs_is_stuck(fs_checks *c, fs_real altitude_m, fs_real now_s)
 {
     if (fs_abs(altitude_m - c->altitude_m) > FS_EQUAL_M) {
@@ -69,18 +67,18 @@ bool fs_is_stuck(fs_checks *c, fs_real altitude_m, fs_real now_s)
     return equal_s > FS_STUCK_S;
 }
 
-/* Return a mean of innovations upwards with the newest one of a row. source_checks.py:96 */
+/* Return a mean of innovations upwards with the newest one of a row. source_checks.py:94 */
 static fs_real mean_(fs_real mean, const fs_filter *f, int32_t row, fs_real sign, fs_real dt_s)
 {
-    /* 0 before the first fusion */
-    const fs_real variance = fs_max(f->observations[row][FS_INNOVATION_VARIANCE], FS_LEAST_VARIANCE);
-    fs_real value = sign * f->observations[row][FS_INNOVATION] / fs_sqrt(variance);
+    const fs_observed *o = &f->observations[row];
+    const fs_real variance = fs_max(o->variance, FS_LEAST_VARIANCE); /* 0 before the first fusion */
+    fs_real value = sign * o->innovation / fs_sqrt(variance);
     value = fs_min(fs_max(value, -FS_LARGEST), FS_LARGEST);
     const fs_real made = mean + fs_min(dt_s / FS_MEAN_S, FS_LIT(1.0)) * (value - mean);
     return made;
 }
 
-/* source_checks.py:106 */
+/* source_checks.py:105 */
 void fs_take_pressure_innovation(fs_checks *c, const fs_filter *f, fs_real measured_s, fs_real altitude_m)
 {
     c->pressure = mean_(c->pressure, f, FS_BARO, FS_LIT(1.0), fs_max(FS_LIT(0.0), measured_s - c->altitude_s));
@@ -89,7 +87,7 @@ void fs_take_pressure_innovation(fs_checks *c, const fs_filter *f, fs_real measu
 }
 
 /*
- * Decide whether barometer or vertical GNSS velocity is wrong, beyond the noise of their drift. source_checks.py:206
+ * Decide whether barometer or vertical GNSS velocity is wrong, beyond the noise of their drift. source_checks.py:205
  */
 static void judge_height(fs_checks *c, fs_real now_s, fs_real noise_m)
 {
@@ -109,7 +107,7 @@ static void judge_height(fs_checks *c, fs_real now_s, fs_real noise_m)
     }
 }
 
-/* source_checks.py:184 */
+/* source_checks.py:183 */
 void fs_follow_height_drift(fs_checks *c, const fs_real row[], bool flies, fs_real accuracy_m_s)
 {
     const fs_real dt_s = row[0] - c->gnss_s;
@@ -142,7 +140,7 @@ void fs_follow_height_drift(fs_checks *c, const fs_real row[], bool flies, fs_re
  * not. A wrong velocity has moved position and velocity of the filter by as much as the drift, and has noise from now
  * on.
  *
- * source_checks.py:221
+ * source_checks.py:220
  */
 static void start_fault(fs_checks *c, fs_filter *f, int32_t axis)
 {
@@ -160,7 +158,7 @@ static void start_fault(fs_checks *c, fs_filter *f, int32_t axis)
 
 /*
  * Let the position become uncertain at the rate of the drift, for the velocity may be wrong instead.
- * source_checks.py:239
+ * source_checks.py:238
  */
 static void doubt_position(const fs_checks *c, fs_filter *f, int32_t axis, fs_real dt_s)
 {
@@ -169,7 +167,7 @@ static void doubt_position(const fs_checks *c, fs_filter *f, int32_t axis, fs_re
     f->covariance[at][at] = grown_m * grown_m;
 }
 
-/* source_checks.py:155 */
+/* source_checks.py:154 */
 void fs_follow_drift(fs_checks *c, fs_filter *f, const fs_real row[], fs_real eph_m)
 {
     const fs_real dt_s = row[0] - c->gnss_s;
@@ -204,7 +202,7 @@ void fs_follow_drift(fs_checks *c, fs_filter *f, const fs_real row[], fs_real ep
     c->gnss_s = row[0];
 }
 
-/* source_checks.py:123 */
+/* source_checks.py:122 */
 void fs_take_gnss_innovations(fs_checks *c, const fs_filter *f, fs_real dt_s, bool has_baro)
 {
     c->speed = mean_(c->speed, f, FS_GNSS_VELOCITY + 2, FS_LIT(-1.0), dt_s);
@@ -216,7 +214,7 @@ void fs_take_gnss_innovations(fs_checks *c, const fs_filter *f, fs_real dt_s, bo
     }
 }
 
-/* source_checks.py:113 */
+/* source_checks.py:112 */
 void fs_take_horizontal_innovations(fs_checks *c, const fs_filter *f, fs_real dt_s)
 {
     for (int32_t axis = 0; axis < 2; axis++) {
@@ -228,7 +226,7 @@ void fs_take_horizontal_innovations(fs_checks *c, const fs_filter *f, fs_real dt
     }
 }
 
-/* source_checks.py:247 */
+/* source_checks.py:246 */
 bool fs_position_drifts(const fs_checks *c)
 {
     const fs_real north = c->fault[0];

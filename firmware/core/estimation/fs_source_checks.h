@@ -35,17 +35,17 @@ typedef struct {
 
 /*
  * Add the uncertainty of the sensors that count as wrong, so that the filter learns their error anew.
- * source_checks.py:134
+ * source_checks.py:133
  */
 void fs_add_fault_noise(const fs_checks *c, fs_filter *f, fs_real dt_s);
 
 /*
  * Return True if the barometer has repeated its altitude for 1 s; its noise changes each measurement.
- * source_checks.py:146
+ * source_checks.py:145
  */
 bool fs_is_stuck(fs_checks *c, fs_real altitude_m, fs_real now_s);
 
-/* Take the barometer's newest innovation, of an altitude measured at measured_s. source_checks.py:106 */
+/* Take the barometer's newest innovation, of an altitude measured at measured_s. source_checks.py:105 */
 void fs_take_pressure_innovation(fs_checks *c, const fs_filter *f, fs_real measured_s, fs_real altitude_m);
 
 /*
@@ -53,7 +53,7 @@ void fs_take_pressure_innovation(fs_checks *c, const fs_filter *f, fs_real measu
  *
  * accuracy_m_s is that of the velocity, whose noise adds up.
  *
- * source_checks.py:184
+ * source_checks.py:183
  */
 void fs_follow_height_drift(fs_checks *c, const fs_real row[], bool flies, fs_real accuracy_m_s);
 
@@ -64,20 +64,20 @@ void fs_follow_height_drift(fs_checks *c, const fs_real row[], bool flies, fs_re
  * that. A jump counts as a change of one accuracy: the gate of the innovation refuses it. The barometer watches the
  * height.
  *
- * source_checks.py:155
+ * source_checks.py:154
  */
 void fs_follow_drift(fs_checks *c, fs_filter *f, const fs_real row[], fs_real eph_m);
 
-/* Take the vertical innovations of GNSS, and decide whether the accelerometer is wrong. source_checks.py:123 */
+/* Take the vertical innovations of GNSS, and decide whether the accelerometer is wrong. source_checks.py:122 */
 void fs_take_gnss_innovations(fs_checks *c, const fs_filter *f, fs_real dt_s, bool has_baro);
 
 /*
  * Take the horizontal innovations of GNSS velocity, and note when they contradict the prediction.
- * source_checks.py:113
+ * source_checks.py:112
  */
 void fs_take_horizontal_innovations(fs_checks *c, const fs_filter *f, fs_real dt_s);
 
-/* Return True if the GNSS position drifts from its velocity along an axis. source_checks.py:247 */
+/* Return True if the GNSS position drifts from its velocity along an axis. source_checks.py:246 */
 bool fs_position_drifts(const fs_checks *c);
 
 #endif

@@ -19,6 +19,7 @@ from flightstack.firmware.generator.types import (
     Array,
     Record,
     Several,
+    Table,
     c_type,
     has_arrays,
     is_numpy,
@@ -178,7 +179,7 @@ class Assignments:
             raise self.function.refusal(target, "assignment to an attribute")
         if value.type is NOTHING or isinstance(value.type, Several):
             raise self.function.refusal(target, "values of different types", "assignment of no value")
-        if isinstance(value.type, Array):
+        if isinstance(value.type, Array | Table):
             self._alias_array(target, value)
             return
         variable, is_new = self.writer.declare(target, target.id, value.type)

@@ -122,10 +122,17 @@ uint16_t filter_steps_push(filter_steps *s, uint16_t octet)
 uint32_t filter_steps_hash(const filter_steps *s)
 {
     const fs_filter *const f = &s->memory.filter;
+    union {
+        fs_observed fields;
+        fs_real values[sizeof(fs_observed) / sizeof(fs_real)];
+    } view;
     uint32_t hash = hashed(s->hash, f->nominal, (uint16_t)(sizeof f->nominal / sizeof f->nominal[0]));
 
     hash = hashed(hash, &f->covariance[0][0], (uint16_t)(sizeof f->covariance / sizeof f->covariance[0][0]));
-    hash = hashed(hash, &f->observations[0][0], (uint16_t)(sizeof f->observations / sizeof f->observations[0][0]));
+    for (uint16_t i = 0U; i < (uint16_t)(sizeof f->observations / sizeof f->observations[0]); i++) {
+        view.fields = f->observations[i];
+        hash = hashed(hash, view.values, (uint16_t)(sizeof view.values / sizeof view.values[0]));
+    }
     return hashed(hash, &s->memory.yaw_models[0][0], (uint16_t)(sizeof s->memory.yaw_models / sizeof s->row[0]));
 }
 
