@@ -101,7 +101,7 @@ class Program:
 
     def send_signal(self, number: int) -> None:
         if self.poll() is None:
-            with contextlib.suppress(ProcessLookupError):  # it has just ended, which is reported a moment later
+            with contextlib.suppress(ProcessLookupError):  # it ended, which is reported a moment later
                 os.kill(self.pid, number)
 
     def terminate(self) -> None:
