@@ -31,6 +31,8 @@ from flightstack.estimation.kalman import (
     GNSS_VELOCITY,
     HOLD_POSITION,
     HOLDS_HORIZONTAL,
+    HOLDS_TILT,
+    HOLDS_TILT_AND_GYRO,
     MAG,
     RANGE,
     REST_RATE,
@@ -51,6 +53,8 @@ _AIR_KG_M3, _DRAG_GATE = 1.225, 5.0
 _HEIGHT_RETURN_S, _BARO_LOST_S = 1800.0, 5.0
 """Time constant with which the change of the vertical error of GNSS since the first fix returns to zero, and age of the
 last pressure altitude above which it does so faster."""
+_MAG_START = 25.0
+"""Noise of the magnetometer that is assumed at the start, by its least."""
 _AIDED_S = 1.0
 """Time after an accepted GNSS velocity in which the horizontal motion counts as measured."""
 LEAST_COS_TILT = 0.7
@@ -155,19 +159,25 @@ def fuse_gnss_position(
 
 
 @compiled
+def _is_aided(f: Filter) -> bool:
+    """Return True if GNSS measures the horizontal motion."""
+    age_s: float = f.clock[0] - f.observations[GNSS_VELOCITY]["fused_s"]
+    return age_s < _AIDED_S
+
+
+@compiled
 def fuse_baro(f: Filter, altitude_m: float, age_s: float, params: EstimatorParams) -> None:
     """Fuse a pressure altitude: minus the position down, plus the barometer's bias.
 
     It leaves horizontal position and velocity alone in dead reckoning: their errors are then so much larger than that
     of the height that pressure in turns and gusts, which is not white noise, moves them by metres.
     """
-    is_aided = f.clock[0] - f.observations[GNSS_VELOCITY]["fused_s"] < _AIDED_S
     clear(f.h)
     f.h[POSITION + 2] = -1.0
     f.h[BARO_BIAS] = 1.0
     predicted_m = -(f.nominal[9] - age_s * f.nominal[6]) + f.nominal[24]
     noise = Noise(params.baro_noise_m, 1.0, params.baro_largest_noise_m, params.baro_gate, 0.0)
-    fuse(f, BARO, altitude_m - predicted_m, noise, 0.0 if is_aided else HOLDS_HORIZONTAL)
+    fuse(f, BARO, altitude_m - predicted_m, noise, 0.0 if _is_aided(f) else HOLDS_HORIZONTAL)
 
 
 @compiled
@@ -190,9 +200,13 @@ def fuse_range(f: Filter, vertical_m: float, ground_m: float, age_s: float, para
 
 @compiled
 def fuse_field_axis(f: Filter, axis: int, measured: Vector3, params: EstimatorParams) -> None:
-    """Fuse the magnetic field along an axis of the body."""
-    largest = params.mag_largest_noise_gauss
-    noise = Noise(params.mag_noise_gauss, largest, largest, params.mag_gate, 1.0)
+    """Fuse the magnetic field along an axis of the body.
+
+    Its errors, of which soft iron makes most, change with the heading: it corrects the yaw, not the tilt. Nor does it
+    correct the gyro's biases about x and y, by which the tilt moves, while the velocity tells more of them.
+    """
+    least, largest = params.mag_noise_gauss, params.mag_largest_noise_gauss
+    noise = Noise(least, min(_MAG_START * least, largest), largest, params.mag_gate, 1.0)
     n = read_nominal(f.nominal)
     earth, body = n.earth_field_ned_gauss, n.body_field_frd_gauss
     clear(f.h)
@@ -205,7 +219,8 @@ def fuse_field_axis(f: Filter, axis: int, measured: Vector3, params: EstimatorPa
     else:
         expected = field_z_jacobian(n.attitude, earth, body, f.h)
         innovation = measured.z - expected
-    fuse(f, MAG + axis, innovation, noise, 1.0 - params.mag_corrects_tilt)
+    held = HOLDS_TILT_AND_GYRO if _is_aided(f) else HOLDS_TILT
+    fuse(f, MAG + axis, innovation, noise, 0.0 if params.mag_corrects_tilt > 0.0 else held)
 
 
 @compiled

@@ -31,7 +31,9 @@ _PRIOR = 2.0
 
 _LARGEST_CORRELATION = 0.95
 
-HOLDS_HORIZONTAL = 2.0
+HOLDS_TILT, HOLDS_HORIZONTAL, HOLDS_TILT_AND_GYRO = 1.0, 2.0, 3.0
+"""States that keep their values and their uncertainty in an update: tilt, velocity, position and the accelerometer's
+bias; the horizontal velocity and position; those of the first and the gyro's biases about x and y."""
 
 BEHIND_SIZE = 7
 
@@ -42,8 +44,9 @@ class Observed(NamedTuple):
     innovation: float
     """The newest one; the next two are of it."""
     variance: float
+    """That the filter expects of it."""
     test_ratio: float
-    """Squared ratio to the gate."""
+    """Squared ratio to the gate; that of a slow sensor is as wide as its errors are alike."""
     fused_s: float
     """Time of the last accepted one."""
     noise: float
@@ -167,25 +170,32 @@ def _adapt_noise(o: ObservedRecord, r: float, projected: float, last: float, noi
 def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> bool:
     """Fuse a scalar measurement with the Jacobian ``f.h``; return True if it is within its gate.
 
-    With ``holds`` above zero, tilt, velocity, position and accelerometer bias keep their values and their
-    uncertainty (a Schmidt-Kalman update); with ``HOLDS_HORIZONTAL``, horizontal velocity and position.
+    One that the noise at the start would not refuse moves the noise even so: a slow error, such as that of soft iron
+    on another heading, else had an axis refused for good. With ``holds`` other than zero, these states keep their values
+    and their uncertainty: a Schmidt-Kalman update.
     """
     o = f.observations[row]
     least, largest = noise.least * noise.least, noise.largest * noise.largest
     r = min(max(o["noise"] if o["noise"] > 0.0 else noise.start * noise.start, least), largest)
     projected = _project(f)
-    variance = projected + r
+    expected = projected + r
+    variance = expected
     if noise.is_slow > 0.0:
-        correlation = min(max(o["lagged"] / variance, 0.0), _LARGEST_CORRELATION)
+        correlation = min(max(o["lagged"] / expected, 0.0), _LARGEST_CORRELATION)
         variance = projected + r * (1.0 + correlation) / (1.0 - correlation)
     last = o["innovation"]
     ratio = innovation * innovation / (noise.gate * noise.gate * variance)
-    o["innovation"], o["variance"], o["test_ratio"] = innovation, variance, ratio
+    o["innovation"], o["variance"], o["test_ratio"] = innovation, expected, ratio
     if not ratio <= 1.0:
         o["refused"] += 1.0
+        if (
+            noise.is_slow > 0.0
+            and innovation * innovation < noise.gate * noise.gate * noise.start * noise.start
+        ):
+            _adapt_noise(o, r, projected, last, noise)
         return False
     o["fused"] += 1.0
-    o["nis_sum"] += innovation * innovation / variance
+    o["nis_sum"] += innovation * innovation / expected
     _adapt_noise(o, r, projected, last, noise)
     for i in range(ERROR_STATES):
         f.gain[i] = f.ph[i] / variance
@@ -194,7 +204,7 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
             f.gain[3 + i], f.gain[6 + i] = 0.0, 0.0
     elif holds > 0.0:
         f.gain[0], f.gain[1] = 0.0, 0.0
-        for i in range(3, 9):
+        for i in range(3, 11 if holds == HOLDS_TILT_AND_GYRO else 9):
             f.gain[i] = 0.0
         for i in range(12, 15):
             f.gain[i] = 0.0

@@ -29,7 +29,7 @@ from flightstack.estimation.error_state import (
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import BEHIND_SIZE, Filter
 
-_TURN_S, _LEAST_S = 1.0, 1e-3
+_TURN_S, _LEAST_S = 0.25, 1e-3
 _MOST_ANGLE, _MOST_VELOCITY = 0.3**2, 5.0**2
 """Variances [rad²], [m²/s²] beyond which unknown motion adds nothing: other sensors are believed by then."""
 
@@ -129,7 +129,7 @@ def _add_body_noise(p: Covariance, at: int, axis: Vector3, variance: float) -> N
 def _turn_variance(angle: Vector3, dt_s: float, params: EstimatorParams) -> float:
     """Return the variance of each axis of the attitude by errors of scale and alignment of the gyro in a step.
 
-    An error e gives e ω T after a turn of duration T. As white noise that is a density of (e ω)² T, with T = 1 s.
+    An error e gives e ω T after a turn of duration T. As white noise that is a density of (e ω)² T, with T = 0.25 s.
     """
     square = angle.x * angle.x + angle.y * angle.y + angle.z * angle.z
     error = params.gyro_scale_error
@@ -137,20 +137,49 @@ def _turn_variance(angle: Vector3, dt_s: float, params: EstimatorParams) -> floa
 
 
 @compiled
-def _keep_misaligned(p: Covariance, params: EstimatorParams) -> None:
-    """Keep the horizontal biases of the accelerometer as uncertain as the alignment of the gyro leaves them.
+def _keep_misaligned(p: Covariance, at: int, axis: Vector3, params: EstimatorParams) -> None:
+    """Keep a horizontal bias of the accelerometer as uncertain as the alignment of the gyro leaves it.
 
     A yaw rate ω measured along an axis that is off by e turns the tilt by e in step with the heading, which gives the
-    same velocity as a bias g e of the accelerometer. No other measurement tells them apart.
+    same velocity as a bias g e of the accelerometer. No other measurement tells them apart: what is added is a bias
+    along ``axis``, a unit vector in the world frame, with the tilt that hides it from the velocity.
     """
-    bias = params.gravity_m_s2 * params.gyro_scale_error
-    for axis in range(ACCEL_BIAS, ACCEL_BIAS + 2):
-        p[axis, axis] = max(p[axis, axis], bias * bias)
+    gravity = params.gravity_m_s2
+    bias = gravity * params.gyro_scale_error
+    lacking = max(bias * bias - p[at, at], 0.0)
+    about_north, about_east = axis.y / gravity, -axis.x / gravity
+    p[ATTITUDE, ATTITUDE] += lacking * about_north * about_north
+    p[ATTITUDE, ATTITUDE + 1] += lacking * about_north * about_east
+    p[ATTITUDE + 1, ATTITUDE + 1] += lacking * about_east * about_east
+    p[ATTITUDE, at] += lacking * about_north
+    p[ATTITUDE + 1, at] += lacking * about_east
+    p[at, at] += lacking
+
+
+@compiled
+def _pressure_variance(f: Filter, change: Vector3, dt_s: float, params: EstimatorParams) -> float:
+    """Return the variance that a change of the airspeed in a step adds to the barometer's bias.
+
+    The port feels a share of the dynamic pressure: an altitude of share u² / 2 g for the airspeed u, which changes by
+    share u du / g. The wind is not known. As white noise, like turns.
+    """
+    north, east = f.nominal[4], f.nominal[5]
+    square = north * north + east * east + params.wind_m_s * params.wind_m_s
+    share = params.baro_dynamic_share / params.gravity_m_s2
+    return (
+        share * share * square * (change.x * change.x + change.y * change.y) * (_TURN_S / max(dt_s, _LEAST_S))
+    )
 
 
 @compiled
 def _add_process_noise(
-    f: Filter, q: Quaternion, angle: Vector3, dt_s: float, noise: ImuNoise, params: EstimatorParams
+    f: Filter,
+    q: Quaternion,
+    angle: Vector3,
+    change: Vector3,
+    dt_s: float,
+    noise: ImuNoise,
+    params: EstimatorParams,
 ) -> None:
     p, share = f.covariance, f.clock[1]
     gyro, accel = params.gyro_noise, params.accel_noise
@@ -167,11 +196,13 @@ def _add_process_noise(
     _add(p, POSITION, 3, 1e-8 * dt_s)
     _add(p, GYRO_BIAS, 3, params.gyro_bias_walk * params.gyro_bias_walk * dt_s)
     _add(p, ACCEL_BIAS, 3, params.accel_bias_walk * params.accel_bias_walk * dt_s)
-    _keep_misaligned(p, params)
+    _keep_misaligned(p, ACCEL_BIAS, x, params)
+    _keep_misaligned(p, ACCEL_BIAS + 1, y, params)
     _add(p, EARTH_FIELD, 3, params.earth_field_walk * params.earth_field_walk * dt_s)
     _add(p, BODY_FIELD, 3, params.body_field_walk * params.body_field_walk * dt_s)
     _add(p, WIND, 2, params.wind_walk * params.wind_walk * dt_s)
-    _add(p, BARO_BIAS, 1, params.baro_walk * params.baro_walk * dt_s)
+    pressure = _pressure_variance(f, change, dt_s, params)
+    _add(p, BARO_BIAS, 1, params.baro_walk * params.baro_walk * dt_s + pressure)
 
 
 @compiled
@@ -200,7 +231,7 @@ def predict_errors(f: Filter, noise: ImuNoise, params: EstimatorParams) -> None:
     attitude = Quaternion(f.nominal[0], f.nominal[1], f.nominal[2], f.nominal[3])
     middle = quaternion_product(attitude, rotation_over(angle, -0.5))
     predict_covariance(f.covariance, middle, rotate(conjugate(middle), change), dt_s)
-    _add_process_noise(f, middle, angle, dt_s, noise, params)
+    _add_process_noise(f, middle, angle, change, dt_s, noise, params)
     for i in range(BEHIND_SIZE):
         f.behind[i] = 0.0
 
