@@ -166,20 +166,20 @@ class Clock:
 
 
 @pytest.fixture
-def thousand(tmp_path: Path) -> Path:
-    for number in range(1000):
+def hundred(tmp_path: Path) -> Path:
+    for number in range(100):
         write(tmp_path / f"{number:04}.ulg", b"log", 1_000 + number)
     os.utime(tmp_path, (1_000, 1_000))
     return tmp_path
 
 
 def test_a_list_of_logs_examines_the_folder_once_an_interval(
-    thousand: Path, monkeypatch: pytest.MonkeyPatch
+    hundred: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     clock = Clock(monkeypatch)
-    library = LogLibrary(thousand)
+    library = LogLibrary(hundred)
     first = library.logs()
-    assert (len(first), clock.take()) == (1000, (1, 1000))
+    assert (len(first), clock.take()) == (100, (1, 100))
     assert all(library.logs() is first for _ in range(118))
     assert clock.take() == (0, -1)
     clock.now_s += log_library.SCAN_INTERVAL_S
@@ -188,48 +188,48 @@ def test_a_list_of_logs_examines_the_folder_once_an_interval(
 
 
 def test_changes_by_other_programs_show_in_the_next_interval(
-    thousand: Path, monkeypatch: pytest.MonkeyPatch
+    hundred: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     clock = Clock(monkeypatch)
-    library = LogLibrary(thousand)
+    library = LogLibrary(hundred)
     library.logs()
-    (thousand / "0007.ulg").unlink()
-    write(thousand / "new.ulg", b"new", int(clock.now_s))
-    write(thousand / "copy", b"longer log", 1_001)
-    (thousand / "copy").rename(thousand / "0001.ulg")
-    os.utime(thousand, (2_000, 2_000))
+    (hundred / "0007.ulg").unlink()
+    write(hundred / "new.ulg", b"new", int(clock.now_s))
+    write(hundred / "copy", b"longer log", 1_001)
+    (hundred / "copy").rename(hundred / "0001.ulg")
+    os.utime(hundred, (2_000, 2_000))
     clock.take()
     clock.now_s += log_library.SCAN_INTERVAL_S
     logs = {log.name: log.size for log in library.logs()}
-    assert (len(logs), logs["new.ulg"], logs["0001.ulg"]) == (1000, 3, 10)
+    assert (len(logs), logs["new.ulg"], logs["0001.ulg"]) == (100, 3, 10)
     assert clock.take() == (1, 2)
-    write(thousand / "new.ulg", b"it grows", int(clock.now_s))
+    write(hundred / "new.ulg", b"it grows", int(clock.now_s))
     clock.now_s += log_library.SCAN_INTERVAL_S
     assert library.logs()[-1] == LogInfo("new.ulg", 8, 1_000_001)
 
 
-def test_a_log_of_this_process_shows_at_once(thousand: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_log_of_this_process_shows_at_once(hundred: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Clock(monkeypatch)
     own: list[str] = []
-    library = LogLibrary(thousand, lambda: own[0] if own else None)
+    library = LogLibrary(hundred, lambda: own[0] if own else None)
     library.logs()
-    write(thousand / "own.ulg", b"begun", 999_999)
+    write(hundred / "own.ulg", b"begun", 999_999)
     own.append("own.ulg")
     assert library.logs()[-1] == LogInfo("own.ulg", 5, 999_999)
-    write(thousand / "own.ulg", b"begun and ended", 1_000_000)
+    write(hundred / "own.ulg", b"begun and ended", 1_000_000)
     own.clear()
     assert library.logs()[-1] == LogInfo("own.ulg", 15, 1_000_000)
 
 
-def test_an_overwritten_log_shows_its_new_size(thousand: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_overwritten_log_shows_its_new_size(hundred: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     clock = Clock(monkeypatch)
     own: list[str] = []
-    library = LogLibrary(thousand, lambda: own[0] if own else None)
+    library = LogLibrary(hundred, lambda: own[0] if own else None)
     library.logs()
     own.append("0007.ulg")
-    with create_log_file(thousand / "0007.ulg", overwrite=True) as log:
+    with create_log_file(hundred / "0007.ulg", overwrite=True) as log:
         log.write(b"a new log in the same file")
-        os.utime(thousand / "0007.ulg", (1_000_000, 1_000_000))
+        os.utime(hundred / "0007.ulg", (1_000_000, 1_000_000))
     assert library.logs()[-1] == LogInfo("0007.ulg", 26, 1_000_000)
     clock.take()
     assert library.logs()[-1].size == 26
@@ -238,16 +238,16 @@ def test_an_overwritten_log_shows_its_new_size(thousand: Path, monkeypatch: pyte
 
 @pytest.mark.parametrize("ends", [False, True])
 def test_the_open_log_shows_its_size_after_a_pause(
-    thousand: Path, monkeypatch: pytest.MonkeyPatch, ends: bool
+    hundred: Path, monkeypatch: pytest.MonkeyPatch, ends: bool
 ) -> None:
     clock = Clock(monkeypatch)
     own: list[str] = ["own.ulg"]
-    write(thousand / "own.ulg", b"begun", 1_000_000)
-    library = LogLibrary(thousand, lambda: own[0] if own else None)
+    write(hundred / "own.ulg", b"begun", 1_000_000)
+    library = LogLibrary(hundred, lambda: own[0] if own else None)
     library.logs()
     clock.now_s += 70.0
     library.logs()
-    write(thousand / "own.ulg", b"begun, paused, grown", 1_000_070)
+    write(hundred / "own.ulg", b"begun, paused, grown", 1_000_070)
     if ends:
         own.clear()
     else:
@@ -256,12 +256,12 @@ def test_the_open_log_shows_its_size_after_a_pause(
 
 
 def test_an_old_log_that_another_process_grows_shows_its_size_in_a_minute(
-    thousand: Path, monkeypatch: pytest.MonkeyPatch
+    hundred: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     clock = Clock(monkeypatch)
-    library = LogLibrary(thousand)
+    library = LogLibrary(hundred)
     library.logs()
-    write(thousand / "0007.ulg", b"paused and grown", 1_000_030)
+    write(hundred / "0007.ulg", b"paused and grown", 1_000_030)
     clock.now_s += log_library.RECENT_S
     assert library.logs()[-1] == LogInfo("0007.ulg", 16, 1_000_030)
 
