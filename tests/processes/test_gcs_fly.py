@@ -26,7 +26,7 @@ from gcs_cli.report.analysis import read_flight
 from gcs_cli.tui.fly.panels import SEVERITIES, clock_text
 from tests.support.commands import Ended, gcs
 from tests.support.process import await_output, children_of, ends_of
-from tests.support.programs import Program
+from tests.support.programs import NEW_INTERPRETERS, Program
 from tests.support.warm_children import warm_children
 
 LONG_S = 120.0  # a bound for a busy machine that compiles the kernels anew; a flight takes two seconds
@@ -247,7 +247,10 @@ def test_an_interrupted_flight_is_ended_in_order(tmp_path: Path, number: signal.
     assert (out / "report.html").exists()
 
 
-def test_killed_fly_ends_its_vehicle_and_its_log_is_whole(tmp_path: Path) -> None:
+def test_killed_fly_ends_its_vehicle_and_its_log_is_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(NEW_INTERPRETERS, "1")
     out = tmp_path / "run"
     with flight(out) as (process, _):
         process.kill()

@@ -7,9 +7,12 @@ import os
 import signal
 from pathlib import Path
 
+import pytest
+
 from flightstack.testing.instances import free_instance
 from tests.support.commands import gcs
 from tests.support.process import Process, children_of, ends_of
+from tests.support.programs import NEW_INTERPRETERS
 from tests.support.terminal import terminal
 
 
@@ -50,7 +53,8 @@ def test_sim_ends_all_when_one_process_dies() -> None:
         sim.kill()
 
 
-def test_killed_sim_ends_its_vehicle() -> None:
+def test_killed_sim_ends_its_vehicle(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(NEW_INTERPRETERS, "1")
     sim = Process(
         "gcs_cli", "sim", "--instance", str(free_instance()), "--log", "none", "--state-dir", "none"
     )

@@ -19,6 +19,7 @@ import pytest
 from tests.support.commands import Ended, gcs
 from tests.support.plugin_site import ROOT, install
 from tests.support.process import BOUND_S, Process, children_of
+from tests.support.programs import NEW_INTERPRETERS
 from tests.support.warm_children import warm_children
 
 GOOD = "plan = 'hop'\nstate = 'truth'\n[expect]\nmax_error_m = 0.2\n"
@@ -194,7 +195,8 @@ def test_ctrl_c_restores_the_terminal(folder: Path) -> None:
         os.close(terminal)
 
 
-def test_sigkill_leaves_no_process_and_no_file(folder: Path) -> None:
+def test_sigkill_leaves_no_process_and_no_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(NEW_INTERPRETERS, "1")
     run, worker = flying("--junit", "j.xml")
     run.kill()
     assert has_ended(worker)

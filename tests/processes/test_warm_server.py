@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from flightstack.testing.instances import free_instance
 from tests.support.plugin_site import install
+from tests.support.process import children_of, ends_of
 from tests.support.programs import ROOT, Program
 
 CLIENT = """
@@ -51,3 +53,15 @@ def test_a_signal_to_a_program_whose_end_is_not_reported_yet_is_none(monkeypatch
     monkeypatch.setattr(program, "poll", lambda: None)  # its process is gone, the server has not said so
     program.kill()
     assert program.returncode == 0
+
+
+def test_children_of_a_program_are_found_and_end_with_it(tmp_path: Path) -> None:
+    arguments = ["sim", "--instance", str(free_instance()), "--log", "none", "--state-dir", "none"]
+    sim = Program("gcs_cli", arguments, tmp_path)
+    while "Ctrl-C ends" not in (line := sim.stdout.readline()):
+        assert line, "gcs sim ended at its start"
+    children = children_of(sim.pid)
+    assert set(children) == {"sim_bridge", "flightstack"}
+    with ends_of(*children.values()):
+        sim.kill()
+    sim.communicate()

@@ -17,7 +17,7 @@ from pathlib import Path
 from queue import Empty, Queue
 from typing import Any
 
-from tests.support.programs import PROGRAMS, Program
+from tests.support.programs import PROGRAMS, Program, started_by
 
 BOUND_S = 60.0
 MOST_LINES = 200
@@ -43,8 +43,8 @@ def start(module: str, arguments: Sequence[str], listens: bool) -> Program | sub
 
 
 def children_of(pid: int) -> dict[str, int]:
-    """Return module name and process id of the children of a process, from /proc."""
-    found = {}
+    """Return module name and process id of the children of a process: from /proc, and of the warm server."""
+    found = started_by(pid)
     for entry in Path("/proc").iterdir():
         if not entry.name.isdigit():
             continue

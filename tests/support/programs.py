@@ -15,15 +15,25 @@ import threading
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 PROGRAMS = ("flightstack", "sim_bridge", "gcs_cli")
 ROOT = Path(__file__).resolve().parents[2]
+LARGEST_ANSWER = 4096
+GIVEN = 3
+"""Descriptor of a program's own socket to the server that has started it."""
+ASKS: list[socket.socket] = []
+"""That socket in a program of the server; nothing in a test process."""
+NEW_INTERPRETERS = "FLIGHTSTACK_TEST_NEW_INTERPRETERS"
+"""Environment variable of programs whose own children are new interpreters, as those of users are."""
+_ONE_AT_A_TIME = threading.Lock()
 
 
 @cache
 def _server() -> socket.socket:
-    """Start the server of this test process; it ends with this process."""
+    """Return the server of this program, or start that of this test process; it ends with this process."""
+    if ASKS:
+        return ASKS[0]
     ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     command = [sys.executable, "-m", "tests.support.warm_server"]
     server = subprocess.Popen(command, stdin=its, cwd=ROOT, start_new_session=True)
@@ -37,6 +47,21 @@ def _server() -> socket.socket:
     return ours
 
 
+def started_by(pid: int) -> dict[str, int]:
+    """Return module and process id of the programs that a program of this process's server has started."""
+    has_server = _server.cache_info().currsize > 0
+    found: dict[str, int] = json.loads(_answer({"children_of": pid})) if has_server else {}
+    return found
+
+
+def _answer(request: dict[str, Any], descriptors: Sequence[int] = ()) -> bytes:
+    """Return the answer of the server."""
+    with _ONE_AT_A_TIME:
+        server = _server()
+        socket.send_fds(server, [json.dumps(request).encode()], list(descriptors))
+        return server.recv(LARGEST_ANSWER)
+
+
 class Program:
     """A running program; ``stdin`` (with ``listens``), ``stdout`` and ``stderr`` are text pipes."""
 
@@ -48,12 +73,14 @@ class Program:
         *,
         listens: bool = False,
         joins_output: bool = False,
+        shares_errors: bool = False,
         log: IO[bytes] | None = None,
         imports: Sequence[str] = (),
     ) -> None:
         """Start ``python -m MODULE ARGUMENTS``; the server imports the modules ``imports`` before its first start.
 
-        With ``joins_output``, standard error goes to ``stdout``; with a ``log``, both go to that file instead.
+        With ``joins_output``, standard error goes to ``stdout``, and with ``shares_errors`` to that of this process;
+        with a ``log``, both outputs go to that file instead.
         """
         self.args = (module, *arguments)
         self.returncode: int | None = None
@@ -64,7 +91,10 @@ class Program:
         output, output_end = (
             os.pipe() if log is None else (os.open(os.devnull, os.O_RDONLY), os.dup(log.fileno()))
         )
-        errors, errors_end = (None, output_end) if joins_output or log is not None else os.pipe()
+        if shares_errors:
+            errors, errors_end = None, os.dup(2)
+        else:
+            errors, errors_end = (None, output_end) if joins_output or log is not None else os.pipe()
         self._report, report_end = os.pipe()
         request = {
             "module": module,
@@ -72,13 +102,12 @@ class Program:
             "directory": str(directory or Path.cwd()),
             "environment": dict(os.environ),
             "imports": list(imports),
+            "parent": os.getpid(),
         }
         given = [input_end, output_end, errors_end, report_end]
-        server = _server()
-        socket.send_fds(server, [json.dumps(request).encode()], given)
+        self.pid = int(_answer(request, given))
         for descriptor in set(given):
             os.close(descriptor)
-        self.pid = int(server.recv(32))
         self.stdout: IO[str] = open(output)  # noqa: SIM115
         self.stderr: IO[str] | None = None if errors is None else open(errors)  # noqa: SIM115
 

@@ -1,7 +1,7 @@
 """Children of ``gcs fly``, ``gcs pil``, ``gcs paper`` and ``gcs test`` in this process, started from the warm server.
 
-A child takes 0.1 s of CPU time to start instead of 1.2 s. It ends with its parent as any child does. Tests that look
-for the children of a process start new interpreters.
+A child takes 0.1 s of CPU time to start instead of 1.2 s. It ends with its parent as any child does. So do children of
+programs that the server has started. Tests of a parent that is killed start new interpreters.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import subprocess
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from types import SimpleNamespace
 from typing import IO, Any
 from unittest import mock
@@ -31,10 +32,9 @@ def _logged(command: Sequence[str], *, stdout: IO[bytes], **_: Any) -> Program:
     return child
 
 
-def _worker(command: Sequence[str], **_: Any) -> Any:
+def _worker(command: Sequence[str], *, cwd: Path | None, **_: Any) -> Any:
     """Start a program with binary pipes."""
-    child: Any = _start(command)
-    child.stderr.close()
+    child: Any = _start(command, directory=cwd, shares_errors=True)
     child.stdin, child.stdout = child.stdin.detach(), child.stdout.detach()
     return child
 

@@ -1,9 +1,12 @@
 """Start the programs by a fork of a process that has imported them: a start takes 50 ms instead of 1.2 s.
 
 ``python -m tests.support.warm_server`` has a socket as its standard input. A request is a JSON object with the keys
-``module``, ``arguments``, ``directory``, ``environment`` and ``imports`` (modules that the server imports before its
-first start), and four file descriptors: the program's standard input, output and error, and a pipe for its exit code.
-The answer is the process id.
+``module``, ``arguments``, ``directory``, ``environment``, ``imports`` (modules that the server imports before its
+first start) and ``parent`` (the client's process id), and four file descriptors: the program's standard input, output
+and error, and a pipe for its exit code. The answer is the process id. A request with the key ``children_of``, a
+process id, is answered by the programs that this process has started: their process ids by module.
+
+Each program has a socket to the server too, by which it starts its children.
 """
 
 from __future__ import annotations
@@ -23,7 +26,9 @@ from flightstack.params.config import StackConfig
 from flightstack.params.vehicle import load_vehicle
 from flightstack.process.assembly import build
 from sim_bridge.simulator import Simulator
-from tests.support.programs import PROGRAMS
+from tests.support.process import SUPERVISOR
+from tests.support.programs import ASKS, GIVEN, LARGEST_ANSWER, NEW_INTERPRETERS, PROGRAMS
+from tests.support.warm_children import warm_children
 
 LARGEST_REQUEST = 1 << 18
 LATER = (
@@ -31,6 +36,8 @@ LATER = (
     "sim_bridge.server.server",
     "sim_bridge.server.session",
     "gcs_cli.link.connection",
+    "gcs_cli.fly.fly_run",
+    "gcs_cli.scenarios.worker",
 )
 """Modules that the programs import when they run."""
 
@@ -47,10 +54,14 @@ def load() -> None:
 
 
 def become(request: dict[str, Any], streams: list[int]) -> None:
-    """Run the program in this process, as ``python -u -m MODULE ARGUMENTS`` does. Ends with SystemExit."""
+    """Run the program in this process, as ``python -u -m MODULE ARGUMENTS`` does. Ends with SystemExit.
+
+    ``streams`` are standard input, output and error, and the socket to the server.
+    """
     for number, stream in enumerate(streams):
-        os.dup2(stream, number)
-    os.closerange(3, max(*streams, 1024))
+        os.dup2(stream, number, inheritable=number < GIVEN)
+    os.closerange(GIVEN + 1, max(*streams, 1024))
+    ASKS.append(socket.socket(fileno=GIVEN))
     os.chdir(request["directory"])
     os.environ.clear()
     os.environ.update(request["environment"])
@@ -61,7 +72,8 @@ def become(request: dict[str, Any], streams: list[int]) -> None:
     sys.stderr = open(2, "w", buffering=1, closefd=False)  # noqa: SIM115
     signal.signal(signal.SIGINT, signal.default_int_handler)
     sys.argv = [request["module"], *request["arguments"]]
-    runpy.run_module(request["module"], run_name="__main__", alter_sys=True)
+    with contextlib.nullcontext() if NEW_INTERPRETERS in os.environ else warm_children():
+        runpy.run_module(request["module"], run_name="__main__", alter_sys=True)
     sys.exit(0)
 
 
@@ -72,6 +84,8 @@ class Server:
         self._requests = requests
         self._selector = selectors.DefaultSelector()
         self._selector.register(requests, selectors.EVENT_READ)
+        self._programs: dict[int, tuple[int, str]] = {}
+        """Parent and module of each running program."""
 
     def serve(self) -> None:
         """Serve until the client closes the socket, and end the programs that a killed client left behind."""
@@ -85,31 +99,59 @@ class Server:
         for key, _ in self._selector.select():
             if key.data is not None:
                 self._report_end(key.fd, *key.data)
-            elif not self._start():
-                return False
+                continue
+            asking: Any = key.fileobj
+            if not self._answer(asking):
+                if asking is self._requests:
+                    return False
+                self._selector.unregister(asking)  # a program that has ended
+                asking.close()
         return True
 
-    def _start(self) -> bool:
-        message, descriptors, _, _ = socket.recv_fds(self._requests, LARGEST_REQUEST, 4)
+    def _answer(self, asking: socket.socket) -> bool:
+        try:
+            message, descriptors, _, _ = socket.recv_fds(asking, LARGEST_REQUEST, 4)
+        except ConnectionResetError:  # it has been killed before it read its answer
+            return False
         if not message:
             return False
-        *streams, report = descriptors
         request = json.loads(message)
+        if "children_of" in request:
+            found = {
+                module: pid
+                for pid, (parent, module) in self._programs.items()
+                if parent == request["children_of"]
+            }
+            answer = json.dumps(found)
+            assert len(answer) < LARGEST_ANSWER
+        else:
+            answer = str(self._start(request, descriptors))
+        with contextlib.suppress(ConnectionError):  # the program has been killed
+            asking.send(answer.encode())
+        return True
+
+    def _start(self, request: dict[str, Any], descriptors: list[int]) -> int:
+        *streams, report = descriptors
         for name in request["imports"]:
             importlib.import_module(name)
+        ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         pid = os.fork()
         if pid == 0:
-            become(request, streams)
-        self._requests.send(str(pid).encode())
+            become(request, [*streams, its.fileno()])
+        its.close()
         for stream in streams:
             os.close(stream)
+        module, arguments = request["module"], request["arguments"]
+        self._programs[pid] = request["parent"], arguments[1] if module == SUPERVISOR else module
+        self._selector.register(ours, selectors.EVENT_READ)
         self._selector.register(os.pidfd_open(pid), selectors.EVENT_READ, (pid, report))
-        return True
+        return pid
 
     def _report_end(self, handle: int, pid: int, report: int) -> None:
         self._selector.unregister(handle)
         os.close(handle)
         _, status = os.waitpid(pid, 0)
+        del self._programs[pid]
         with contextlib.suppress(BrokenPipeError):  # the test has closed its end
             os.write(report, str(os.waitstatus_to_exitcode(status)).encode())
         os.close(report)
