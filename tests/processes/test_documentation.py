@@ -92,9 +92,11 @@ class Reader:
 
     def _result(self, arguments: list[str]) -> commands.Ended:
         program, *rest = arguments
-        if program in ("python", "pytest"):
-            options = rest if program == "python" else ["-m", "pytest", *PLUGIN, *rest]
-            done = subprocess.run([sys.executable, *options], capture_output=True, text=True, check=False)
+        if program == "pytest":
+            tests = Program("pytest", [*PLUGIN, *rest], self._folder, imports=["pytest"])
+            return commands.Ended(*tests.communicate(), tests.wait())
+        if program == "python":
+            done = subprocess.run([sys.executable, *rest], capture_output=True, text=True, check=False)
             return commands.Ended(done.stdout, done.stderr, done.returncode)
         if program == "gcs":
             starts_processes = rest[0] == "fly" or (
