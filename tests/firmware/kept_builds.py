@@ -1,4 +1,4 @@
-"""Compile C once for each state of the sources, compiler and flags; workers and later runs share the result."""
+"""Compile and check C once for each state of sources, tool and flags; workers and later runs share the result."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -65,6 +65,24 @@ def kept_build(name: str, compiler: tuple[str, ...], *words: str | Path) -> Path
                 _compile(command, fresh / name)
                 fresh.replace(folder)
     return folder / name
+
+
+def kept_text(name: str, tool: tuple[str, ...], inputs: Sequence[Path], look: Callable[[], str]) -> str:
+    """Return what ``look`` finds by a tool in the C sources; once for each state of them, tool and ``inputs``.
+
+    Among the inputs are the files that say how the tool is called. Nothing is kept of a ``look`` that raises.
+    """
+    digest = hashlib.sha256(_version(tool).encode())
+    for path in inputs:
+        digest.update(f"\0{path}\0".encode() + path.read_bytes())
+    place = _folder() / f"{name}-{digest.hexdigest()[:16]}.txt"
+    with alone(place):
+        if not place.exists():
+            text = look()
+            fresh = place.with_suffix(f".{os.getpid()}")
+            fresh.write_text(text, encoding="utf-8")
+            fresh.replace(place)
+    return place.read_text(encoding="utf-8")
 
 
 def _compile(command: Sequence[str], output: Path) -> None:

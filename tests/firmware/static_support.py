@@ -81,6 +81,11 @@ def portable_files() -> list[Path]:
     return [path for folder in PORTABLE for path in sorted((FIRMWARE / folder).glob("*.[ch]"))]
 
 
+def tools_files(test: str) -> list[Path]:
+    """Return the files that say how a test calls its tools, this one among them."""
+    return [Path(test), Path(__file__), *sorted(path for path in CPPCHECK.rglob("*") if path.is_file())]
+
+
 def run(command: Sequence[str | Path], cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     """Run a tool to its end and return what it said."""
     return subprocess.run(

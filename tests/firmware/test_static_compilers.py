@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.firmware.kept_builds import kept_text
 from tests.firmware.static_support import (
     CPPCHECK,
     ESTIMATION,
@@ -22,6 +23,7 @@ from tests.firmware.static_support import (
     portable_files,
     portable_sources,
     run,
+    tools_files,
     without_comments,
 )
 from tests.support.tools import NIGHTLY
@@ -43,8 +45,14 @@ ALLOWED = {
 def test_no_compiler_has_anything_to_say(name: str, tmp_path: Path) -> None:
     target = available(TARGETS[name])
     sources = [*portable_sources(), *(ESTIMATION if NIGHTLY or name in BY_DAY else [])]
-    done = run([*command_of(target), *sources], cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
+
+    def look() -> str:
+        done = run([*command_of(target), *sources], cwd=tmp_path)
+        assert (done.returncode, done.stderr) == (0, "")
+        return f"nothing in {len(sources)} files"
+
+    label = "".join(c for c in name if c.isalnum())
+    assert kept_text(f"{label}-{len(sources)}", target.command, tools_files(__file__), look).endswith("files")
 
 
 def command_of(target: Target) -> list[str]:

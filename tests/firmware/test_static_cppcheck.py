@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import sys
@@ -13,6 +14,7 @@ from typing import NamedTuple
 import pytest
 
 from flightstack.firmware.generator.unit import Program, write
+from tests.firmware.kept_builds import kept_text
 from tests.firmware.static_support import (
     CPPCHECK,
     FIRMWARE,
@@ -20,6 +22,7 @@ from tests.firmware.static_support import (
     PORTABLE,
     code_lines,
     run,
+    tools_files,
 )
 from tests.parity import generated_laws
 from tests.support.tools import missing
@@ -99,7 +102,11 @@ def findings(tmp_path_factory: pytest.TempPathFactory) -> list[Finding]:
     not_ours = [
         f"--suppress=*:{folder}/*" for folder in (OWN_DRIVERLIB, CPPCHECK / "include", FIRMWARE / "laws")
     ]
-    return cppcheck(root, "--addon=misra", *includes, f"-I{OWN_DRIVERLIB}", *not_ours, *folders)
+    words = ["--addon=misra", *includes, f"-I{OWN_DRIVERLIB}", *not_ours, *folders]
+    text = kept_text(
+        "cppcheck", ("cppcheck",), tools_files(__file__), lambda: json.dumps(cppcheck(root, *words))
+    )
+    return [Finding(*each) for each in json.loads(text)]
 
 
 @pytest.fixture(scope="module")
