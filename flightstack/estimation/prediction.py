@@ -165,10 +165,9 @@ def _pressure_variance(f: Filter, change: Vector3, dt_s: float, params: Estimato
     """
     north, east = f.nominal[4], f.nominal[5]
     square = north * north + east * east + params.wind_m_s * params.wind_m_s
-    share = params.baro_dynamic_share / params.gravity_m_s2
-    return (
-        share * share * square * (change.x * change.x + change.y * change.y) * (_TURN_S / max(dt_s, _LEAST_S))
-    )
+    share, lasting = params.baro_dynamic_share / params.gravity_m_s2, _TURN_S / max(dt_s, _LEAST_S)
+    variance: float = share * share * square * (change.x * change.x + change.y * change.y) * lasting
+    return variance
 
 
 @compiled

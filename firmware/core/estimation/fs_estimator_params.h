@@ -17,6 +17,7 @@ typedef struct {
     fs_real body_field_walk;
     fs_real wind_walk;
     fs_real baro_walk;
+    fs_real baro_dynamic_share;
     fs_real gyro_range_rad_s;
     fs_real accel_range_m_s2;
     fs_real tilt_rad;

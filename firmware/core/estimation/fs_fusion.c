@@ -7,6 +7,11 @@
 #include "fs_kalman.h"
 #include "fs_math.h"
 
+#define FS_MAG_START FS_LIT(25.0)
+#define FS_GNSS_VELOCITY 0
+#define FS_AIDED_S FS_LIT(1.0)
+#define FS_HOLDS_TILT_AND_GYRO FS_LIT(3.0)
+#define FS_HOLDS_TILT FS_LIT(1.0)
 #define FS_MAG 7
 #define FS_VELOCITY 3
 #define FS_REST_VELOCITY 11
@@ -17,8 +22,6 @@
 #define FS_DRAG_GATE FS_LIT(5.0)
 #define FS_AIR_KG_M3 FS_LIT(1.225)
 #define FS_DRAG 23
-#define FS_GNSS_VELOCITY 0
-#define FS_AIDED_S FS_LIT(1.0)
 #define FS_BARO_BIAS 23
 #define FS_BARO 6
 #define FS_HOLDS_HORIZONTAL FS_LIT(2.0)
@@ -36,13 +39,21 @@
 #define FS_POSITION_DRIFTS FS_LIT(1.0)
 #define FS_GNSS_POSITION 3
 
-/* fusion.py:192 */
+/* Return True if GNSS measures the horizontal motion. fusion.py:162 */
+static bool is_aided(const fs_filter *f)
+{
+    const fs_real age_s = f->clock[0] - f->observations[FS_GNSS_VELOCITY].fused_s;
+    return age_s < FS_AIDED_S;
+}
+
+/* fusion.py:202 */
 void fs_fuse_field_axis(fs_filter *f, int32_t axis, const fs_vector3 *measured, const fs_estimator_params *params)
 {
+    const fs_real least = params->mag_noise_gauss;
     const fs_real largest = params->mag_largest_noise_gauss;
     const fs_noise noise = {
-        .least = params->mag_noise_gauss,
-        .start = largest,
+        .least = least,
+        .start = fs_min(FS_MAG_START * least, largest),
         .largest = largest,
         .gate = params->mag_gate,
         .is_slow = FS_LIT(1.0),
@@ -65,10 +76,11 @@ void fs_fuse_field_axis(fs_filter *f, int32_t axis, const fs_vector3 *measured, 
             innovation = measured->z - expected;
         }
     }
-    (void)fs_fuse(f, FS_MAG + axis, innovation, &noise, FS_LIT(1.0) - params->mag_corrects_tilt);
+    const fs_real held = is_aided(f) ? FS_HOLDS_TILT_AND_GYRO : FS_HOLDS_TILT;
+    (void)fs_fuse(f, FS_MAG + axis, innovation, &noise, params->mag_corrects_tilt > FS_LIT(0.0) ? FS_LIT(0.0) : held);
 }
 
-/* fusion.py:212 */
+/* fusion.py:227 */
 void fs_fuse_field(fs_filter *f, const fs_vector3 *measured, const fs_estimator_params *params)
 {
     for (int32_t axis = 0; axis < 3; axis++) {
@@ -76,7 +88,7 @@ void fs_fuse_field(fs_filter *f, const fs_vector3 *measured, const fs_estimator_
     }
 }
 
-/* fusion.py:244 */
+/* fusion.py:259 */
 void fs_fuse_rest_velocity(fs_filter *f, int32_t axis, const fs_estimator_params *params)
 {
     const fs_real velocity = params->rest_velocity_noise_m_s;
@@ -86,7 +98,7 @@ void fs_fuse_rest_velocity(fs_filter *f, int32_t axis, const fs_estimator_params
     (void)fs_fuse(f, FS_REST_VELOCITY + axis, -f->nominal[4 + axis], &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:254 */
+/* fusion.py:269 */
 void fs_fuse_rest_rate(fs_filter *f, int32_t axis, const fs_vector3 *rate_rad_s, fs_real variance,
                        const fs_estimator_params *params)
 {
@@ -98,7 +110,7 @@ void fs_fuse_rest_rate(fs_filter *f, int32_t axis, const fs_vector3 *rate_rad_s,
     (void)fs_fuse(f, FS_REST_RATE + axis, value - f->nominal[10 + axis], &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:270 */
+/* fusion.py:285 */
 void fs_fuse_hold(fs_filter *f, int32_t axis, fs_real held_m, const fs_estimator_params *params)
 {
     const fs_noise noise = {
@@ -113,7 +125,7 @@ void fs_fuse_hold(fs_filter *f, int32_t axis, fs_real held_m, const fs_estimator
     (void)fs_fuse(f, FS_HOLD_POSITION + axis, held_m - f->nominal[7 + axis], &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:219 */
+/* fusion.py:234 */
 void fs_fuse_drag(fs_filter *f, int32_t axis, const fs_vector3 *force, const fs_estimator_params *params)
 {
     const fs_real deviation = fs_sqrt(params->drag_variance);
@@ -140,10 +152,9 @@ void fs_fuse_drag(fs_filter *f, int32_t axis, const fs_vector3 *force, const fs_
     (void)fs_fuse(f, FS_DRAG + axis, innovation, &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:158 */
+/* fusion.py:169 */
 void fs_fuse_baro(fs_filter *f, fs_real altitude_m, fs_real age_s, const fs_estimator_params *params)
 {
-    const bool is_aided = f->clock[0] - f->observations[FS_GNSS_VELOCITY].fused_s < FS_AIDED_S;
     fs_clear(f->h);
     f->h[FS_POSITION + 2] = FS_LIT(-1.0);
     f->h[FS_BARO_BIAS] = FS_LIT(1.0);
@@ -155,10 +166,10 @@ void fs_fuse_baro(fs_filter *f, fs_real altitude_m, fs_real age_s, const fs_esti
         .gate = params->baro_gate,
         .is_slow = FS_LIT(0.0),
     };
-    (void)fs_fuse(f, FS_BARO, altitude_m - predicted_m, &noise, is_aided ? FS_LIT(0.0) : FS_HOLDS_HORIZONTAL);
+    (void)fs_fuse(f, FS_BARO, altitude_m - predicted_m, &noise, is_aided(f) ? FS_LIT(0.0) : FS_HOLDS_HORIZONTAL);
 }
 
-/* fusion.py:174 */
+/* fusion.py:184 */
 fs_real fs_cos_tilt_of(const fs_filter *f)
 {
     const fs_real x = f->nominal[1];
@@ -167,7 +178,7 @@ fs_real fs_cos_tilt_of(const fs_filter *f)
     return cosine;
 }
 
-/* fusion.py:182 */
+/* fusion.py:192 */
 void fs_fuse_range(fs_filter *f, fs_real vertical_m, fs_real ground_m, fs_real age_s,
                    const fs_estimator_params *params)
 {
@@ -184,37 +195,37 @@ void fs_fuse_range(fs_filter *f, fs_real vertical_m, fs_real ground_m, fs_real a
     (void)fs_fuse(f, FS_RANGE, vertical_m - height_m, &noise, FS_LIT(0.0));
 }
 
-/* Return an accuracy that a receiver states; unknown if it states none. Zero is an ideal receiver's. fusion.py:63 */
+/* Return an accuracy that a receiver states; unknown if it states none. Zero is an ideal receiver's. fusion.py:67 */
 static fs_real stated(fs_real accuracy, fs_real unknown)
 {
     return fs_is_finite(accuracy) && accuracy >= FS_LIT(0.0) ? accuracy : unknown;
 }
 
-/* fusion.py:81 */
+/* fusion.py:85 */
 fs_real fs_speed_accuracy(const fs_real row[10])
 {
     return stated(row[9], FS_UNKNOWN_M_S);
 }
 
-/* fusion.py:75 */
+/* fusion.py:79 */
 fs_real fs_vertical_accuracy(const fs_real row[10])
 {
     return stated(row[8], FS_UNKNOWN_VERTICAL_M);
 }
 
-/* fusion.py:69 */
+/* fusion.py:73 */
 fs_real fs_horizontal_accuracy(const fs_real row[10])
 {
     return stated(row[7], FS_UNKNOWN_M);
 }
 
-/* fusion.py:87 */
+/* fusion.py:91 */
 fs_real fs_gnss_bias_share(const fs_estimator_params *params, int32_t axis)
 {
     return params->gnss_bias_share * (axis == 2 ? fs_sqrt(FS_LIT(2.0)) : FS_LIT(1.0));
 }
 
-/* fusion.py:93 */
+/* fusion.py:97 */
 void fs_drift_gnss_bias(fs_filter *f, const fs_real row[10], fs_real elapsed_s, const fs_estimator_params *params)
 {
     const fs_real eph_m = fs_horizontal_accuracy(row);
@@ -242,7 +253,7 @@ void fs_drift_gnss_bias(fs_filter *f, const fs_real row[10], fs_real elapsed_s, 
  *
  * Fast motion and vibration look like noise of the IMU, but do not add up to an error of the velocity.
  *
- * fusion.py:116
+ * fusion.py:120
  */
 static void confirm_imu_noise(fs_filter *f, int32_t row)
 {
@@ -252,7 +263,7 @@ static void confirm_imu_noise(fs_filter *f, int32_t row)
                                 FS_LEAST_SHARE), FS_LIT(1.0));
 }
 
-/* fusion.py:127 */
+/* fusion.py:131 */
 void fs_fuse_gnss_velocity(fs_filter *f, const fs_real row[10], int32_t axis, fs_real fault,
                            const fs_estimator_params *params)
 {
@@ -274,7 +285,7 @@ void fs_fuse_gnss_velocity(fs_filter *f, const fs_real row[10], int32_t axis, fs
     }
 }
 
-/* fusion.py:140 */
+/* fusion.py:144 */
 void fs_fuse_gnss_position(fs_filter *f, const fs_real row[10], fs_real age_s, int32_t axis, fs_real fault,
                            const fs_estimator_params *params)
 {

@@ -12,8 +12,9 @@
 #define FS_ADAPTATION FS_LIT(0.01)
 #define FS_PRIOR FS_LIT(2.0)
 #define FS_HOLDS_HORIZONTAL FS_LIT(2.0)
+#define FS_HOLDS_TILT_AND_GYRO FS_LIT(3.0)
 
-/* kalman.py:207 */
+/* kalman.py:217 */
 void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
 {
     for (int32_t i = at; i < at + count; i++) {
@@ -27,7 +28,7 @@ void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real var
     }
 }
 
-/* kalman.py:95 */
+/* kalman.py:98 */
 void fs_clear(fs_real x[27])
 {
     for (int32_t i = 0; i < 27; i++) {
@@ -35,7 +36,7 @@ void fs_clear(fs_real x[27])
     }
 }
 
-/* Write P h' to ph and return h P h'. kalman.py:108 */
+/* Write P h' to ph and return h P h'. kalman.py:111 */
 static fs_real project(fs_filter *f)
 {
     fs_clear(f->ph);
@@ -64,7 +65,7 @@ static fs_real project(fs_filter *f)
  * Half the squared difference of two successive innovations has the variance of white noise, and an error of the
  * model, which both have, does not count. A slow sensor has the whole variance, as its correlation is counted apart.
  *
- * kalman.py:148
+ * kalman.py:151
  */
 static void adapt_noise(fs_observed *o, fs_real r, fs_real projected, fs_real last, const fs_noise *noise)
 {
@@ -88,7 +89,7 @@ static void adapt_noise(fs_observed *o, fs_real r, fs_real projected, fs_real la
  * Joseph's form with such a gain subtracts P h' h P / variance from the covariance, except between two states that
  * both keep their values: one product for each element instead of two.
  *
- * kalman.py:125
+ * kalman.py:128
  */
 static void correct(fs_filter *f, fs_real innovation)
 {
@@ -117,7 +118,7 @@ static void correct(fs_filter *f, fs_real innovation)
     fs_write_nominal(f->nominal, &corrected);
 }
 
-/* kalman.py:167 */
+/* kalman.py:170 */
 bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *noise, fs_real holds)
 {
     fs_observed *o = &f->observations[row];
@@ -125,22 +126,27 @@ bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *nois
     const fs_real largest = noise->largest * noise->largest;
     const fs_real r = fs_min(fs_max(o->noise > FS_LIT(0.0) ? o->noise : noise->start * noise->start, least), largest);
     const fs_real projected = project(f);
-    fs_real variance = projected + r;
+    const fs_real expected = projected + r;
+    fs_real variance = expected;
     if (noise->is_slow > FS_LIT(0.0)) {
-        const fs_real correlation = fs_min(fs_max(o->lagged / variance, FS_LIT(0.0)), FS_LARGEST_CORRELATION);
+        const fs_real correlation = fs_min(fs_max(o->lagged / expected, FS_LIT(0.0)), FS_LARGEST_CORRELATION);
         variance = projected + r * (FS_LIT(1.0) + correlation) / (FS_LIT(1.0) - correlation);
     }
     const fs_real last = o->innovation;
     const fs_real ratio = innovation * innovation / (noise->gate * noise->gate * variance);
     o->innovation = innovation;
-    o->variance = variance;
+    o->variance = expected;
     o->test_ratio = ratio;
     if (!(ratio <= FS_LIT(1.0))) {
         o->refused += FS_LIT(1.0);
+        if (noise->is_slow > FS_LIT(0.0) && innovation * innovation < noise->gate * noise->gate * noise->start *
+            noise->start) {
+            adapt_noise(o, r, projected, last, noise);
+        }
         return false;
     }
     o->fused += FS_LIT(1.0);
-    o->nis_sum += innovation * innovation / variance;
+    o->nis_sum += innovation * innovation / expected;
     adapt_noise(o, r, projected, last, noise);
     for (int32_t i = 0; i < 27; i++) {
         f->gain[i] = f->ph[i] / variance;
@@ -154,7 +160,7 @@ bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *nois
         if (holds > FS_LIT(0.0)) {
             f->gain[0] = FS_LIT(0.0);
             f->gain[1] = FS_LIT(0.0);
-            for (int32_t i = 3; i < 9; i++) {
+            for (int32_t i = 3; i < holds == FS_HOLDS_TILT_AND_GYRO ? 11 : 9; i++) {
                 f->gain[i] = FS_LIT(0.0);
             }
             for (int32_t i = 12; i < 15; i++) {
@@ -167,7 +173,7 @@ bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *nois
     return true;
 }
 
-/* kalman.py:218 */
+/* kalman.py:228 */
 fs_real fs_deviation(const fs_filter *f, int32_t at, int32_t count)
 {
     fs_real total = FS_LIT(0.0);

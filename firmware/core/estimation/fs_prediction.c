@@ -11,7 +11,7 @@
 #include "fs_math.h"
 
 #define FS_ATTITUDE 0
-#define FS_TURN_S FS_LIT(1.0)
+#define FS_TURN_S FS_LIT(0.25)
 #define FS_LEAST_S FS_LIT(0.001)
 #define FS_VELOCITY 3
 #define FS_POSITION 6
@@ -76,7 +76,7 @@ fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion)
     };
 }
 
-/* prediction.py:178 */
+/* prediction.py:208 */
 void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_params *params)
 {
     const fs_nominal n = fs_read_nominal(f->nominal);
@@ -111,7 +111,7 @@ static void add(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
  * Return the variance of each axis of the attitude by errors of scale and alignment of the gyro in a step.
  *
  * An error e gives e omega T after a turn of duration T. As white noise that is a density of (e omega)^2 T, with T =
- * 1 s.
+ * 0.25 s.
  *
  * prediction.py:129
  */
@@ -134,24 +134,52 @@ static void add_body_noise(fs_real p[27][27], int32_t at, const fs_vector3 *axis
 }
 
 /*
- * Keep the horizontal biases of the accelerometer as uncertain as the alignment of the gyro leaves them.
+ * Keep a horizontal bias of the accelerometer as uncertain as the alignment of the gyro leaves it.
  *
  * A yaw rate omega measured along an axis that is off by e turns the tilt by e in step with the heading, which gives
- * the same velocity as a bias g e of the accelerometer. No other measurement tells them apart.
+ * the same velocity as a bias g e of the accelerometer. No other measurement tells them apart: what is added is a
+ * bias along axis, a unit vector in the world frame, with the tilt that hides it from the velocity.
  *
  * prediction.py:140
  */
-static void keep_misaligned(fs_real p[27][27], const fs_estimator_params *params)
+static void keep_misaligned(fs_real p[27][27], int32_t at, const fs_vector3 *axis, const fs_estimator_params *params)
 {
-    const fs_real bias = params->gravity_m_s2 * params->gyro_scale_error;
-    for (int32_t axis = 12; axis < FS_ACCEL_BIAS + 2; axis++) {
-        p[axis][axis] = fs_max(p[axis][axis], bias * bias);
-    }
+    const fs_real gravity = params->gravity_m_s2;
+    const fs_real bias = gravity * params->gyro_scale_error;
+    const fs_real lacking = fs_max(bias * bias - p[at][at], FS_LIT(0.0));
+    const fs_real about_north = axis->y / gravity;
+    const fs_real about_east = -axis->x / gravity;
+    p[FS_ATTITUDE][FS_ATTITUDE] += lacking * about_north * about_north;
+    p[FS_ATTITUDE][FS_ATTITUDE + 1] += lacking * about_north * about_east;
+    p[FS_ATTITUDE + 1][FS_ATTITUDE + 1] += lacking * about_east * about_east;
+    p[FS_ATTITUDE][at] += lacking * about_north;
+    p[FS_ATTITUDE + 1][at] += lacking * about_east;
+    p[at][at] += lacking;
 }
 
-/* prediction.py:152 */
-static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vector3 *angle, fs_real dt_s,
-                              const fs_imu_noise *noise, const fs_estimator_params *params)
+/*
+ * Return the variance that a change of the airspeed in a step adds to the barometer's bias.
+ *
+ * The port feels a share of the dynamic pressure: an altitude of share u^2 / 2 g for the airspeed u, which changes by
+ * share u du / g. The wind is not known. As white noise, like turns.
+ *
+ * prediction.py:160
+ */
+static fs_real pressure_variance(const fs_filter *f, const fs_vector3 *change, fs_real dt_s,
+                                 const fs_estimator_params *params)
+{
+    const fs_real north = f->nominal[4];
+    const fs_real east = f->nominal[5];
+    const fs_real square = north * north + east * east + params->wind_m_s * params->wind_m_s;
+    const fs_real share = params->baro_dynamic_share / params->gravity_m_s2;
+    const fs_real lasting = FS_TURN_S / fs_max(dt_s, FS_LEAST_S);
+    const fs_real variance = share * share * square * (change->x * change->x + change->y * change->y) * lasting;
+    return variance;
+}
+
+/* prediction.py:174 */
+static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vector3 *angle, const fs_vector3 *change,
+                              fs_real dt_s, const fs_imu_noise *noise, const fs_estimator_params *params)
 {
     const fs_real share = f->clock[1];
     const fs_real gyro = params->gyro_noise;
@@ -171,14 +199,16 @@ static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vec
     add(f->covariance, FS_POSITION, 3, FS_LIT(1e-08) * dt_s);
     add(f->covariance, FS_GYRO_BIAS, 3, params->gyro_bias_walk * params->gyro_bias_walk * dt_s);
     add(f->covariance, FS_ACCEL_BIAS, 3, params->accel_bias_walk * params->accel_bias_walk * dt_s);
-    keep_misaligned(f->covariance, params);
+    keep_misaligned(f->covariance, FS_ACCEL_BIAS, &x, params);
+    keep_misaligned(f->covariance, FS_ACCEL_BIAS + 1, &y, params);
     add(f->covariance, FS_EARTH_FIELD, 3, params->earth_field_walk * params->earth_field_walk * dt_s);
     add(f->covariance, FS_BODY_FIELD, 3, params->body_field_walk * params->body_field_walk * dt_s);
     add(f->covariance, FS_WIND, 2, params->wind_walk * params->wind_walk * dt_s);
-    add(f->covariance, FS_BARO_BIAS, 1, params->baro_walk * params->baro_walk * dt_s);
+    const fs_real pressure = pressure_variance(f, change, dt_s, params);
+    add(f->covariance, FS_BARO_BIAS, 1, params->baro_walk * params->baro_walk * dt_s + pressure);
 }
 
-/* prediction.py:194 */
+/* prediction.py:224 */
 void fs_predict_errors(fs_filter *f, const fs_imu_noise *noise, const fs_estimator_params *params)
 {
     const fs_real dt_s = f->behind[0];
@@ -195,13 +225,13 @@ void fs_predict_errors(fs_filter *f, const fs_imu_noise *noise, const fs_estimat
     const fs_quaternion conjugate = fs_conjugate(&middle);
     const fs_vector3 rotate = fs_rotate(&conjugate, &change);
     fs_predict_covariance(f->covariance, &middle, &rotate, dt_s);
-    add_process_noise(f, &middle, &angle, dt_s, noise, params);
+    add_process_noise(f, &middle, &angle, &change, dt_s, noise, params);
     for (int32_t i = 0; i < 7; i++) {
         f->behind[i] = FS_LIT(0.0);
     }
 }
 
-/* prediction.py:209 */
+/* prediction.py:239 */
 void fs_add_unknown(fs_filter *f, const fs_delta_sample *step)
 {
     const fs_real half_s = FS_LIT(0.5) * step->dt_s;
