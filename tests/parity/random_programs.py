@@ -198,7 +198,11 @@ def statements(draw: st.DrawFn, depth: int = 0, in_loop: bool = False) -> list[s
             if draw(st.booleans()):
                 lines += ["else:", *(f"    {line}" for line in draw(statements(depth + 1, in_loop)))]
         else:
-            bounds = draw(st.sampled_from(["COUNT", "1, 4", "3, 0, -1", "w.size"]))
+            bounds = draw(
+                st.sampled_from(
+                    ["COUNT", "1, 4", "3, 0, -1", "w.size", "3 if flag else 2", "3 if a > b else 1, 0, -1"]
+                )
+            )
             name = f"i{depth}"
             block = [f"{draw(NAMES)} -= {name} * HALF", *draw(statements(depth + 1, True))]
             lines += [f"for {name} in range({bounds}):", *(f"    {line}" for line in block)]

@@ -160,7 +160,7 @@ bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *nois
         if (holds > FS_LIT(0.0)) {
             f->gain[0] = FS_LIT(0.0);
             f->gain[1] = FS_LIT(0.0);
-            for (int32_t i = 3; i < holds == FS_HOLDS_TILT_AND_GYRO ? 11 : 9; i++) {
+            for (int32_t i = 3; i < (holds == FS_HOLDS_TILT_AND_GYRO ? 11 : 9); i++) {
                 f->gain[i] = FS_LIT(0.0);
             }
             for (int32_t i = 12; i < 15; i++) {

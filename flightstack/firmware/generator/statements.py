@@ -12,7 +12,7 @@ from flightstack.firmware.generator.subset import construct_of
 from flightstack.firmware.generator.text import identifier
 from flightstack.firmware.generator.types import INT, NOTHING, Several, has_arrays
 from flightstack.firmware.generator.unit import Unit
-from flightstack.firmware.generator.values import Value
+from flightstack.firmware.generator.values import SUM, Value
 from flightstack.firmware.generator.writer import Variable, Writer, declaration
 
 
@@ -161,7 +161,7 @@ class Statements:
         change = {1: f"{c_name}++", -1: f"{c_name}--"}.get(
             step, f"{c_name} {'+' if step > 0 else '-'}= {abs(step)}"
         )
-        writer.line(f"for (int32_t {c_name} = {start.text}; {c_name} {sign} {stop.text}; {change}) {{")
+        writer.line(f"for (int32_t {c_name} = {start.text}; {c_name} {sign} {stop.within(SUM)}; {change}) {{")
         writer.variables[name] = Variable(c_name, INT, root=name)
         before = set(writer.assigned)
         writer.assigned.add(name)
