@@ -20,7 +20,7 @@ class EstimatorParams(NamedTuple):
     accel_noise: float = estimator_default("accel_noise")  # m/s²/√Hz
     imu_noise_share: float = 0.1
     """Share of the measured noise of the IMU that counts at the start."""
-    gyro_scale_error: float = 0.0032
+    gyro_scale_error: float = 0.0035
     """Error of scale and alignment of the gyro, 1σ of each term."""
     gyro_bias_walk: float = estimator_default("gyro_bias_walk")  # rad/s/√s
     accel_bias_walk: float = estimator_default("accel_bias_walk")  # m/s²/√s
@@ -28,7 +28,7 @@ class EstimatorParams(NamedTuple):
     body_field_walk: float = estimator_default("body_field_walk")  # gauss/√s
     wind_walk: float = estimator_default("wind_walk")  # m/s/√s
     baro_walk: float = 0.015  # m/√s
-    baro_dynamic_share: float = 0.07
+    baro_dynamic_share: float = 0.015
     """Share of the dynamic pressure that the barometer feels, 1σ."""
     gyro_range_rad_s: float = estimator_default("gyro_range_rad_s")
     accel_range_m_s2: float = estimator_default("accel_range_m_s2")

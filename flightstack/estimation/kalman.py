@@ -167,11 +167,25 @@ def _adapt_noise(o: ObservedRecord, r: float, projected: float, last: float, noi
 
 
 @compiled
+def _hold(gain: ErrorVector, holds: float) -> None:
+    """Make the gains of the states that are held zero."""
+    if holds == HOLDS_HORIZONTAL:
+        for i in range(2):
+            gain[3 + i], gain[6 + i] = 0.0, 0.0
+    elif holds > 0.0:
+        gain[0], gain[1] = 0.0, 0.0
+        for i in range(3, 11 if holds == HOLDS_TILT_AND_GYRO else 9):
+            gain[i] = 0.0
+        for i in range(12, 15):
+            gain[i] = 0.0
+
+
+@compiled
 def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> bool:
     """Fuse a scalar measurement with the Jacobian ``f.h``; return True if it is within its gate.
 
-    One that the noise at the start would not refuse moves the noise even so: a slow error, such as that of soft iron
-    on another heading, else had an axis refused for good. With ``holds`` other than zero, these states keep their
+    A refused one that is smaller than the noise at the start moves the noise even so: a slow error, such as that of
+    soft iron on another heading, else had an axis refused for good. With ``holds`` other than zero, these states keep their
     values and their uncertainty: a Schmidt-Kalman update.
     """
     o = f.observations[row]
@@ -188,10 +202,7 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
     o["innovation"], o["variance"], o["test_ratio"] = innovation, expected, ratio
     if not ratio <= 1.0:
         o["refused"] += 1.0
-        if (
-            noise.is_slow > 0.0
-            and innovation * innovation < noise.gate * noise.gate * noise.start * noise.start
-        ):
+        if noise.is_slow > 0.0 and abs(innovation) < noise.start:
             _adapt_noise(o, r, projected, last, noise)
         return False
     o["fused"] += 1.0
@@ -199,15 +210,7 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
     _adapt_noise(o, r, projected, last, noise)
     for i in range(ERROR_STATES):
         f.gain[i] = f.ph[i] / variance
-    if holds == HOLDS_HORIZONTAL:
-        for i in range(2):
-            f.gain[3 + i], f.gain[6 + i] = 0.0, 0.0
-    elif holds > 0.0:
-        f.gain[0], f.gain[1] = 0.0, 0.0
-        for i in range(3, 11 if holds == HOLDS_TILT_AND_GYRO else 9):
-            f.gain[i] = 0.0
-        for i in range(12, 15):
-            f.gain[i] = 0.0
+    _hold(f.gain, holds)
     _correct(f, innovation)
     o["fused_s"] = f.clock[0]
     return True

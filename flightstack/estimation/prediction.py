@@ -29,7 +29,9 @@ from flightstack.estimation.error_state import (
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import BEHIND_SIZE, Filter
 
-_TURN_S, _LEAST_S = 0.25, 1e-3
+_TURN_S, _LEAST_S = 1.0, 1e-3
+_WIND_M_S = 2.0
+"""Wind with which changes of the airspeed are counted: it is not known."""
 _MOST_ANGLE, _MOST_VELOCITY = 0.3**2, 5.0**2
 """Variances [rad²], [m²/s²] beyond which unknown motion adds nothing: other sensors are believed by then."""
 
@@ -129,7 +131,7 @@ def _add_body_noise(p: Covariance, at: int, axis: Vector3, variance: float) -> N
 def _turn_variance(angle: Vector3, dt_s: float, params: EstimatorParams) -> float:
     """Return the variance of each axis of the attitude by errors of scale and alignment of the gyro in a step.
 
-    An error e gives e ω T after a turn of duration T. As white noise that is a density of (e ω)² T, with T = 0.25 s.
+    An error e gives e ω T after a turn of duration T. As white noise that is a density of (e ω)² T, with T = 1 s.
     """
     square = angle.x * angle.x + angle.y * angle.y + angle.z * angle.z
     error = params.gyro_scale_error
@@ -164,7 +166,7 @@ def _pressure_variance(f: Filter, change: Vector3, dt_s: float, params: Estimato
     share u du / g. The wind is not known. As white noise, like turns.
     """
     north, east = f.nominal[4], f.nominal[5]
-    square = north * north + east * east + params.wind_m_s * params.wind_m_s
+    square = north * north + east * east + _WIND_M_S * _WIND_M_S
     share, lasting = params.baro_dynamic_share / params.gravity_m_s2, _TURN_S / max(dt_s, _LEAST_S)
     variance: float = share * share * square * (change.x * change.x + change.y * change.y) * lasting
     return variance

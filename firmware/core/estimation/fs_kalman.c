@@ -14,7 +14,7 @@
 #define FS_HOLDS_HORIZONTAL FS_LIT(2.0)
 #define FS_HOLDS_TILT_AND_GYRO FS_LIT(3.0)
 
-/* kalman.py:217 */
+/* kalman.py:220 */
 void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
 {
     for (int32_t i = at; i < at + count; i++) {
@@ -83,6 +83,28 @@ static void adapt_noise(fs_observed *o, fs_real r, fs_real projected, fs_real la
     o->noise = fs_min(fs_max(r + share * (estimate - r), least), largest);
 }
 
+/* Make the gains of the states that are held zero. kalman.py:170 */
+static void hold(fs_real gain[27], fs_real holds)
+{
+    if (holds == FS_HOLDS_HORIZONTAL) {
+        for (int32_t i = 0; i < 2; i++) {
+            gain[3 + i] = FS_LIT(0.0);
+            gain[6 + i] = FS_LIT(0.0);
+        }
+    } else {
+        if (holds > FS_LIT(0.0)) {
+            gain[0] = FS_LIT(0.0);
+            gain[1] = FS_LIT(0.0);
+            for (int32_t i = 3; i < (holds == FS_HOLDS_TILT_AND_GYRO ? 11 : 9); i++) {
+                gain[i] = FS_LIT(0.0);
+            }
+            for (int32_t i = 12; i < 15; i++) {
+                gain[i] = FS_LIT(0.0);
+            }
+        }
+    }
+}
+
 /*
  * Correct state and covariance with gain: P h' / variance, or zero for a state that keeps its value.
  *
@@ -118,7 +140,7 @@ static void correct(fs_filter *f, fs_real innovation)
     fs_write_nominal(f->nominal, &corrected);
 }
 
-/* kalman.py:170 */
+/* kalman.py:184 */
 bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *noise, fs_real holds)
 {
     fs_observed *o = &f->observations[row];
@@ -139,8 +161,7 @@ bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *nois
     o->test_ratio = ratio;
     if (!(ratio <= FS_LIT(1.0))) {
         o->refused += FS_LIT(1.0);
-        if (noise->is_slow > FS_LIT(0.0) && innovation * innovation < noise->gate * noise->gate * noise->start *
-            noise->start) {
+        if (noise->is_slow > FS_LIT(0.0) && fs_abs(innovation) < noise->start) {
             adapt_noise(o, r, projected, last, noise);
         }
         return false;
@@ -151,29 +172,13 @@ bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *nois
     for (int32_t i = 0; i < 27; i++) {
         f->gain[i] = f->ph[i] / variance;
     }
-    if (holds == FS_HOLDS_HORIZONTAL) {
-        for (int32_t i = 0; i < 2; i++) {
-            f->gain[3 + i] = FS_LIT(0.0);
-            f->gain[6 + i] = FS_LIT(0.0);
-        }
-    } else {
-        if (holds > FS_LIT(0.0)) {
-            f->gain[0] = FS_LIT(0.0);
-            f->gain[1] = FS_LIT(0.0);
-            for (int32_t i = 3; i < (holds == FS_HOLDS_TILT_AND_GYRO ? 11 : 9); i++) {
-                f->gain[i] = FS_LIT(0.0);
-            }
-            for (int32_t i = 12; i < 15; i++) {
-                f->gain[i] = FS_LIT(0.0);
-            }
-        }
-    }
+    hold(f->gain, holds);
     correct(f, innovation);
     o->fused_s = f->clock[0];
     return true;
 }
 
-/* kalman.py:228 */
+/* kalman.py:231 */
 fs_real fs_deviation(const fs_filter *f, int32_t at, int32_t count)
 {
     fs_real total = FS_LIT(0.0);
