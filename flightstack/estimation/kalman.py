@@ -185,8 +185,9 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
     """Fuse a scalar measurement with the Jacobian ``f.h``; return True if it is within its gate.
 
     A refused one that is smaller than the noise at the start moves the noise even so: a slow error, such as that of
-    soft iron on another heading, else had an axis refused for good. With ``holds`` other than zero, these states keep their
-    values and their uncertainty: a Schmidt-Kalman update.
+    soft iron on another heading, else had an axis refused for good.
+
+    With ``holds`` other than zero, these states keep their values and their uncertainty: a Schmidt-Kalman update.
     """
     o = f.observations[row]
     least, largest = noise.least * noise.least, noise.largest * noise.largest

@@ -42,7 +42,7 @@ typedef struct {
     fs_real is_slow;
 } fs_noise;
 
-/* Make count states from at independent of all others, each with variance. kalman.py:220 */
+/* Make count states from at independent of all others, each with variance. kalman.py:221 */
 void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real variance);
 
 /* Set every item to zero. kalman.py:98 */
@@ -52,14 +52,15 @@ void fs_clear(fs_real x[27]);
  * Fuse a scalar measurement with the Jacobian f.h; return True if it is within its gate.
  *
  * A refused one that is smaller than the noise at the start moves the noise even so: a slow error, such as that of
- * soft iron on another heading, else had an axis refused for good. With holds other than zero, these states keep
- * their values and their uncertainty: a Schmidt-Kalman update.
+ * soft iron on another heading, else had an axis refused for good.
+ *
+ * With holds other than zero, these states keep their values and their uncertainty: a Schmidt-Kalman update.
  *
  * kalman.py:184
  */
 bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *noise, fs_real holds);
 
-/* Return the root of the summed variances of count states from at. kalman.py:231 */
+/* Return the root of the summed variances of count states from at. kalman.py:232 */
 fs_real fs_deviation(const fs_filter *f, int32_t at, int32_t count);
 
 #endif
