@@ -4,6 +4,7 @@
 #include "fs_estimator.h"
 
 #define ROW 10U
+#define RESETS 19U /* numbers of fs_resets that the message has room for */
 #define STATE 13U
 #define EARTH 4U
 #define KNOWN 4U      /* place of the flag behind the Earth's field */
@@ -24,7 +25,7 @@ typedef union {
 
 typedef union {
     fs_resets fields;
-    fs_real values[sizeof(fs_resets) / sizeof(fs_real)];
+    fs_real values[RESETS];
 } resets_view;
 
 /* The members of the memory are floats and integers of 32 bits, so that it can be read and cleared as words. */
@@ -95,7 +96,7 @@ static void tell(fs_pil_estimate *estimate)
         estimate->state[i] = (float)memory->state[i];
     }
     resets.fields = memory->resets;
-    for (i = 0U; i < (uint16_t)(sizeof resets.values / sizeof resets.values[0]); i++) {
+    for (i = 0U; i < RESETS; i++) {
         estimate->resets[i] = (float)resets.values[i];
     }
 }

@@ -204,7 +204,7 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
     if not ratio <= 1.0:
         o["refused"] += 1.0
         if noise.is_slow > 0.0 and abs(innovation) < noise.start:
-            _adapt_noise(o, r, projected, last, noise)
+            o["noise"] = min(r + _ADAPTATION * (innovation * innovation - expected), largest)
         return False
     o["fused"] += 1.0
     o["nis_sum"] += innovation * innovation / expected

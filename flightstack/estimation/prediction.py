@@ -32,6 +32,8 @@ from flightstack.estimation.kalman import BEHIND_SIZE, Filter
 _TURN_S, _LEAST_S = 1.0, 1e-3
 _WIND_M_S = 2.0
 """Wind with which changes of the airspeed are counted: it is not known."""
+_MOST_PRESSURE = 0.01
+"""Variance [m²] that a step can add by it: an impact is no wind."""
 _MOST_ANGLE, _MOST_VELOCITY = 0.3**2, 5.0**2
 """Variances [rad²], [m²/s²] beyond which unknown motion adds nothing: other sensors are believed by then."""
 
@@ -144,7 +146,7 @@ def _keep_misaligned(p: Covariance, at: int, axis: Vector3, params: EstimatorPar
 
     A yaw rate ω measured along an axis that is off by e turns the tilt by e in step with the heading, which gives the
     same velocity as a bias g e of the accelerometer. No other measurement tells them apart: what is added is a bias
-    along ``axis``, a unit vector in the world frame, with the tilt that hides it from the velocity.
+    along ``axis``, a unit vector in the world frame, with the tilt that hides it from the velocity of level flight.
     """
     gravity = params.gravity_m_s2
     bias = gravity * params.gyro_scale_error
@@ -169,7 +171,7 @@ def _pressure_variance(f: Filter, change: Vector3, dt_s: float, params: Estimato
     square = north * north + east * east + _WIND_M_S * _WIND_M_S
     share, lasting = params.baro_dynamic_share / params.gravity_m_s2, _TURN_S / max(dt_s, _LEAST_S)
     variance: float = share * share * square * (change.x * change.x + change.y * change.y) * lasting
-    return variance
+    return min(variance, _MOST_PRESSURE)
 
 
 @compiled

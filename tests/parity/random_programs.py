@@ -200,7 +200,7 @@ def statements(draw: st.DrawFn, depth: int = 0, in_loop: bool = False) -> list[s
         else:
             bounds = draw(
                 st.sampled_from(
-                    ["COUNT", "1, 4", "3, 0, -1", "w.size", "3 if flag else 2", "3 if a > b else 1, 0, -1"]
+                    ["COUNT", "1, 4", "3, 0, -1", "w.size", "3 if flag else 2", "3 if a > b else 1"]
                 )
             )
             name = f"i{depth}"

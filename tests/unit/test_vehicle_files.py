@@ -279,7 +279,11 @@ def test_estimator_has_the_noise_of_the_vehicle_file(name: str) -> None:
         assert estimation is not None
         params = estimation.estimator.params
         assert params.mag_noise_gauss == own["EKF2_MAG_NOISE"] != EstimatorParams().mag_noise_gauss
-        assert params.accel_bias_m_s2 == own["EKF2_ABIAS_INIT"] != EstimatorParams().accel_bias_m_s2
+        assert (
+            params.gnss_velocity_noise_m_s
+            == own["EKF2_GPS_V_NOISE"]
+            != EstimatorParams().gnss_velocity_noise_m_s
+        )
 
 
 @pytest.mark.parametrize(

@@ -95,7 +95,8 @@ static void hold(fs_real gain[27], fs_real holds)
         if (holds > FS_LIT(0.0)) {
             gain[0] = FS_LIT(0.0);
             gain[1] = FS_LIT(0.0);
-            for (int32_t i = 3; i < (holds == FS_HOLDS_TILT_AND_GYRO ? 11 : 9); i++) {
+            const int32_t stop = holds == FS_HOLDS_TILT_AND_GYRO ? 11 : 9;
+            for (int32_t i = 3; i < stop; i++) {
                 gain[i] = FS_LIT(0.0);
             }
             for (int32_t i = 12; i < 15; i++) {
@@ -162,7 +163,7 @@ bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *nois
     if (!(ratio <= FS_LIT(1.0))) {
         o->refused += FS_LIT(1.0);
         if (noise->is_slow > FS_LIT(0.0) && fs_abs(innovation) < noise->start) {
-            adapt_noise(o, r, projected, last, noise);
+            o->noise = fs_min(r + FS_ADAPTATION * (innovation * innovation - expected), largest);
         }
         return false;
     }

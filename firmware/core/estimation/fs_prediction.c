@@ -21,23 +21,24 @@
 #define FS_BODY_FIELD 18
 #define FS_WIND 21
 #define FS_WIND_M_S FS_LIT(2.0)
+#define FS_MOST_PRESSURE FS_LIT(0.01)
 #define FS_BARO_BIAS 23
 #define FS_MOST_ANGLE FS_LIT(0.09)
 #define FS_MOST_VELOCITY FS_LIT(25.0)
 
-/* prediction.py:90 */
+/* prediction.py:92 */
 fs_motion fs_motion_of(const fs_nominal *n)
 {
     return (fs_motion){n->attitude, n->velocity_ned_m_s, n->position_ned_m};
 }
 
-/* prediction.py:70 */
+/* prediction.py:72 */
 fs_vector3 fs_less_bias(const fs_vector3 *v, const fs_vector3 *bias, fs_real dt_s)
 {
     return (fs_vector3){v->x - bias->x * dt_s, v->y - bias->y * dt_s, v->z - bias->z * dt_s};
 }
 
-/* prediction.py:76 */
+/* prediction.py:78 */
 fs_motion fs_moved(const fs_motion *start, const fs_vector3 *angle, const fs_vector3 *delta_velocity, fs_real dt_s,
                    fs_real gravity)
 {
@@ -59,7 +60,7 @@ fs_motion fs_moved(const fs_motion *start, const fs_vector3 *angle, const fs_vec
     };
 }
 
-/* prediction.py:96 */
+/* prediction.py:98 */
 fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion)
 {
     return (fs_nominal){
@@ -77,7 +78,7 @@ fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion)
     };
 }
 
-/* prediction.py:210 */
+/* prediction.py:212 */
 void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_params *params)
 {
     const fs_nominal n = fs_read_nominal(f->nominal);
@@ -100,7 +101,7 @@ void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_
     f->clock[0] = sample->time_s;
 }
 
-/* prediction.py:114 */
+/* prediction.py:116 */
 static void add(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
 {
     for (int32_t i = at; i < at + count; i++) {
@@ -114,7 +115,7 @@ static void add(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
  * An error e gives e omega T after a turn of duration T. As white noise that is a density of (e omega)^2 T, with T =
  * 1 s.
  *
- * prediction.py:131
+ * prediction.py:133
  */
 static fs_real turn_variance(const fs_vector3 *angle, fs_real dt_s, const fs_estimator_params *params)
 {
@@ -123,7 +124,7 @@ static fs_real turn_variance(const fs_vector3 *angle, fs_real dt_s, const fs_est
     return error * error * square * (FS_TURN_S / fs_max(dt_s, FS_LEAST_S));
 }
 
-/* Add the noise of one axis of the body, a unit vector in the world frame. prediction.py:120 */
+/* Add the noise of one axis of the body, a unit vector in the world frame. prediction.py:122 */
 static void add_body_noise(fs_real p[27][27], int32_t at, const fs_vector3 *axis, fs_real variance)
 {
     p[at][at] += variance * axis->x * axis->x;
@@ -139,9 +140,9 @@ static void add_body_noise(fs_real p[27][27], int32_t at, const fs_vector3 *axis
  *
  * A yaw rate omega measured along an axis that is off by e turns the tilt by e in step with the heading, which gives
  * the same velocity as a bias g e of the accelerometer. No other measurement tells them apart: what is added is a
- * bias along axis, a unit vector in the world frame, with the tilt that hides it from the velocity.
+ * bias along axis, a unit vector in the world frame, with the tilt that hides it from the velocity of level flight.
  *
- * prediction.py:142
+ * prediction.py:144
  */
 static void keep_misaligned(fs_real p[27][27], int32_t at, const fs_vector3 *axis, const fs_estimator_params *params)
 {
@@ -164,7 +165,7 @@ static void keep_misaligned(fs_real p[27][27], int32_t at, const fs_vector3 *axi
  * The port feels a share of the dynamic pressure: an altitude of share u^2 / 2 g for the airspeed u, which changes by
  * share u du / g. The wind is not known. As white noise, like turns.
  *
- * prediction.py:162
+ * prediction.py:164
  */
 static fs_real pressure_variance(const fs_filter *f, const fs_vector3 *change, fs_real dt_s,
                                  const fs_estimator_params *params)
@@ -175,10 +176,10 @@ static fs_real pressure_variance(const fs_filter *f, const fs_vector3 *change, f
     const fs_real share = params->baro_dynamic_share / params->gravity_m_s2;
     const fs_real lasting = FS_TURN_S / fs_max(dt_s, FS_LEAST_S);
     const fs_real variance = share * share * square * (change->x * change->x + change->y * change->y) * lasting;
-    return variance;
+    return fs_min(variance, FS_MOST_PRESSURE);
 }
 
-/* prediction.py:176 */
+/* prediction.py:178 */
 static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vector3 *angle, const fs_vector3 *change,
                               fs_real dt_s, const fs_imu_noise *noise, const fs_estimator_params *params)
 {
@@ -209,7 +210,7 @@ static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vec
     add(f->covariance, FS_BARO_BIAS, 1, params->baro_walk * params->baro_walk * dt_s + pressure);
 }
 
-/* prediction.py:226 */
+/* prediction.py:228 */
 void fs_predict_errors(fs_filter *f, const fs_imu_noise *noise, const fs_estimator_params *params)
 {
     const fs_real dt_s = f->behind[0];
@@ -232,7 +233,7 @@ void fs_predict_errors(fs_filter *f, const fs_imu_noise *noise, const fs_estimat
     }
 }
 
-/* prediction.py:241 */
+/* prediction.py:243 */
 void fs_add_unknown(fs_filter *f, const fs_delta_sample *step)
 {
     const fs_real half_s = FS_LIT(0.5) * step->dt_s;

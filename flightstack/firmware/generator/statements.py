@@ -156,12 +156,14 @@ class Statements:
         if writer.usage.stores.get(name) or name in self._loops:
             raise self.function.refusal(node, "loop variable", f"assignment to {name}")
         start, stop, step = self._bounds(node.iter)
+        if stop.rank < SUM:  # a condition, which the body may change
+            stop = writer.hoist(stop, "stop")
         c_name = identifier(name) if name.strip("_") else writer.fresh("count")
         sign = "<" if step > 0 else ">"
         change = {1: f"{c_name}++", -1: f"{c_name}--"}.get(
             step, f"{c_name} {'+' if step > 0 else '-'}= {abs(step)}"
         )
-        writer.line(f"for (int32_t {c_name} = {start.text}; {c_name} {sign} {stop.within(SUM)}; {change}) {{")
+        writer.line(f"for (int32_t {c_name} = {start.text}; {c_name} {sign} {stop.text}; {change}) {{")
         writer.variables[name] = Variable(c_name, INT, root=name)
         before = set(writer.assigned)
         writer.assigned.add(name)

@@ -1,0 +1,119 @@
+"""Single updates and predictions of the filter: what each may move, and what it adds."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from flightstack.core.contract import Vector3
+from flightstack.estimation.error_state import (
+    ACCEL_BIAS,
+    ATTITUDE,
+    BARO_BIAS,
+    ERROR_STATES,
+    GYRO_BIAS,
+    POSITION,
+    VELOCITY,
+)
+from flightstack.estimation.estimator_params import EstimatorParams
+from flightstack.estimation.fusion import fuse_field_axis
+from flightstack.estimation.kalman import GNSS_VELOCITY, MAG, Filter
+from flightstack.estimation.memory import MEMORY
+from flightstack.estimation.prediction import ImuNoise, predict_errors
+
+PARAMS = EstimatorParams(mag_noise_gauss=0.001)
+FIELD = Vector3(0.2, 0.0, 0.4)
+"""Of the Earth, and so that of a level vehicle that heads north."""
+QUIET = ImuNoise(Vector3(0.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.0))
+
+
+def level(gnss_s: float = 0.0) -> Filter:
+    """Return a filter at 10 s, level and heading north, with all states correlated; GNSS was fused at ``gnss_s``."""
+    memory = np.zeros(1, MEMORY)[0]
+    f = Filter(*(memory[name] for name in Filter._fields))
+    f.clock[0] = 10.0
+    f.nominal[0], f.nominal[16], f.nominal[18] = 1.0, FIELD.x, FIELD.z
+    mixed = np.random.default_rng(3).normal(size=(ERROR_STATES, ERROR_STATES))
+    f.covariance[:] = 1e-4 * (mixed @ mixed.T / ERROR_STATES)
+    f.observations[GNSS_VELOCITY]["fused_s"] = gnss_s
+    return f
+
+
+@pytest.mark.parametrize(("gnss_s", "moves"), [(9.8, False), (5.0, True)], ids=["with GNSS", "without GNSS"])
+def test_magnetometer_moves_yaw_but_neither_tilt_nor_what_moves_it(gnss_s: float, moves: bool) -> None:
+    f = level(gnss_s)
+    before, spread = f.nominal.copy(), f.covariance.copy()
+    fuse_field_axis(f, 1, FIELD._replace(y=0.004), PARAMS)
+    changed = f.nominal - before
+    assert abs(changed[3]) > 5e-5  # the yaw
+    assert changed[1:3] == pytest.approx(0.0, abs=1e-12)
+    assert np.all(changed[4:10] == 0.0)  # velocity, position
+    assert np.all(changed[13:16] == 0.0)  # bias of the accelerometer
+    assert np.all((changed[10:12] != 0.0) == moves)  # biases of the gyro about x and y
+    assert changed[12] != 0.0
+    held = [*range(ATTITUDE, ATTITUDE + 2), *range(VELOCITY, GYRO_BIAS + (0 if moves else 2))]
+    assert np.array_equal(f.covariance[np.ix_(held, held)], spread[np.ix_(held, held)])
+
+
+def test_field_of_another_heading_is_refused_for_a_moment_only() -> None:
+    f = level(9.8)
+    f.covariance[:] = np.eye(ERROR_STATES) * 1e-10
+    rng = np.random.default_rng(4)
+    for _ in range(1500):
+        fuse_field_axis(f, 1, FIELD._replace(y=rng.normal(0.0, 0.001)), PARAMS)
+    o = f.observations[MAG + 1]
+    assert math.sqrt(o["noise"]) < 0.0015
+    refused = o["refused"]
+    for _ in range(100):
+        fuse_field_axis(f, 1, FIELD._replace(y=0.02 + rng.normal(0.0, 0.001)), PARAMS)
+    assert 5 < o["refused"] - refused < 40  # measured: 14, at 20 Hz below a second
+
+
+def test_disturbance_beyond_the_noise_of_the_start_is_refused_and_not_learnt() -> None:
+    f = level(9.8)
+    f.covariance[:] = np.eye(ERROR_STATES) * 1e-10
+    for _ in range(1500):
+        fuse_field_axis(f, 1, FIELD._replace(y=0.0), PARAMS)
+    o = f.observations[MAG + 1]
+    noise, refused = float(o["noise"]), float(o["refused"])
+    for _ in range(300):
+        fuse_field_axis(f, 1, FIELD._replace(y=0.1), PARAMS)
+    assert o["refused"] == refused + 300
+    assert o["noise"] == noise
+
+
+def hovered(f: Filter, change_m_s: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
+    """Return the covariance after a prediction of 10 ms level flight, with a change of the velocity north and east."""
+    f.covariance[:] = 0.0
+    f.behind[0], f.behind[4:] = 0.01, (*change_m_s, -9.80665 * 0.01)
+    without = PARAMS._replace(gyro_noise=0.0, accel_noise=0.0, accel_bias_walk=0.0, gyro_bias_walk=0.0)
+    predict_errors(f, QUIET, without)
+    return f.covariance.copy()
+
+
+@pytest.mark.parametrize("yaw_rad", [0.0, 0.7, 2.5])
+def test_bias_by_misalignment_of_the_gyro_does_not_move_the_velocity(yaw_rad: float) -> None:
+    f = level()
+    f.nominal[0], f.nominal[3] = math.cos(0.5 * yaw_rad), math.sin(0.5 * yaw_rad)
+    hovered(f)
+    added = f.covariance[ACCEL_BIAS, ACCEL_BIAS]
+    assert math.sqrt(added) == pytest.approx(9.80665 * PARAMS.gyro_scale_error)
+    f.covariance[POSITION:GYRO_BIAS] = 0.0
+    f.behind[0], f.behind[6] = 0.01, -9.80665 * 0.01
+    predict_errors(f, QUIET, PARAMS._replace(gyro_noise=0.0, accel_noise=0.0, accel_bias_walk=0.0))
+    moved = f.covariance[VELOCITY, VELOCITY] + f.covariance[VELOCITY + 1, VELOCITY + 1]
+    assert moved < 1e-6 * added * 0.01**2  # a bias alone gives twice the last product
+
+
+def test_bias_of_the_barometer_spreads_with_changes_of_the_airspeed() -> None:
+    still = hovered(level())[BARO_BIAS, BARO_BIAS]
+    assert still == pytest.approx(PARAMS.baro_walk**2 * 0.01)
+    f = level()
+    f.nominal[4] = 6.0  # m/s
+    share = PARAMS.baro_dynamic_share / 9.80665
+    expected = (share * 0.03) ** 2 * (6.0**2 + 2.0**2) * 1.0 / 0.01
+    assert hovered(f, (0.03, 0.0))[BARO_BIAS, BARO_BIAS] - still == pytest.approx(expected, rel=1e-6)
+    largest = hovered(f, (30.0, 0.0))[BARO_BIAS, BARO_BIAS] - still
+    assert largest == pytest.approx(0.01)  # m², of an impact
