@@ -174,10 +174,12 @@ def _hold(gain: ErrorVector, holds: float) -> None:
             gain[3 + i], gain[6 + i] = 0.0, 0.0
     elif holds > 0.0:
         gain[0], gain[1] = 0.0, 0.0
-        for i in range(3, 11 if holds == HOLDS_TILT_AND_GYRO else 9):
+        for i in range(3, 9):
             gain[i] = 0.0
         for i in range(12, 15):
             gain[i] = 0.0
+        if holds == HOLDS_TILT_AND_GYRO:
+            gain[9], gain[10] = 0.0, 0.0
 
 
 @compiled

@@ -14,7 +14,7 @@
 #define FS_HOLDS_HORIZONTAL FS_LIT(2.0)
 #define FS_HOLDS_TILT_AND_GYRO FS_LIT(3.0)
 
-/* kalman.py:221 */
+/* kalman.py:223 */
 void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
 {
     for (int32_t i = at; i < at + count; i++) {
@@ -95,12 +95,15 @@ static void hold(fs_real gain[27], fs_real holds)
         if (holds > FS_LIT(0.0)) {
             gain[0] = FS_LIT(0.0);
             gain[1] = FS_LIT(0.0);
-            const int32_t stop = holds == FS_HOLDS_TILT_AND_GYRO ? 11 : 9;
-            for (int32_t i = 3; i < stop; i++) {
+            for (int32_t i = 3; i < 9; i++) {
                 gain[i] = FS_LIT(0.0);
             }
             for (int32_t i = 12; i < 15; i++) {
                 gain[i] = FS_LIT(0.0);
+            }
+            if (holds == FS_HOLDS_TILT_AND_GYRO) {
+                gain[9] = FS_LIT(0.0);
+                gain[10] = FS_LIT(0.0);
             }
         }
     }
@@ -141,7 +144,7 @@ static void correct(fs_filter *f, fs_real innovation)
     fs_write_nominal(f->nominal, &corrected);
 }
 
-/* kalman.py:184 */
+/* kalman.py:186 */
 bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *noise, fs_real holds)
 {
     fs_observed *o = &f->observations[row];
@@ -179,7 +182,7 @@ bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *nois
     return true;
 }
 
-/* kalman.py:232 */
+/* kalman.py:234 */
 fs_real fs_deviation(const fs_filter *f, int32_t at, int32_t count)
 {
     fs_real total = FS_LIT(0.0);
