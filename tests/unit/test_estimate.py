@@ -136,8 +136,21 @@ def test_estimate_is_closer_to_truth_than_that_of_px4(name: str, capsys: pytest.
     found = json.loads(capsys.readouterr().out)
     ours, px4 = found["to_truth"], found["log_to_truth"]
     for key in ours:
-        if "_rms_" in key:
+        if "_rms_" in key:  # measured: pitch of the windy flight 0.91 of PX4's, the rest 0.87 and less
             assert ours[key] < px4[key], key
+
+
+@pytest.mark.parametrize("name", ["real_fsyr_log_61", "real_toopazo_log_149", "real_toopazo_log_78"])
+def test_estimate_of_a_real_flight_is_near_that_of_px4(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    path = SHARED_LOGS / f"{name}.ulg.xz"
+    if not path.is_file():
+        pytest.skip(f"{path} is missing")
+    assert main(["estimate", str(path), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["to_log"]
+    assert found["tilt_rms_deg"] < 1.5  # measured 0.85 and less
+    assert found["yaw_rms_deg"] < 1.5  # measured 1.2 and less
+    assert found["velocity_horizontal_rms_m_s"] < 0.5  # measured 0.28 and less
+    assert found["velocity_vertical_rms_m_s"] < 0.5  # measured 0.15 and less
 
 
 def test_parameters_of_the_filter_have_their_range(log: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,7 +3,7 @@
 
 const fs_estimator_params fs_default_estimator_params = {
     .gyro_noise = FS_LIT(0.00044721359549995795),
-    .accel_noise = FS_LIT(0.006260990336999412),
+    .accel_noise = FS_LIT(0.03130495168499706),
     .imu_noise_share = FS_LIT(0.1),
     .gyro_scale_error = FS_LIT(0.0035),
     .gyro_bias_walk = FS_LIT(0.0003041052449399714),
