@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 from io import TextIOWrapper
 from typing import IO, Any, TypeAlias, cast
 
-from textual.app import App
+from textual.app import App, ScreenStackError
 from textual.dom import DOMNode
 from textual.drivers.linux_driver import LinuxDriver
 from textual.events import InputEvent, Key, MouseUp, Paste
@@ -46,9 +46,15 @@ class KeyQueue:
         return screen if screen is not None and screen.is_mounted else None
 
     async def run(self) -> None:
-        """Handle events until cancelled."""
+        """Handle events until cancelled, or until the application has ended and its screens are gone."""
         while True:
-            await self._take(*await self._events.get())
+            event, seen = await self._events.get()
+            try:
+                await self._take(event, seen)
+            except ScreenStackError:
+                if self._app.screen_stack:
+                    raise
+                return
             self._events.task_done()
 
     async def handled(self) -> None:
@@ -66,7 +72,7 @@ class KeyQueue:
 
     async def _settle(self) -> None:
         """Wait until the focused widget, those around it and the application have handled their messages."""
-        node: DOMNode | None = self._app.focused or (self._app.screen if self._app.screen_stack else None)
+        node: DOMNode | None = self._app.focused or self._app.screen
         while node is not None:
             handled = asyncio.Event()
             if node.call_later(handled.set):

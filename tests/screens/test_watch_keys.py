@@ -9,13 +9,14 @@ import threading
 from typing import IO, cast
 
 import pytest
+from textual.app import App
 from textual.drivers._writer_thread import WriterThread
 from textual.events import Key, Paste
 from textual.pilot import Pilot
 from textual.widgets import Input
 
 from gcs_cli.tui.app import WatchApp
-from gcs_cli.tui.input import LastingFile
+from gcs_cli.tui.input import KeyQueue, LastingFile
 from gcs_cli.tui.orders.form import Confirm, OrderForm
 from tests.support.pilots import type_ahead
 from tests.support.screens import shown
@@ -158,3 +159,15 @@ def test_output_without_a_terminal_does_not_hold_up_the_program() -> None:
     program.join(LONG_S)
     assert not program.is_alive()
     assert lost
+
+
+def test_keys_that_are_left_when_the_view_ends_are_dropped() -> None:
+    async def ended() -> None:
+        app: App[None] = App()
+        async with app.run_test():
+            keys = KeyQueue(app, app.on_event)
+        assert not app.screen_stack
+        keys.put(Key("1", "1"))
+        await keys.run()
+
+    asyncio.run(ended())
