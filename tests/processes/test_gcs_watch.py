@@ -113,7 +113,6 @@ def test_the_end_restores_the_terminal(link: list[str], ending: bytes | signal.S
             screen.process.send_signal(ending)
         screen.read_until(b"\x1b[?1049l")
         assert screen.process.wait(LONG_S) == 0
-        screen.read_until(b"\x1b[?25h")
         assert screen.is_restored
         assert b"Traceback" not in screen.seen
 

@@ -77,6 +77,9 @@ def test_port_taken_after_the_search_means_the_next_instance(
 ) -> None:
     first, last = free_instance(), 0
     with socket.socket() as other:
+        other.setsockopt(
+            socket.SOL_SOCKET, socket.SO_REUSEADDR, 1
+        )  # an earlier vehicle's connection may linger
         other.bind(("127.0.0.1", simulator_port(first)))
         other.listen()
         last = free_instance({first})

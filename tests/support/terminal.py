@@ -52,9 +52,13 @@ class Terminal:
 
     @property
     def is_restored(self) -> bool:
-        """True if the main screen, the cursor, the mouse and the line discipline are as before."""
-        ends = (b"\x1b[?1049l", b"\x1b[?25h", b"\x1b[?1000l")
-        return all(end in self.seen for end in ends) and termios.tcgetattr(self._inner) == self._before
+        """True if the main screen, the cursor, the mouse and the line discipline are as before.
+
+        The last output of a process that has ended may still be on its way.
+        """
+        for end in (b"\x1b[?1049l", b"\x1b[?25h", b"\x1b[?1000l"):
+            self.read_until(end)
+        return bool(termios.tcgetattr(self._inner) == self._before)
 
     def close(self) -> None:
         self.process.kill()

@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import tempfile
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -29,6 +30,7 @@ class Terminal:
     def __init__(self, tmux: subprocess.Popen[bytes]) -> None:
         self._tmux = tmux
         self._unread = b""
+        self._told: deque[str] = deque(maxlen=40)  # for the message of a failure
         self.ended = False
 
     def _line(self) -> str:
@@ -42,7 +44,13 @@ class Terminal:
                 return ""
             self._unread += more
         line, _, self._unread = self._unread.partition(b"\n")
-        return line.decode(errors="replace")  # an output may end within a character
+        self._told.append(line.decode(errors="replace"))  # an output may end within a character
+        return self._told[-1]
+
+    def wait_for_session(self) -> None:
+        """Wait until the session exists: a command before it has no target."""
+        while not (self.ended or self._line().startswith("%session-changed")):
+            pass
 
     def _call(self, *words: object) -> list[str]:
         """Return the reply to a command of tmux."""
@@ -54,7 +62,7 @@ class Terminal:
             line = self._line()
             if line.startswith(("%begin", "%end", "%error")) and line.endswith(OWN_REPLY):
                 if reply is not None:
-                    assert not line.startswith("%error"), reply
+                    assert not line.startswith("%error"), "\n".join((*reply, "after:", *self._told))
                     return reply
                 reply = []
             elif reply is not None:
@@ -90,7 +98,7 @@ class Terminal:
         while not holds(shown := self.screen):
             assert time.monotonic() < end_s, f"never {what} in {self.sizes}:\n{shown}"
             while not self._line().startswith("%output"):
-                assert not self.ended, f"ended without {what}"
+                assert not self.ended, "\n".join((f"ended without {what} after:", *self._told))
         return shown
 
     def press(self, *keys: str) -> None:
@@ -130,6 +138,7 @@ def terminal(
         )
         try:
             made = Terminal(client)
+            made.wait_for_session()
             made.resize(*size)
             yield made
         finally:
