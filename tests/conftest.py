@@ -52,28 +52,52 @@ TIERS = {
 }
 """Marker of the tests in each folder; ``make test`` runs some of them, ``make test-all`` all."""
 
+SHORT = ("protocol", "unit")
+"""Folders whose files come last: short ones, so that no worker waits long for another at the end."""
+
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """Collect without garbage collection, which takes a fifth of the time, and exempt the tests from later ones."""
+    """Collect without garbage collection, which takes a fifth of the time, and exempt the tests from later ones.
+
+    Later ones are rare: flights make many objects and few cycles.
+    """
     gc.disable()
     try:
         return (yield)
     finally:
         gc.freeze()
+        gc.set_threshold(20_000, 20, 20)
         gc.enable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark each test with its tier, and those of ``long.txt`` and below a folder ``long`` as long."""
+    """Mark each test with its tier, those of ``long.txt`` and below a folder ``long`` as long; mix the folders."""
     long = frozenset(Path(__file__).with_name("long.txt").read_text(encoding="utf-8").splitlines())
-    for path, in_file in itertools.groupby(items, lambda item: item.path):
+    files: dict[str, list[list[pytest.Item]]] = {}
+    for path, found in itertools.groupby(items, lambda item: item.path):
         folder, *below = path.relative_to(Path(__file__).parent).parts
         tier = "paper" if path.name.startswith("test_paper") else TIERS[folder]
+        in_file = list(found)
         for item in in_file:
             if "long" in below or item.nodeid in long:
                 item.add_marker(pytest.mark.long)
             item.add_marker(getattr(pytest.mark, tier))
+        files.setdefault(folder, []).append(in_file)
+    items[:] = mixed(files)
+
+
+def mixed(files: dict[str, list[list[pytest.Item]]]) -> list[pytest.Item]:
+    """Return the tests of all folders, each spread over the whole run.
+
+    Clients of others wait in real time: if all workers run those, the processors are idle.
+    """
+    placed = [
+        (folder in SHORT, (number + 0.5) / len(all_of_it), folder, in_file)
+        for folder, all_of_it in files.items()
+        for number, in_file in enumerate(all_of_it)
+    ]
+    return [item for *_, in_file in sorted(placed, key=lambda each: each[:3]) for item in in_file]
 
 
 @pytest.fixture(autouse=True)
