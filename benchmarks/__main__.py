@@ -15,6 +15,7 @@ from benchmarks import (
     emulated,
     ground_load,
     one_process,
+    peers,
     plants,
     real_time,
     report,
@@ -78,19 +79,29 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--quick", action="store_true", help="few and short rounds: half a minute")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures to FILE too")
     parser.add_argument("--only", choices=SECTIONS, action="append", help="measure only this (repeatable)")
+    parser.add_argument(
+        "--against",
+        type=peers.checkouts_of,
+        metavar="NAME=DIRECTORY,…",
+        help="fly in turns with the builds in checkouts of ardupilot and px4; only this without --only",
+    )
     return parser.parse_args()
 
 
 def main() -> int:
     """Measure and print; return the exit code."""
     arguments = _arguments()
-    wanted = arguments.only or [section for section in SECTIONS if section not in _LONG]
+    ordinary = [section for section in SECTIONS if section not in _LONG and not arguments.against]
+    wanted = arguments.only or ordinary
     load = OtherLoad()
     results: dict[str, Any] = {}
     for each in MEASUREMENTS:
         if each.section in wanted:
             print(f"measuring {each.name} …", file=sys.stderr, flush=True)
             results[each.key] = each.measure(*(each.quick if arguments.quick else each.whole))
+    if arguments.against:
+        print("measuring flights in turns with other autopilots …", file=sys.stderr, flush=True)
+        results["peers"] = peers.flights(arguments.against, 2 if arguments.quick else 7)
     machine = {
         "system": f"{platform.system()} {platform.machine()}",
         "cores": os.cpu_count(),

@@ -78,7 +78,7 @@ VARIANTS = (
 )
 
 
-def _fly(variant: Variant) -> tuple[float, float]:
+def fly(variant: Variant) -> tuple[float, float]:
     """Return the real-time factor and the time of a step [µs]."""
     world = flying(variant.log, variant.station, variant.state)
     began_s, simulated_s = time.perf_counter(), world.time_s
@@ -93,7 +93,7 @@ def flights(rounds: int) -> dict[str, tuple[Figure, Figure]]:
     seen: dict[str, list[tuple[float, float]]] = {variant.name: [] for variant in VARIANTS}
     for _ in range(rounds):
         for variant in VARIANTS:
-            seen[variant.name].append(_fly(variant))
+            seen[variant.name].append(fly(variant))
     return {
         name: (figure(factor for factor, _ in flown), figure(step for _, step in flown))
         for name, flown in seen.items()

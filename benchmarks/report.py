@@ -36,6 +36,8 @@ def texts(results: dict[str, Any], machine: dict[str, Any]) -> Iterator[str]:
     )
     if "three_processes" in results:
         yield _flights(results) + "\n"
+    if "peers" in results:
+        yield _peers(results["peers"]) + "\n"
     if "emulated" in results:
         yield _emulated(results["emulated"]) + "\n"
     if "plants" in results:
@@ -70,6 +72,13 @@ def _flights(results: dict[str, Any]) -> str:
         rows.append((f"one process, {name}, 500 Hz", factor.text(), step_us.text(), *marks))
     head = ("missions/square.plan", "× real time", "µs a step", "mark", "others")
     return table("FLIGHTS", head, rows)
+
+
+def _peers(flown: dict[str, Figure]) -> str:
+    rows = [(name, factor.text()) for name, factor in flown.items()]
+    return table(
+        "FLIGHTS IN TURNS WITH OTHER AUTOPILOTS", ("square.plan, or 60 s of hover", "× real time"), rows
+    )
 
 
 def _emulated(results: dict[str, Flown]) -> str:

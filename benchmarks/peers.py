@@ -1,0 +1,191 @@
+"""Own flights and those of other autopilots in turns: ``--against ardupilot=DIRECTORY,px4=DIRECTORY``, their builds.
+
+Own flights are ``missions/square.plan`` on sensors. A peer takes off and hovers as fast as it can on its own
+simulation, with its estimator, its log and its telemetry as they come, read by a ``Connection`` in this process. Its
+factor is that of 60 s of hover, by the time in its messages. It flies no mission: at a hundred times real time the
+upload exceeds what the vehicle's clock allows for an answer.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+from benchmarks import one_process, three_processes
+from benchmarks.measure import Figure, figure
+from flightstack.mavlink.dialect import mavlink
+from flightstack.params.config import ESTIMATED
+from gcs_cli.actions.in_flight import takeoff
+from gcs_cli.errors import CliError
+from gcs_cli.link.connection import Connection
+from gcs_cli.link.endpoint import parse_endpoint
+from gcs_cli.link.perform import perform
+from gcs_cli.output import Output
+
+_LATITUDE, _LONGITUDE, _ALTITUDE = "47.397742", "8.545594", "488"
+"""Home of the plan."""
+_UNLIMITED = "1000"
+"""Speed factor that no machine reaches."""
+_ALTITUDE_M, _HOVER_S = 5.0, 60.0
+_LIMIT_S, _PAUSE_S = 60.0, 0.05
+
+
+class Peer(NamedTuple):
+    """Another autopilot: how its build is started, and where it answers."""
+
+    title: str
+    program: str
+    """Path in the checkout."""
+    arguments: Callable[[Path], tuple[str, ...]]
+    """Arguments of the program, from the checkout."""
+    environment: dict[str, str]
+    endpoint: str
+
+
+PEERS = {
+    "ardupilot": Peer(
+        "ArduCopter's SITL, one process",
+        "build/sitl/bin/arducopter",
+        lambda checkout: (
+            *("--model", "quad", "--speedup", _UNLIMITED, "--wipe"),
+            *("--defaults", str(checkout / "Tools" / "autotest" / "default_params" / "copter.parm")),
+            *("--home", f"{_LATITUDE},{_LONGITUDE},{_ALTITUDE},0"),
+        ),
+        {},
+        "tcp:127.0.0.1:5760",
+    ),
+    "px4": Peer(
+        "PX4's SIH, one process",
+        "build/px4_sitl_default/bin/px4",
+        lambda checkout: ("-d", "-w", ".", str(checkout / "build" / "px4_sitl_default" / "etc")),
+        {
+            "PX4_SIM_MODEL": "sihsim_quadx",
+            "PX4_SIM_SPEED_FACTOR": _UNLIMITED,
+            "PX4_HOME_LAT": _LATITUDE,
+            "PX4_HOME_LON": _LONGITUDE,
+            "PX4_HOME_ALT": _ALTITUDE,
+        },
+        "udpin:127.0.0.1:14550",
+    ),
+}
+
+
+class _Silent(Output):
+    def say(self, event: str, sentence: str, **facts: object) -> None:
+        """Print nothing."""
+
+
+def checkouts_of(text: str) -> dict[str, Path]:
+    """Return the checkout of each peer in ``ardupilot=DIRECTORY,px4=DIRECTORY``; raise ArgumentTypeError."""
+    found: dict[str, Path] = {}
+    for part in text.split(","):
+        name, _, directory = part.partition("=")
+        if name not in PEERS or not directory:
+            raise argparse.ArgumentTypeError(
+                f"{part!r} is not NAME=DIRECTORY with a NAME of {', '.join(PEERS)}"
+            )
+        checkout = Path(directory).resolve()
+        if not (checkout / PEERS[name].program).is_file():
+            raise argparse.ArgumentTypeError(f"{checkout} has no {PEERS[name].program}: build it first")
+        found[name] = checkout
+    return found
+
+
+@contextlib.contextmanager
+def _running(peer: Peer, checkout: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """Run a peer in an empty directory, and end it."""
+    command = [str(checkout / peer.program), *peer.arguments(checkout)]
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        process = subprocess.Popen(
+            command,
+            cwd=folder,
+            env={**os.environ, **peer.environment},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        try:
+            yield process
+        finally:
+            process.kill()
+            process.wait()
+
+
+def _connected(peer: Peer, process: subprocess.Popen[bytes]) -> Connection:
+    """Return a connection once the peer listens."""
+    end_s = time.monotonic() + _LIMIT_S
+    while True:
+        try:
+            return Connection(parse_endpoint(peer.endpoint))
+        except CliError as error:
+            if process.poll() is not None or time.monotonic() > end_s:
+                raise RuntimeError(f"{peer.title}: {error}") from None
+        time.sleep(_PAUSE_S)
+
+
+def _take_off(connection: Connection) -> None:
+    """Take off as soon as the vehicle can: its estimator needs half a minute of its time."""
+    end_s = time.monotonic() + _LIMIT_S
+    while True:
+        try:
+            perform(connection, takeoff(_ALTITUDE_M), _Silent(as_json=False))
+            return
+        except CliError:  # also if an answer was lost, as some of PX4's at this speed
+            view = connection.session.view
+            if view.armed and view.landed_state == mavlink.MAV_LANDED_STATE_IN_AIR:
+                return
+            if time.monotonic() > end_s:
+                raise
+        connection.step(connection.now_s + _PAUSE_S)
+
+
+def fly(peer: Peer, checkout: Path) -> float:
+    """Hover once; return the real-time factor."""
+    with _running(peer, checkout) as process, _connected(peer, process) as connection:
+        connection.wait_for_vehicle(_LIMIT_S)
+        session = connection.session
+        _take_off(connection)
+        began_s, from_s = time.perf_counter(), session.view.time_s or 0.0
+        if not connection.wait_for(lambda: (session.view.time_s or 0.0) > from_s + _HOVER_S, _LIMIT_S):
+            raise RuntimeError(f"{peer.title} did not fly for {_HOVER_S:g} s within {_LIMIT_S:g} s")
+        took_s = time.perf_counter() - began_s
+        if not session.view.armed:
+            raise RuntimeError(f"{peer.title} did not stay in the air")
+        return ((session.view.time_s or 0.0) - from_s) / took_s
+
+
+def _one_process(variant: one_process.Variant) -> float:
+    return one_process.fly(variant)[0]
+
+
+def _three_processes() -> float:
+    summary, _ = three_processes.fly(500.0, state=ESTIMATED)
+    return float(summary["real_time_factor"])
+
+
+def flights(checkouts: dict[str, Path], rounds: int) -> dict[str, Figure]:
+    """Return the factors of own flights on sensors and of the peers', flown in turns; the first round warms caches."""
+    flown: dict[str, Callable[[], float]] = {
+        **{
+            f"one process, {each.name}": partial(_one_process, each)
+            for each in one_process.VARIANTS
+            if each.state == ESTIMATED
+        },
+        "three processes, sensors and estimator, log": _three_processes,
+        **{PEERS[name].title: partial(fly, PEERS[name], checkout) for name, checkout in checkouts.items()},
+    }
+    seen: dict[str, list[float]] = {name: [] for name in flown}
+    for number in range(rounds + 1):
+        for name, once in flown.items():
+            factor = once()
+            if number:
+                seen[name].append(factor)
+    return {name: figure(factors) for name, factors in seen.items()}
