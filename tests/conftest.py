@@ -53,21 +53,21 @@ TIERS = {
 """Marker of the tests in each folder; ``make test`` runs some of them, ``make test-all`` all."""
 
 SHORT = ("protocol", "unit")
-"""Folders whose files come last: short ones, so that no worker waits long for another at the end."""
+"""Folders whose files come last: most are short, so that no worker waits long for another at the end."""
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
     """Collect without garbage collection, which takes a fifth of the time, and exempt the tests from later ones.
 
-    Later ones are rare: flights make many objects and few cycles.
+    Later ones of new objects are rarer than Python's: flights make many objects and few cycles.
     """
     gc.disable()
     try:
         return (yield)
     finally:
         gc.freeze()
-        gc.set_threshold(20_000, 20, 20)
+        gc.set_threshold(20_000, 10, 10)
         gc.enable()
 
 

@@ -54,7 +54,14 @@ class KeyQueue:
             except ScreenStackError:
                 if self._app.screen_stack:
                     raise
+                self._drop_rest()
                 return
+            finally:
+                self._events.task_done()
+
+    def _drop_rest(self) -> None:
+        while not self._events.empty():
+            self._events.get_nowait()
             self._events.task_done()
 
     async def handled(self) -> None:

@@ -88,5 +88,5 @@ def test_ctrl_c_in_the_view_of_sim_ends_all() -> None:
             screen.type(b"\x03")
         screen.read_until(b"simulation ended")
         assert screen.process.wait() == 0
-        assert screen.is_restored
+        assert screen.is_restored()
         assert b"Traceback" not in screen.seen

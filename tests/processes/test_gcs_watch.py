@@ -113,7 +113,7 @@ def test_the_end_restores_the_terminal(link: list[str], ending: bytes | signal.S
             screen.process.send_signal(ending)
         screen.read_until(b"\x1b[?1049l")
         assert screen.process.wait(LONG_S) == 0
-        assert screen.is_restored
+        assert screen.is_restored()
         assert b"Traceback" not in screen.seen
 
 
@@ -130,7 +130,7 @@ def test_an_exception_restores_the_terminal(link: list[str]) -> None:
     with terminal(["-c", FAILING, "watch", *link]) as screen:
         screen.read_until(b"drawing failed")
         assert screen.process.wait(LONG_S) == 1
-        assert screen.is_restored
+        assert screen.is_restored()
 
 
 def test_a_suspended_view_gives_the_terminal_back_and_draws_again(link: list[str]) -> None:
@@ -156,7 +156,7 @@ def test_a_view_that_was_stopped_without_notice_draws_again_and_ends(link: list[
         screen.read_until(b"Position")
         screen.type(b"q")
         assert screen.process.wait(LONG_S) == 0
-        assert screen.is_restored
+        assert screen.is_restored()
 
 
 def test_gcs_alone_on_a_terminal_opens_the_view() -> None:

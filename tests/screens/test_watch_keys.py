@@ -167,7 +167,9 @@ def test_keys_that_are_left_when_the_view_ends_are_dropped() -> None:
         async with app.run_test():
             keys = KeyQueue(app, app.on_event)
         assert not app.screen_stack
-        keys.put(Key("1", "1"))
+        for key in "12":
+            keys.put(Key(key, key))
         await keys.run()
+        await keys.handled()
 
     asyncio.run(ended())

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 
 LONG_S = 60
 """Hang guard [s]."""
+_LAST = b"<the last output>"
 # makes the terminal on stdin the process's own, so that Ctrl-C reaches it
 ON_ITS_TERMINAL = """
 import fcntl, os, sys, termios
@@ -50,15 +51,15 @@ class Terminal:
         os.close(self._inner)
         self._terminal = self._inner = -1
 
-    @property
     def is_restored(self) -> bool:
-        """True if the main screen, the cursor, the mouse and the line discipline are as before.
+        """Return True if the main screen, the cursor, the mouse and the line discipline are as before.
 
-        The last output of a process that has ended may still be on its way.
+        The process has ended; its last output may still be on its way, before that of this one.
         """
-        for end in (b"\x1b[?1049l", b"\x1b[?25h", b"\x1b[?1000l"):
-            self.read_until(end)
-        return bool(termios.tcgetattr(self._inner) == self._before)
+        os.write(self._inner, _LAST)
+        self.read_until(_LAST)
+        ends = (b"\x1b[?1049l", b"\x1b[?25h", b"\x1b[?1000l")
+        return all(end in self.seen for end in ends) and termios.tcgetattr(self._inner) == self._before
 
     def close(self) -> None:
         self.process.kill()

@@ -37,7 +37,9 @@ class Terminal:
         """Return the next line of tmux; empty after its end."""
         assert self._tmux.stdout is not None
         while b"\n" not in self._unread:
-            assert select.select([self._tmux.stdout], [], [], HANG_S)[0], f"no output:\n{self.screen}"
+            assert select.select([self._tmux.stdout], [], [], HANG_S)[0], "\n".join(
+                ("no output after:", *self._told)
+            )
             more = os.read(self._tmux.stdout.fileno(), 65536)
             if not more:
                 self.ended = True
@@ -49,8 +51,8 @@ class Terminal:
 
     def wait_for_session(self) -> None:
         """Wait until the session exists: a command before it has no target."""
-        while not (self.ended or self._line().startswith("%session-changed")):
-            pass
+        while not self._line().startswith("%session-changed"):
+            assert not self.ended, "\n".join(("no session:", *self._told))
 
     def _call(self, *words: object) -> list[str]:
         """Return the reply to a command of tmux."""
