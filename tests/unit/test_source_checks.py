@@ -15,7 +15,7 @@ from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.estimation.error_state import POSITION
 from flightstack.estimation.estimator import Estimator
-from flightstack.estimation.estimator_params import EstimatorParams
+from flightstack.estimation.estimator_params import EstimatorParams, tuning_of
 from flightstack.estimation.kalman import (
     BARO,
     GNSS_POSITION,
@@ -26,10 +26,13 @@ from flightstack.estimation.source_checks import (
     POSITION_DRIFTS,
     VELOCITY_IS_WRONG,
 )
+from flightstack.params.vehicle import load_vehicle
 from tests.support import flown_sensors as flown
 from tests.support.flown_sensors import Faults
 
 PARAMS = EstimatorParams()._replace(gnss_delay_s=flown.GNSS_DELAY_S, delay_s=flown.GNSS_DELAY_S + 0.012)
+BUILT_IN = tuning_of(dict(load_vehicle("x_quad").default_params))[0]
+"""Parameters of a built-in vehicle, which states the noise of its sensors."""
 STEADY_S, BEGIN_S, END_S = 10.0, 20.0, 50.0
 Change = Callable[[Any, float], Any]
 
@@ -124,7 +127,7 @@ def moved(sample: GnssSample, north_m: float, north_m_s: float) -> GnssSample:
 @pytest.mark.parametrize(
     ("accel_noise", "most_m"),
     [
-        (0.006, 0.6),  # measured 0.4 and 0.2, of 12 m: the gate refuses the velocity
+        (BUILT_IN.accel_noise, 0.6),  # measured 0.4 and 0.2, of 12 m: the gate refuses the velocity
         (
             PARAMS.accel_noise,
             2.0,
