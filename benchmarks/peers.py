@@ -11,7 +11,10 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import signal
+import socket
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -21,6 +24,7 @@ from typing import NamedTuple
 
 from benchmarks import one_process, three_processes
 from benchmarks.measure import Figure, figure
+from benchmarks.ports import is_free
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.config import ESTIMATED
 from gcs_cli.actions.in_flight import takeoff
@@ -29,6 +33,7 @@ from gcs_cli.link.connection import Connection
 from gcs_cli.link.endpoint import parse_endpoint
 from gcs_cli.link.perform import perform
 from gcs_cli.output import Output
+from gcs_cli.vehicle.view_types import VehicleView
 
 _LATITUDE, _LONGITUDE, _ALTITUDE = "47.397742", "8.545594", "488"
 """Home of the plan."""
@@ -48,6 +53,10 @@ class Peer(NamedTuple):
     """Arguments of the program, from the checkout."""
     environment: dict[str, str]
     endpoint: str
+    port: int
+    """The port of ``endpoint``, which has to be free before."""
+    autopilot: int
+    """Its MAV_AUTOPILOT."""
 
 
 PEERS = {
@@ -61,6 +70,8 @@ PEERS = {
         ),
         {},
         "tcp:127.0.0.1:5760",
+        5760,
+        mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA,
     ),
     "px4": Peer(
         "PX4's SIH, one process",
@@ -74,8 +85,14 @@ PEERS = {
             "PX4_HOME_ALT": _ALTITUDE,
         },
         "udpin:127.0.0.1:14550",
+        14550,
+        mavlink.MAV_AUTOPILOT_PX4,
     ),
 }
+
+
+class PeerError(RuntimeError):
+    """A peer that cannot be measured."""
 
 
 class _Silent(Output):
@@ -95,6 +112,8 @@ def checkouts_of(text: str) -> dict[str, Path]:
         checkout = Path(directory).resolve()
         if not (checkout / PEERS[name].program).is_file():
             raise argparse.ArgumentTypeError(f"{checkout} has no {PEERS[name].program}: build it first")
+        if name in found:
+            raise argparse.ArgumentTypeError(f"{name} has two directories")
         found[name] = checkout
     return found
 
@@ -102,6 +121,9 @@ def checkouts_of(text: str) -> dict[str, Path]:
 @contextlib.contextmanager
 def _running(peer: Peer, checkout: Path) -> Iterator[subprocess.Popen[bytes]]:
     """Run a peer in an empty directory, and end it."""
+    for kind in (socket.SOCK_STREAM, socket.SOCK_DGRAM):
+        if not is_free(kind, peer.port):
+            raise PeerError(f"{peer.title}: port {peer.port} is in use")
     command = [str(checkout / peer.program), *peer.arguments(checkout)]
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         process = subprocess.Popen(
@@ -111,11 +133,12 @@ def _running(peer: Peer, checkout: Path) -> Iterator[subprocess.Popen[bytes]]:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
+            start_new_session=True,
         )
         try:
             yield process
         finally:
-            process.kill()
+            os.killpg(process.pid, signal.SIGKILL)  # with PX4's shells
             process.wait()
 
 
@@ -127,8 +150,12 @@ def _connected(peer: Peer, process: subprocess.Popen[bytes]) -> Connection:
             return Connection(parse_endpoint(peer.endpoint))
         except CliError as error:
             if process.poll() is not None or time.monotonic() > end_s:
-                raise RuntimeError(f"{peer.title}: {error}") from None
+                raise PeerError(f"{peer.title}: {error}") from None
         time.sleep(_PAUSE_S)
+
+
+def _is_in_air(view: VehicleView) -> bool:
+    return view.armed and view.landed_state == mavlink.MAV_LANDED_STATE_IN_AIR
 
 
 def _take_off(connection: Connection) -> None:
@@ -140,7 +167,7 @@ def _take_off(connection: Connection) -> None:
             return
         except CliError:  # also if an answer was lost, as some of PX4's at this speed
             view = connection.session.view
-            if view.armed and view.landed_state == mavlink.MAV_LANDED_STATE_IN_AIR:
+            if _is_in_air(view):
                 return
             if time.monotonic() > end_s:
                 raise
@@ -152,14 +179,23 @@ def fly(peer: Peer, checkout: Path) -> float:
     with _running(peer, checkout) as process, _connected(peer, process) as connection:
         connection.wait_for_vehicle(_LIMIT_S)
         session = connection.session
+        identity = session.view.identity
+        if process.poll() is not None or identity is None or identity.autopilot != peer.autopilot:
+            raise PeerError(f"{peer.title}: another vehicle answers at {peer.endpoint}")
         _take_off(connection)
-        began_s, from_s = time.perf_counter(), session.view.time_s or 0.0
-        if not connection.wait_for(lambda: (session.view.time_s or 0.0) > from_s + _HOVER_S, _LIMIT_S):
-            raise RuntimeError(f"{peer.title} did not fly for {_HOVER_S:g} s within {_LIMIT_S:g} s")
+        mode, began_s, from_s = session.view.mode, time.perf_counter(), _time_s(session.view)
+        if not connection.wait_for(lambda: _time_s(session.view) > from_s + _HOVER_S, _LIMIT_S):
+            raise PeerError(f"{peer.title} did not fly for {_HOVER_S:g} s within {_LIMIT_S:g} s")
         took_s = time.perf_counter() - began_s
-        if not session.view.armed:
-            raise RuntimeError(f"{peer.title} did not stay in the air")
-        return ((session.view.time_s or 0.0) - from_s) / took_s
+        if not _is_in_air(session.view) or session.view.mode != mode:
+            raise PeerError(f"{peer.title} did not hover: {session.view.mode} after {mode}")
+        return (_time_s(session.view) - from_s) / took_s
+
+
+def _time_s(view: VehicleView) -> float:
+    if view.time_s is None:
+        raise PeerError("the vehicle sends no time")
+    return view.time_s
 
 
 def _one_process(variant: one_process.Variant) -> float:
@@ -185,7 +221,11 @@ def flights(checkouts: dict[str, Path], rounds: int) -> dict[str, Figure]:
     seen: dict[str, list[float]] = {name: [] for name in flown}
     for number in range(rounds + 1):
         for name, once in flown.items():
-            factor = once()
+            try:
+                factor = once()
+            except (CliError, PeerError) as error:
+                print(f"round {number} left out: {error}", file=sys.stderr, flush=True)
+                continue
             if number:
                 seen[name].append(factor)
-    return {name: figure(factors) for name, factors in seen.items()}
+    return {name: figure(factors) for name, factors in seen.items() if factors}

@@ -15,7 +15,8 @@ from flightstack.core.port_numbers import (
 _FIRST, _LAST = 60, 99
 
 
-def _is_free(kind: socket.SocketKind, port: int) -> bool:
+def is_free(kind: socket.SocketKind, port: int) -> bool:
+    """Return True if a port of this machine can be bound."""
     with socket.socket(socket.AF_INET, kind) as probe:
         if kind == socket.SOCK_STREAM:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -31,8 +32,8 @@ def free_instance() -> int:
     for instance in range(_FIRST, _LAST + 1):
         udp = (ground_station_port(instance), vehicle_ground_port(instance), vehicle_api_port(instance))
         tcp = (simulator_port(instance), tcp_port(instance))
-        if all(_is_free(socket.SOCK_STREAM, port) for port in tcp) and all(
-            _is_free(socket.SOCK_DGRAM, port) for port in udp
+        if all(is_free(socket.SOCK_STREAM, port) for port in tcp) and all(
+            is_free(socket.SOCK_DGRAM, port) for port in udp
         ):
             return instance
     raise RuntimeError(f"instances {_FIRST} to {_LAST} are all in use")
