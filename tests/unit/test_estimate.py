@@ -8,6 +8,7 @@ import math
 import os
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -127,13 +128,18 @@ def test_earth_field_is_that_of_the_year(year: float, declination_deg: float) ->
     assert math.degrees(math.atan2(east, north)) == pytest.approx(declination_deg, abs=0.3)
 
 
-@pytest.mark.parametrize("name", ["px4_sih_calm", "px4_world_windy", "px4_world_outage"])
-def test_estimate_is_closer_to_truth_than_that_of_px4(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def estimate_of_shared_log(name: str, capsys: pytest.CaptureFixture[str]) -> Any:
+    """Return what ``gcs estimate --json`` says of a log; skip without the log."""
     path = SHARED_LOGS / f"{name}.ulg.xz"
     if not path.is_file():
         pytest.skip(f"{path} is missing")
     assert main(["estimate", str(path), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    return json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize("name", ["px4_sih_calm", "px4_world_windy", "px4_world_outage"])
+def test_estimate_is_closer_to_truth_than_that_of_px4(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    found = estimate_of_shared_log(name, capsys)
     ours, px4 = found["to_truth"], found["log_to_truth"]
     for key in ours:
         if "_rms_" in key:  # measured: pitch of the windy flight 0.91 of PX4's, the rest 0.89 and less
@@ -142,11 +148,7 @@ def test_estimate_is_closer_to_truth_than_that_of_px4(name: str, capsys: pytest.
 
 @pytest.mark.parametrize("name", ["real_fsyr_log_61", "real_toopazo_log_149", "real_toopazo_log_78"])
 def test_estimate_of_a_real_flight_is_near_that_of_px4(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    path = SHARED_LOGS / f"{name}.ulg.xz"
-    if not path.is_file():
-        pytest.skip(f"{path} is missing")
-    assert main(["estimate", str(path), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)["to_log"]
+    found = estimate_of_shared_log(name, capsys)["to_log"]
     assert found["tilt_rms_deg"] < 1.5  # measured 0.85 and less
     assert found["yaw_rms_deg"] < 1.5  # measured 1.2 and less
     assert found["velocity_horizontal_rms_m_s"] < 0.5  # measured 0.28 and less
