@@ -20,19 +20,7 @@ from flightstack.estimation.sensor_samples import (
     MagSample,
     RangeSample,
 )
-from flightstack.simulator_link.sensor_frames import (
-    ACCEL,
-    ACCEL_AT,
-    ALTITUDE_AT,
-    BARO,
-    GYRO,
-    GYRO_AT,
-    MAG,
-    MAG_AT,
-    PRESSURE_AT,
-    TEMPERATURE_AT,
-    HilGps,
-)
+from flightstack.simulator_link.sensor_frames import ACCEL, BARO, GYRO, MAG, HilGps
 from flightstack.simulator_link.sensor_inbox import FlowReport, HilReport, RangeReport, Report
 
 Sample = MagSample | BaroSample | GnssSample | RangeSample | FlowSample
@@ -128,10 +116,10 @@ def slow_samples(time_s: float, report: HilReport) -> Iterator[MagSample | BaroS
     One with values that are not finite is none, so that its sensor counts as missing.
     """
     fields, values = report.fields, report.values
-    if fields & MAG == MAG and _is_finite(values[MAG_AT]):
-        yield MagSample(time_s, Vector3(*values[MAG_AT]))
-    if fields & BARO == BARO and math.isfinite(values[ALTITUDE_AT]):
-        yield BaroSample(time_s, values[PRESSURE_AT], values[ALTITUDE_AT], values[TEMPERATURE_AT])
+    if fields & MAG == MAG and _is_finite(values.mag_gauss):
+        yield MagSample(time_s, Vector3(*values.mag_gauss))
+    if fields & BARO == BARO and math.isfinite(values.altitude_m):
+        yield BaroSample(time_s, values.pressure_hpa, values.altitude_m, values.temperature_c)
 
 
 def _is_finite(values: Sequence[float]) -> bool:
@@ -257,9 +245,10 @@ class SensorFeed:
         """
         number, fields, values, step_us = report
         time_s, lane = time_us * 1e-6, self.lanes[number]
-        is_measured = fields & _IMU == _IMU and _is_finite(values[GYRO_AT]) and _is_finite(values[ACCEL_AT])
+        gyro, accel = values.gyro_rad_s, values.accel_m_s2
+        is_measured = fields & _IMU == _IMU and _is_finite(gyro) and _is_finite(accel)
         if is_measured and step_us > 0:
-            row = lane.newest.imu_track.take(time_s, step_us * 1e-6, values[GYRO_AT], values[ACCEL_AT])
+            row = lane.newest.imu_track.take(time_s, step_us * 1e-6, gyro, accel)
             lane.measured_us, lane.step_us = time_us, step_us
             lane.estimator.imu_row(row)
             if lane is self._selected:

@@ -8,7 +8,7 @@ reference. What remains is the rounding of one stage in one step. Only the integ
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias
+from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -41,6 +41,8 @@ from flightstack.core.arrays import (
 )
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import (
+    ATTITUDE_TARGET_SIZE,
+    MAX_ROTORS,
     STATE_SIZE,
     AttitudeReference,
     FloatArray,
@@ -55,9 +57,9 @@ from flightstack.core.contract import (
     Wrench,
 )
 from flightstack.core.geometry import blend, conjugate, quaternion_product, rotate, rotation_vector
+from flightstack.core.record_types import dtype_of
 from flightstack.firmware.c_loops import INPUT_SIZE, OUTPUT_SIZE, SETPOINT_AT, TARGET_AT, LoopsSetup
 
-REFERENCE_AT, THRUST_AT, ACHIEVED_AT, COMMAND_AT, STATUS_AT = 5, 15, 19, 23, 31
 OUTER_DUE, SET_TARGET, RESET = LoopFlags.OUTER_DUE, LoopFlags.SET_TARGET, LoopFlags.RESET
 NOT_FINITE = LoopStatus.INPUT_NOT_FINITE | LoopStatus.OUTPUT_NOT_FINITE
 ROW_COMMAND = LoopRow.ROTOR_COMMAND.start
@@ -68,6 +70,28 @@ RESOLUTION = 1e-9
 """Difference of demanded and achieved wrench [N, N m] above which the mixer is saturated, as in the loops."""
 
 _Flags: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
+
+
+class StageOutputs(NamedTuple):
+    """Output of each stage in one step, as a target reports them."""
+
+    target: Annotated[FloatArray, ATTITUDE_TARGET_SIZE]
+    attitude: Annotated[FloatArray, 4]
+    """Of the reference; its rates and accelerations too."""
+    rates_frd_rad_s: Annotated[FloatArray, 3]
+    acceleration_frd_rad_s2: Annotated[FloatArray, 3]
+    thrust_n: float
+    """Demanded of the mixer; the torque too."""
+    torque_frd_n_m: Annotated[FloatArray, 3]
+    achieved_thrust_n: float
+    achieved_torque_frd_n_m: Annotated[FloatArray, 3]
+    commands_rad_s: Annotated[FloatArray, MAX_ROTORS]
+    status: float
+    """Bits of ``LoopStatus``."""
+
+
+STAGE_OUTPUTS = dtype_of(StageOutputs)
+_Outputs: TypeAlias = Annotated[Record, StageOutputs]
 
 # bound by ``specialise`` to the laws of the controller
 controller_step: Any = None
@@ -111,7 +135,7 @@ def _aim(m: Record, inputs: FloatArray, flags: int) -> None:
 
 
 @compiled
-def _filter(m: Record, attitude: Quaternion, expected: FloatArray) -> None:
+def _filter(m: Record, attitude: Quaternion, expected: _Outputs) -> None:
     """Write the expected attitude reference."""
     target = blend(
         attitude_target(m["last_target"]).attitude, attitude_target(m["target"]).attitude, m["fraction"][0]
@@ -123,17 +147,17 @@ def _filter(m: Record, attitude: Quaternion, expected: FloatArray) -> None:
         m["dt_s"],
     )
     reference = in_body_frame(filtered, attitude)
-    store(expected[REFERENCE_AT:], reference.attitude)
-    store(expected[REFERENCE_AT + 4 :], reference.rates_frd_rad_s)
-    store(expected[REFERENCE_AT + 7 :], reference.acceleration_frd_rad_s2)
+    store(expected["attitude"], reference.attitude)
+    store(expected["rates_frd_rad_s"], reference.rates_frd_rad_s)
+    store(expected["acceleration_frd_rad_s2"], reference.acceleration_frd_rad_s2)
 
 
 @compiled
-def _reported_reference(out: FloatArray) -> AttitudeReference:
+def _reported_reference(out: _Outputs) -> AttitudeReference:
     return AttitudeReference(
-        Quaternion(out[5], out[6], out[7], out[8]),
-        Vector3(out[9], out[10], out[11]),
-        Vector3(out[12], out[13], out[14]),
+        Quaternion(*as_tuple(out["attitude"], 4)),
+        Vector3(*as_tuple(out["rates_frd_rad_s"], 3)),
+        Vector3(*as_tuple(out["acceleration_frd_rad_s2"], 3)),
     )
 
 
@@ -152,17 +176,17 @@ def _law_inputs(
 
 
 @compiled
-def _reported_wrench(out: FloatArray) -> Wrench:
-    return Wrench(out[THRUST_AT], Vector3(out[16], out[17], out[18]))
+def _reported_wrench(out: _Outputs) -> Wrench:
+    return Wrench(out["thrust_n"], Vector3(*as_tuple(out["torque_frd_n_m"], 3)))
 
 
 @compiled
-def _store_mixed(demanded: Wrench, achieved: Wrench, rotors: int, expected: FloatArray) -> None:
+def _store_mixed(demanded: Wrench, achieved: Wrench, rotors: int, expected: _Outputs) -> None:
     """Write the expected achieved wrench and status."""
-    expected[ACHIEVED_AT] = achieved.thrust_n
-    store(expected[ACHIEVED_AT + 1 :], achieved.torque_frd_n_m)
-    expected[COMMAND_AT + rotors : STATUS_AT] = 0.0
-    expected[STATUS_AT] = _status(demanded, achieved)
+    expected["achieved_thrust_n"] = achieved.thrust_n
+    store(expected["achieved_torque_frd_n_m"], achieved.torque_frd_n_m)
+    expected["commands_rad_s"][rotors:] = 0.0
+    expected["status"] = _status(demanded, achieved)
 
 
 @compiled
@@ -204,33 +228,34 @@ def _status(demanded: Wrench, achieved: Wrench) -> float:
 
 
 @compiled
-def _adopt(m: Record, attitude: Quaternion, out: FloatArray) -> None:
+def _adopt(m: Record, attitude: Quaternion, out: _Outputs) -> None:
     """Take the reported outputs as the state of the next step.
 
     The achieved wrench counts as the commanded one where the target reports no saturation: it may differ by rounding.
     """
-    reference, status = _reported_reference(out), int(out[STATUS_AT])
+    reference, status = _reported_reference(out), int(out["status"])
     turn = quaternion_product(conjugate(attitude), reference.attitude)
     store(m["reference"], reference.attitude)
     store(m["reference"][4:], rotate(conjugate(turn), reference.rates_frd_rad_s))
     last = m["last"]
-    store(last[ROW_COMMAND:], out[COMMAND_AT:STATUS_AT])
-    demanded = Wrench(out[15], Vector3(out[16], out[17], out[18]))
+    store(last[ROW_COMMAND:], out["commands_rad_s"])
+    demanded, reported = _reported_wrench(out), Vector3(*as_tuple(out["achieved_torque_frd_n_m"], 3))
+    torque = demanded.torque_frd_n_m
     achieved = Wrench(
-        out[19] if status & THRUST else out[15],
+        out["achieved_thrust_n"] if status & THRUST else demanded.thrust_n,
         Vector3(
-            out[20] if status & ROLL else out[16],
-            out[21] if status & PITCH else out[17],
-            out[22] if status & YAW else out[18],
+            reported.x if status & ROLL else torque.x,
+            reported.y if status & PITCH else torque.y,
+            reported.z if status & YAW else torque.z,
         ),
     )
     store_wrenches(last, demanded, achieved)
 
 
 def stages_kernel(
-    inputs: FloatArray, flags: _Flags, outputs: FloatArray, memory: RecordArray, expected: FloatArray
+    inputs: FloatArray, flags: _Flags, outputs: RecordArray, memory: RecordArray, expected: RecordArray
 ) -> None:
-    """Write ``expected`` (n, 32) for ``inputs`` (n, 29), ``flags`` (n,) and the reported ``outputs`` (n, 32).
+    """Write ``expected`` (n,) for ``inputs`` (n, 29), ``flags`` (n,) and the reported ``outputs`` (n,).
 
     A step whose status is not finite repeats an earlier output. ``specialise`` binds the controller to this template.
     """
@@ -243,10 +268,10 @@ def stages_kernel(
                 given[:STATE_SIZE], given[SETPOINT_AT:TARGET_AT], m["outer"], m["outer_params"], m["last"],
                 m["outer_dt_s"], m["target"],
             )  # fmt: skip
-        store(wanted, m["target"])
-        store(m["target"], out[:REFERENCE_AT])
-        if int(out[STATUS_AT]) & NOT_FINITE:
-            store(wanted, out)
+        store(wanted["target"], m["target"])
+        store(m["target"], out["target"])
+        if int(out["status"]) & NOT_FINITE:
+            expected[step] = outputs[step]
             continue
         vehicle = vehicle_state(given[:STATE_SIZE])
         _filter(m, vehicle.attitude, wanted)
@@ -256,13 +281,13 @@ def stages_kernel(
             ControllerParams(*as_tuple(m["attitude_params"], CONTROLLER_PARAMS_SIZE)), m["dt_s"],
         )  # fmt: skip
         store(m["attitude"], advanced)
-        wanted[THRUST_AT] = m["target"][4]
-        store(wanted[THRUST_AT + 1 :], torque)
+        wanted["thrust_n"] = m["target"][4]
+        store(wanted["torque_frd_n_m"], torque)
         demanded = _reported_wrench(out)
         mixed, achieved = mixer_step(
             MixerMemory(*as_tuple(m["mixer"], MIXER_MEMORY_SIZE)), demanded, mixer,
             MixerParams(*as_tuple(m["mixer_params"], MIXER_PARAMS_SIZE)), m["dt_s"],
-            wanted[COMMAND_AT:STATUS_AT], m["work"],
+            wanted["commands_rad_s"], m["work"],
         )  # fmt: skip
         store(m["mixer"], mixed)
         _store_mixed(demanded, achieved, mixer.spin.size, wanted)
@@ -309,7 +334,8 @@ class StageModel:
     ) -> FloatArray:
         """Return the expected outputs (n, 32) of the next steps; see ``stages_kernel``."""
         wanted = np.zeros((len(flags), OUTPUT_SIZE))
-        self._kernel(inputs, flags, outputs, self._memory, wanted)
+        reported = np.ascontiguousarray(outputs).view(STAGE_OUTPUTS)
+        self._kernel(inputs, flags, reported[:, 0], self._memory, wanted.view(STAGE_OUTPUTS)[:, 0])
         return wanted
 
 

@@ -33,10 +33,19 @@ BARO = (
 )
 """Bits of ``fields_updated`` that PX4 needs, all of a group, to take a sensor from the message."""
 
-VALUES = 13
-ACCEL_AT, GYRO_AT, MAG_AT = slice(0, 3), slice(3, 6), slice(6, 9)
-PRESSURE_AT, ALTITUDE_AT, TEMPERATURE_AT = 9, 11, 12
-"""Places of the groups in ``HilSensorFrame.values``; between pressure and altitude is the differential pressure."""
+HIL_VALUES = np.dtype(
+    [
+        ("accel_m_s2", "<f4", 3),
+        ("gyro_rad_s", "<f4", 3),
+        ("mag_gauss", "<f4", 3),
+        ("pressure_hpa", "<f4"),
+        ("diff_pressure_hpa", "<f4"),
+        ("altitude_m", "<f4"),
+        ("temperature_c", "<f4"),
+    ]
+)
+"""The measurements of HIL_SENSOR in the order of the message."""
+VALUES = HIL_VALUES.itemsize // 4
 
 _ALIGNMENT = 6  # puts the payload at offset 16 of the buffer
 _PAYLOAD = struct.Struct("<Q13fIB")
@@ -47,6 +56,39 @@ _HEAD = struct.Struct("<BBB4x3s")  # magic, size, incompatible flags, message
 _SENSOR_EXTRA: int = mavlink.MAVLink_hil_sensor_message.crc_extra
 _SENSOR_EXTRA_BYTE = bytes([_SENSOR_EXTRA])
 _crc16 = crc16.mcrf4xx
+
+
+class HilValues(NamedTuple):
+    """The measurements of a HIL_SENSOR, in the order of the message."""
+
+    accel_x_m_s2: float
+    accel_y_m_s2: float
+    accel_z_m_s2: float
+    gyro_x_rad_s: float
+    gyro_y_rad_s: float
+    gyro_z_rad_s: float
+    mag_x_gauss: float
+    mag_y_gauss: float
+    mag_z_gauss: float
+    pressure_hpa: float
+    diff_pressure_hpa: float
+    altitude_m: float
+    temperature_c: float
+
+    @property
+    def accel_m_s2(self) -> tuple[float, ...]:
+        """Specific force along x, y, z."""
+        return self[:3]
+
+    @property
+    def gyro_rad_s(self) -> tuple[float, ...]:
+        """Rates about x, y, z."""
+        return self[3:6]
+
+    @property
+    def mag_gauss(self) -> tuple[float, ...]:
+        """Magnetic field along x, y, z."""
+        return self[6:9]
 
 
 class HilMeasurement(NamedTuple):
@@ -69,6 +111,8 @@ class HilSensorFrame:
         self._payload = self._frame[HEADER_V2 : HEADER_V2 + _PAYLOAD.size]
         self.values = np.frombuffer(self._buffer, "<f4", VALUES, _ALIGNMENT + HEADER_V2 + 8)
         """Measurements, float32, shape (13,)."""
+        self.parts = self.values.view(HIL_VALUES)
+        """The same as one record of ``HIL_VALUES``, shape (1,)."""
         self.time_us = 0
         self.fields = 0
         """Bits of ``fields_updated``."""

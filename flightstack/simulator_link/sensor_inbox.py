@@ -20,6 +20,7 @@ from flightstack.simulator_link.sensor_frames import (
     HilGps,
     HilMeasurement,
     HilSensorFrame,
+    HilValues,
     decode_gps,
     gps_of,
 )
@@ -32,11 +33,11 @@ MOST_WAITING = 64
 
 
 class HilReport(NamedTuple):
-    """Measurements of one HIL_SENSOR: ``values`` as in ``HilSensorFrame``, valid where ``fields`` has the bits."""
+    """Measurements of one HIL_SENSOR; ``values`` are valid where ``fields`` has their bits."""
 
     number: int
     fields: int
-    values: tuple[float, ...]
+    values: HilValues
     step_us: int
     """Time since the last inertial measurement of this sensor; 0 in the first one, and in a report without one.
 
@@ -102,7 +103,7 @@ class SensorInbox:
         """Take the contents of HIL_SENSOR by their id; then call ``stamp``, for the first one is the clock."""
         for number in range(len(measurements) - 1, 0, -1):
             values, fields = measurements[number]
-            self._wait(HilReport(number, fields, tuple(values.tolist()), 0))
+            self._wait(HilReport(number, fields, HilValues(*values.tolist()), 0))
         self._frame.set(time_us, measurements[0])
 
     def take_message(self, message: Message) -> bool:
@@ -143,9 +144,9 @@ class SensorInbox:
         if frame.number == 0:
             return True
         if frame.time_us == self._stamp_us:
-            self._report(self._time_us, frame.number, frame.fields, tuple(frame.values.tolist()))
+            self._report(self._time_us, frame.number, frame.fields, HilValues(*frame.values.tolist()))
         else:
-            self._wait(HilReport(frame.number, frame.fields, tuple(frame.values.tolist()), 0))
+            self._wait(HilReport(frame.number, frame.fields, HilValues(*frame.values.tolist()), 0))
         return False
 
     def _wait(self, content: Content) -> None:
@@ -164,11 +165,11 @@ class SensorInbox:
                     self._reports.append(Report(time_us, content))
             self._waiting.clear()
         self._time_us, self._stamp_us = time_us, frame.time_us
-        self._report(time_us, 0, frame.fields, tuple(frame.values.tolist()))
+        self._report(time_us, 0, frame.fields, HilValues(*frame.values.tolist()))
         if len(self._reports) > MOST_WAITING:
             self._drop(len(self._reports) - MOST_WAITING)
 
-    def _report(self, time_us: int, number: int, fields: int, values: tuple[float, ...]) -> None:
+    def _report(self, time_us: int, number: int, fields: int, values: HilValues) -> None:
         """Report the measurements of a HIL_SENSOR with the duration of the inertial one."""
         step_us = 0
         if fields & _IMU == _IMU:

@@ -25,17 +25,7 @@ from flightstack.process.assembly import Stack
 from flightstack.simulator_link.hot_frames import ActuatorsFrame
 from flightstack.testing.quiet_outer import QuietOuter
 from flightstack.testing.quiet_slow import QuietSlow
-from flightstack.vehicle.quiet_kernel import (
-    ADVANCE,
-    CALLS,
-    CONTROL,
-    COUNTERS,
-    ESTIMATE,
-    FOLLOW,
-    MEASURE,
-    TAKE,
-    fly_quiet_ticks,
-)
+from flightstack.vehicle.quiet_kernel import QUIET_COUNTERS, QuietCalls, QuietCounters, fly_quiet_ticks
 from sim_bridge.plant.compiled_plant import CompiledPlant
 from sim_bridge.plant.layout import CONTACT
 from sim_bridge.sensors.imu import measure_imu
@@ -110,7 +100,7 @@ class QuietBlock:
         self._interval_us, self._divisor = simulator.interval_us, stack.rates.divisor
         self.waited = False
         """True if the last tick of ``run`` waited for Python."""
-        self._counters = np.zeros(COUNTERS, np.int64)
+        self._counters = np.zeros(1, QUIET_COUNTERS)
         self._fraction, self._idle = np.zeros(1), np.zeros(LoopRow.SIZE)
         self._no_log = Trace(DEFAULT_CAPACITY, LoopRow.SIZE, lambda: None)
         self._no_imu_log = Trace(DEFAULT_CAPACITY, RECORD_SIZE, lambda: None)
@@ -119,7 +109,7 @@ class QuietBlock:
         changing = self._changing(0, False, self._no_log, self._no_imu_log)
         self._fly = partial(direct(fly_quiet_ticks, *constant, *changing), *constant)
 
-    def _addresses(self, sensing: _Arguments) -> Any:
+    def _addresses(self, sensing: _Arguments) -> QuietCalls:
         """Return the addresses of the kernels."""
         now, faults, commands = (
             self._stack.now,
@@ -127,15 +117,18 @@ class QuietBlock:
             self._actuators.rotor_speed_rad_s,
         )
         row, plant, loops = self._no_log.rows[0], self._plant, self._loops
-        calls = np.zeros(CALLS, np.int64)
-        calls[ADVANCE] = address_of(plant.kernel, plant.memory, commands, 0, 1, plant.output)
-        calls[CONTROL] = address_of(loops.kernel, now.state, 1.0, now.rotor_speed, loops.memory, row)
-        calls[FOLLOW] = address_of(follow_rotors, row, faults.rotors, faults.lags)
+        calls = QuietCalls(
+            address_of(plant.kernel, plant.memory, commands, 0, 1, plant.output),
+            address_of(loops.kernel, now.state, 1.0, now.rotor_speed, loops.memory, row),
+            address_of(follow_rotors, row, faults.rotors, faults.lags),
+        )
         if self._estimation is not None:
             track, record = self._estimation.feed.lanes[0].newest.imu_track, self._no_imu_log.rows[0]
-            calls[MEASURE] = address_of(measure_imu, *sensing[:6])
-            calls[TAKE] = address_of(take_wire, track.ring, track.counters, sensing[5][0], 0.0, 1, record)
-            calls[ESTIMATE] = address_of(imu_kernel, self._estimation.estimators[0].memory, track.ring[0])
+            calls = calls._replace(
+                measure=address_of(measure_imu, *sensing[:6]),
+                take=address_of(take_wire, track.ring, track.counters, sensing[5][0], 0.0, 1, record),
+                estimate=address_of(imu_kernel, self._estimation.estimators[0].memory, track.ring[0]),
+            )
         return calls
 
     def _constant(self, calls: Any, sensing: _Arguments) -> _Arguments:
@@ -205,22 +198,26 @@ class QuietBlock:
         if not flies:
             self._loops.idle(now.state, now.rotor_speed, now.status.armed, self._idle)
         self._fly(*self._changing(count, is_taken, log, imu_log))
-        ticks, _, _, sensed, _ = self._counters.tolist()
+        done = self._done()
+        ticks = done.ticks
         self._loops.fraction = float(self._fraction[0])
         rows = log.rows[log.n :]
         if recorded is not None:
             log.n += ticks
         if imu_log is not self._no_imu_log:
-            imu_log.n += sensed
-        return self._count(rows)
+            imu_log.n += done.sensed
+        return self._count(rows, done)
 
-    def _count(self, rows: FloatArray) -> int:
+    def _done(self) -> QuietCounters:
+        return QuietCounters(*self._counters[0].item())
+
+    def _count(self, rows: FloatArray, done: QuietCounters) -> int:
         """Bring all parts to the time of the kernel, and run a tick that waits; return the number of ticks.
 
         ``rows`` are those of the ticks. A tick waits after a reset of the estimate, or for an event of the outer loop.
         """
         stack, interval_us, began_us = self._stack, self._interval_us, self._stack.now.time_us
-        ticks, flown, result, sensed, waits = self._counters.tolist()
+        ticks, flown, result, sensed, waits = done
         self.waited = waits > 0
         if flown:
             stack.simulator.pass_by(flown)

@@ -19,17 +19,7 @@ from flightstack.guidance.fence import fence_step
 from flightstack.guidance.kernels import GoalArrays, goal_kernel
 from flightstack.guidance.mission import MissionProgress
 from flightstack.process.assembly import Stack
-from flightstack.vehicle.outer_kernel import (
-    AT,
-    COMMAND,
-    DETECT,
-    FENCE,
-    GUIDE,
-    MARKS,
-    OUTER_CALLS,
-    PROGRESS,
-    STORE,
-)
+from flightstack.vehicle.outer_kernel import OUTER_MARKS, PROGRESS, OuterCalls, OuterMarks
 
 _NEVER_M = -1.0
 """A distance to the takeoff altitude that is never reached."""
@@ -51,10 +41,10 @@ class QuietOuter:
         self._navigator, self._autopilot = parts.navigator, parts.autopilot
         self._fence, self._faults = parts.failsafes.fence, parts.failsafes.faults
         self._takeoff, self._link = parts.takeoff, stack.simulator
-        self._marks = np.zeros(MARKS, np.int64)
+        self._marks = np.zeros(1, OUTER_MARKS)
         self._state = _bytes(now.state)
         self._seen = np.zeros_like(self._state)
-        self._progress = np.zeros(PROGRESS, np.int64)
+        self._progress = np.zeros(1, PROGRESS)
         self._control = loops.outer_arrays
         columns = OUTER.size + len(self._recorder.estimate)
         self._no_log = Trace(DEFAULT_CAPACITY, columns, lambda: None)
@@ -65,33 +55,25 @@ class QuietOuter:
         self.calls = self._addresses(loops)
         """Addresses of the kernels."""
 
-    def _addresses(self, loops: PythonLoops) -> Any:
+    def _addresses(self, loops: PythonLoops) -> OuterCalls:
         now, faults, fence, goal = self._now, self._faults, self._fence, self._navigator.goal
         target, _last_target, memory, parameters, last, outer_dt_s = self._control
-        calls = np.zeros(OUTER_CALLS, np.int64)
-        calls[FENCE] = address_of(fence_step, *fence.areas, fence.limits, now.state, fence.breach)
-        calls[DETECT] = address_of(
-            detect,
-            now.state,
-            now.setpoint,
-            now.row,
-            faults.rotors,
-            faults.detectors,
-            faults.limits,
-            False,
-            1.0,
-        )
-        calls[GUIDE] = address_of(
-            goal_kernel, 0, now.state, goal.trajectory, goal.mission, goal.plan, goal.jumps_left, goal.mode_target,
-            goal.land, target, 1.0, goal.params, 1.0, now.setpoint,
+        return OuterCalls(
+            fence=address_of(fence_step, *fence.areas, fence.limits, now.state, fence.breach),
+            detect=address_of(
+                detect, now.state, now.setpoint, now.row, faults.rotors, faults.detectors, faults.limits, False, 1.0
+            ),
+            guide=address_of(
+                goal_kernel, 0, now.state, goal.trajectory, goal.mission, goal.plan, goal.jumps_left,
+                goal.mode_target, goal.land, target, 1.0, goal.params, 1.0, now.setpoint,
+            ),
+            command=address_of(
+                loops.outer_kernel, now.state, now.setpoint, memory, parameters, last, outer_dt_s, target
+            ),
+            store=address_of(
+                store_outer_row, self._no_log.rows[0], now.state, now.setpoint, target, _FLAGS
+            ),
         )  # fmt: skip
-        calls[COMMAND] = address_of(
-            loops.outer_kernel, now.state, now.setpoint, memory, parameters, last, outer_dt_s, target
-        )
-        calls[STORE] = address_of(
-            store_outer_row, self._no_log.rows[0], now.state, now.setpoint, target, _FLAGS
-        )
-        return calls
 
     def room(self, time_us: int) -> int:
         """Return for how many ticks from the outer tick at ``time_us`` the open log takes rows without other work."""
@@ -105,13 +87,13 @@ class QuietOuter:
         """Return the kernel's argument ``outer``."""
         now, log, link = self._now, self._recorder.log, self._link
         trace = self._no_log if log is None else log.outer
-        self._marks[AT] = trace.n
+        self._marks["at"] = trace.n
         if link.seen is not self._seen_bytes:
             self._seen_bytes = link.seen
             self._seen[:] = np.frombuffer(link.seen, np.uint8) if link.seen else 0
         if now.progress is not self._progress_is:
             self._progress_is = now.progress
-            self._progress[:] = now.progress
+            self._progress[0] = now.progress.current, now.progress.reached
         goal = self._navigator.goal
         key = (
             goal.plan, goal.jumps_left, self._navigator.modes, self._fence.arguments, self._faults.limits, trace,
@@ -152,13 +134,14 @@ class QuietOuter:
 
         Return the index of the last outer tick among the ticks, None without one.
         """
-        _at, outers, last, fell_us, found = self._marks.tolist()
-        if not outers:
+        marks = OuterMarks(*self._marks[0].item())
+        if not marks.outers:
             return None
+        last = marks.last
         time_us = began_us + (last + 1) * interval_us
         if log is not None:
-            log.outer.n += outers
+            log.outer.n += marks.outers
         self._seen_bytes = self._seen.tobytes()
         self._link.pass_outer(time_us, self._seen_bytes)
-        self._autopilot.pass_outer(time_us, rows[last], found, fell_us)
-        return int(last)
+        self._autopilot.pass_outer(time_us, rows[last], marks.found, marks.fell_us)
+        return last

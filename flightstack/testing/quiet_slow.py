@@ -9,13 +9,13 @@ import numpy as np
 from flightstack.core.contract import FloatArray, Vector3
 from flightstack.core.kernel_calls import address_of
 from flightstack.estimation.delayed_filter import push_kernel
-from flightstack.estimation.rings import BARO_RING, MAG_RING
+from flightstack.estimation.rings import MAG_RING
 from flightstack.estimation.sensor_samples import BaroSample, MagSample
 from flightstack.flight_log.flight_log import DEFAULT_CAPACITY, Trace
 from flightstack.flight_log.sensor_recorder import NEVER_US, TRUTH_INTERVAL_US
 from flightstack.flight_log.sensor_topics import BARO_GROUP, MAG_GROUP, TRUTH_GROUP
-from flightstack.simulator_link.sensor_frames import ALTITUDE_AT, MAG_AT, PRESSURE_AT, TEMPERATURE_AT, VALUES
 from flightstack.simulator_link.sensor_frames import BARO as BARO_FIELDS
+from flightstack.simulator_link.sensor_frames import HIL_VALUES, HilValues
 from flightstack.simulator_link.sensor_frames import MAG as MAG_FIELDS
 from flightstack.vehicle.estimation import Estimation
 from flightstack.vehicle.slow_kernel import (
@@ -34,7 +34,6 @@ from sim_bridge.simulator import Simulator
 assert (MAG_SLOT, BARO_SLOT) == (MAG, BARO)
 _GROUPS = (MAG_GROUP, BARO_GROUP, TRUTH_GROUP)
 """In the order of the kernel's counters of new rows."""
-_RINGS = (MAG_RING, BARO_RING)
 _NO_SENSOR: tuple[Any, ...] = (np.zeros(0, np.uint8), np.zeros(3), np.zeros((0, 0)), np.zeros(1, np.int64))
 
 
@@ -62,7 +61,6 @@ class QuietSlow:
         self._no_traces = [Trace(DEFAULT_CAPACITY, group.columns, lambda: None) for group in _GROUPS]
         self._marks = np.zeros(1, SLOW_MARKS)
         self._marks["truth_us"] = NEVER_US
-        self._delay_s = np.zeros(2)
         self.calls = self._addresses(simulator)
         """Addresses of the kernels."""
         self.constant = self._constant(simulator, truth)
@@ -90,18 +88,18 @@ class QuietSlow:
         sensors, estimation = self._sensors, self._estimation
         if sensors is None or estimation is None:
             due_us = np.full(2, NEVER_US)
-            values, mag, baro = np.zeros(VALUES, np.float32), None, None
+            parts, mag, baro = np.zeros(1, HIL_VALUES), None, None
             current_a, offset_m = np.zeros(1), np.zeros(3)
             period_us = np.ones(2, np.int64)
         else:
             assert isinstance(simulator.plant, CompiledPlant)
             due_us, period_us = sensors.due_us, sensors.period_us
-            values, mag, baro = sensors.values, sensors.mag, sensors.baro
+            parts, mag, baro = sensors.parts, sensors.mag, sensors.baro
             current_a, offset_m = simulator.plant.currents_a, estimation.recorder.offset_m
         scratch = np.zeros(4), np.zeros(4), np.zeros(2), np.zeros(2)
         return (
-            due_us, period_us, self._marks, (*_sensor(mag), values[MAG_AT], current_a),
-            (*_sensor(baro), values[PRESSURE_AT:]), scratch, (truth, offset_m, TRUTH_INTERVAL_US),
+            due_us, period_us, self._marks, parts, (*_sensor(mag), current_a), _sensor(baro), scratch,
+            (truth, offset_m, TRUTH_INTERVAL_US),
         )  # fmt: skip
 
     def room(self) -> int:
@@ -119,16 +117,16 @@ class QuietSlow:
 
         ``boot_us`` is the simulator's time at the start of the vehicle's, not 0 after a power cycle.
         """
-        marks, estimation = self._marks, self._estimation
+        marks, estimation, delays_s = self._marks, self._estimation, (0.0, 0.0)
         truth_us = marks["truth_us"][0]
         marks[0] = 0
         marks["truth_us"] = truth_us
         if estimation is not None:
             params = estimation.estimators[0].params
-            self._delay_s[:] = params.mag_delay_s, params.baro_delay_s
+            delays_s = float(params.mag_delay_s), float(params.baro_delay_s)
             marks["truth_us"] = estimation.recorder.truth_due_us
         logs = ((trace.rows, trace.times_us, trace.n) for trace in self._open_traces())
-        return (_RINGS, self._delay_s, *logs, boot_us)
+        return (delays_s, *logs, boot_us)
 
     def _open_traces(self) -> list[Trace]:
         """Return the traces of the open log; without one, traces that are not recorded."""
@@ -147,12 +145,11 @@ class QuietSlow:
             estimation.recorder.pass_by(truth_us)
             for trace, new in zip(self._open_traces(), rows, strict=True):
                 trace.n += new
-        values = sensors.values.tolist()
-        mag = MagSample(mag_us * 1e-6, Vector3(*values[MAG_AT])) if mag_us else None
-        pressure_hpa, altitude_m, temperature_c = (
-            values[PRESSURE_AT],
-            values[ALTITUDE_AT],
-            values[TEMPERATURE_AT],
+        values = HilValues(*sensors.values.tolist())
+        mag = MagSample(mag_us * 1e-6, Vector3(*values.mag_gauss)) if mag_us else None
+        baro = (
+            BaroSample(baro_us * 1e-6, values.pressure_hpa, values.altitude_m, values.temperature_c)
+            if baro_us
+            else None
         )
-        baro = BaroSample(baro_us * 1e-6, pressure_hpa, altitude_m, temperature_c) if baro_us else None
         return is_mag_new * MAG_FIELDS | is_baro_new * BARO_FIELDS, mag, baro

@@ -7,22 +7,50 @@ memories back as they were: the tick is then run in Python, which knows what fol
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from flightstack.commander.fault_detector import MOVING
 from flightstack.commander.ground_monitor import FALL_M_S
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
 from flightstack.core.kernel_calls import call_kernel, call_kernel_int
+from flightstack.core.record_types import dtype_of
 from flightstack.guidance.land_detector import CONTACT_M_S
 
-FENCE, DETECT, GUIDE, COMMAND, STORE, OUTER_CALLS = range(6)
-"""Kernels by their index in ``calls``."""
-AT, OUTERS, LAST, FELL_US, FOUND, MARKS = range(6)
-"""Marks: index of the first row of the log, number of outer ticks, index of the last one among all ticks, time of the
-last fall or 0, bits of ``detect``."""
-CURRENT, REACHED, FINISHED, WANTS_RETURN, PROGRESS = range(5)
-"""Progress of the mission, by its index."""
+
+class OuterCalls(NamedTuple):
+    """Addresses of the kernels."""
+
+    fence: int
+    detect: int
+    guide: int
+    command: int
+    store: int
+
+
+class OuterMarks(NamedTuple):
+    """What the kernel notes."""
+
+    at: int
+    """Index of the first row of the log."""
+    outers: int
+    """Number of outer ticks."""
+    last: int
+    """Index of the last one among all ticks."""
+    fell_us: int
+    """Time of the last fall, or 0."""
+    found: int
+    """Bits of ``detect``."""
+
+
+class Progress(NamedTuple):
+    """Items of the mission, by their index."""
+
+    current: int
+    reached: int
+
+
+OUTER_MARKS, PROGRESS = dtype_of(OuterMarks), dtype_of(Progress)
 
 
 @compiled
@@ -51,7 +79,7 @@ def _has_progress(mission: Any, progress: Any) -> bool:
     """Return True if the mission has reached an item since ``progress``, or is at its end."""
     m = mission[0]
     is_over = m["finished"] or m["wants_return"]
-    return bool(is_over or m["current"] != progress[CURRENT] or m["reached"] != progress[REACHED])
+    return bool(is_over or m["current"] != progress[0]["current"] or m["reached"] != progress[0]["reached"])
 
 
 @compiled
@@ -59,7 +87,7 @@ def _leaves_fence(calls: Any, fence: Any, state: FloatArray) -> bool:
     is_active, areas, vertices, groups, limits, breach = fence
     if not is_active:
         return False
-    call_kernel(calls[FENCE], (areas, vertices, groups, limits, state, breach))
+    call_kernel(calls.fence, (areas, vertices, groups, limits, state, breach))
     return bool(breach[0]["flags"] != 0)
 
 
@@ -74,11 +102,11 @@ def _is_nominal(calls: Any, outer: Any, state: FloatArray, row: FloatArray) -> b
         return False
     if abs(state[2] + altitude_m) <= acceptance_m or _leaves_fence(calls, fence, state):
         return False
-    found = call_kernel_int(calls[DETECT], (state, setpoint, row, rotors, detectors, limits, on_ground, dt_s))
+    found = call_kernel_int(calls.detect, (state, setpoint, row, rotors, detectors, limits, on_ground, dt_s))
     if found & ~MOVING != 0:
         return False
     call_kernel(
-        calls[GUIDE],
+        calls.guide,
         (
             number, state, trajectory, mission, plan, jumps_left, mode_target, land, control[0], rotors[0]["thrust"],
             params, dt_s, setpoint,
@@ -86,7 +114,7 @@ def _is_nominal(calls: Any, outer: Any, state: FloatArray, row: FloatArray) -> b
     )  # fmt: skip
     if _touches(land):
         return False
-    marks[FOUND] = found
+    marks[0]["found"] = found
     return True
 
 
@@ -106,23 +134,24 @@ def guide(calls: Any, outer: Any, tick: int, time_us: int, state: FloatArray, ro
         return False
     copy_all(watch[0], watch[1])
     if abs(state[5]) > FALL_M_S:
-        marks[FELL_US] = time_us
-    marks[LAST] = tick
+        marks[0]["fell_us"] = time_us
+    marks[0]["last"] = tick
     target, last_target, memory, parameters, last, outer_dt_s = control
     copy_all(target, last_target)
-    call_kernel(calls[COMMAND], (state, guidance[9], memory, parameters, last, outer_dt_s, target))
+    call_kernel(calls.command, (state, guidance[9], memory, parameters, last, outer_dt_s, target))
     return True
 
 
 @compiled
 def note_outer(calls: Any, outer: Any, time_us: int, state: FloatArray) -> None:
     """Record the outer tick, after its inner loop."""
-    marks, _watch, _fence, _faults, guidance, control, log, _saved = outer
+    marks_array, _watch, _fence, _faults, guidance, control, log, _saved = outer
+    marks = marks_array[0]
     rows, times_us, size, estimate, flags = log
-    at = marks[AT] + marks[OUTERS]
+    at = marks["at"] + marks["outers"]
     row = rows[at]
     times_us[at] = time_us
-    call_kernel(calls[STORE], (row, state, guidance[9], control[0], flags))
+    call_kernel(calls.store, (row, state, guidance[9], control[0], flags))
     for i in range(len(estimate)):
         row[size + i] = estimate[i]
-    marks[OUTERS] += 1
+    marks["outers"] += 1

@@ -7,23 +7,48 @@ imports: the key of a kernel in the cache depends on all of them.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, LoopRow
 from flightstack.core.kernel_calls import call_kernel, call_kernel_int
-from flightstack.vehicle.outer_kernel import FELL_US, FOUND, OUTERS, copy_all, guide, note_outer
+from flightstack.core.record_types import dtype_of
+from flightstack.vehicle.outer_kernel import copy_all, guide, note_outer
 from flightstack.vehicle.slow_kernel import log_truth, measure_slow, take_slow
 
-ADVANCE, MEASURE, TAKE, ESTIMATE, CONTROL, FOLLOW, CALLS = range(7)
-"""Kernels by their index in ``calls``."""
-TICKS, FLOWN, RESULT, SENSED, WAITS, COUNTERS = range(6)
-"""Counters: ticks of the vehicle, advances of the plant, the last result of these, samples of the sensors, and 1 if a
-tick is begun that must be run in Python."""
 _REFERENCE, _COMMAND, _SPEED = (
     columns.start for columns in (LoopRow.REFERENCE_ATTITUDE, LoopRow.ROTOR_COMMAND, LoopRow.ROTOR_SPEED)
 )
 _QUATERNION_AT = 6
+
+
+class QuietCalls(NamedTuple):
+    """Addresses of the kernels; those of the sensors are 0 on the true state."""
+
+    advance: int
+    control: int
+    follow: int
+    measure: int = 0
+    take: int = 0
+    estimate: int = 0
+
+
+class QuietCounters(NamedTuple):
+    """What the kernel did."""
+
+    ticks: int
+    """Of the vehicle."""
+    flown: int
+    """Advances of the plant."""
+    result: int
+    """Of the last advance."""
+    sensed: int
+    """Samples of the inertial sensors."""
+    waits: int
+    """1 if a tick is begun that must be run in Python."""
+
+
+QUIET_COUNTERS = dtype_of(QuietCounters)
 
 
 @compiled
@@ -39,13 +64,13 @@ def _sense(
 ) -> None:
     """Measure with the inertial sensors, and give each filter its sample; ``record`` takes that of the selected one."""
     motion, imus, true_state, true_speeds, noise, wires, tracks, counters, filters, spare_record = sensing
-    call_kernel(calls[MEASURE], (motion, imus, true_state, true_speeds, noise, wires))
+    call_kernel(calls.measure, (motion, imus, true_state, true_speeds, noise, wires))
     time_s = time_us * 1e-6
     for k in range(len(tracks)):
         sample = tracks[k][counters[k][0] % len(tracks[k])]
         kept = record if k == selected else spare_record
-        call_kernel(calls[TAKE], (tracks[k], counters[k], wires[k], time_s, interval_us, kept))
-        call_kernel(calls[ESTIMATE], (filters[k], sample))
+        call_kernel(calls.take, (tracks[k], counters[k], wires[k], time_s, interval_us, kept))
+        call_kernel(calls.estimate, (filters[k], sample))
 
 
 @compiled
@@ -64,10 +89,10 @@ def _control(calls: Any, control: Any, flies: bool, row: FloatArray, commands: F
     state, speeds, loops, fraction, fraction_step, idle, rotors, lags = control
     if flies:
         fraction[0] += fraction_step
-        call_kernel(calls[CONTROL], (state, fraction[0], speeds, loops, row))
+        call_kernel(calls.control, (state, fraction[0], speeds, loops, row))
     else:
         _rest(row, idle, state, speeds)
-    call_kernel(calls[FOLLOW], (row, rotors, lags))
+    call_kernel(calls.follow, (row, rotors, lags))
     for i in range(len(commands)):
         commands[i] = row[_COMMAND + i]
 
@@ -81,36 +106,36 @@ def _advance(
     memory, commands, steps, output, largest_result, sent, taken = plant
     selected, known, is_known, resets = estimate
     records, record_times, record_at = imu_log
-    result = call_kernel_int(calls[ADVANCE], (memory, commands, flags, steps, output))
-    counters[FLOWN] += 1
-    counters[RESULT] = result
+    result = call_kernel_int(calls.advance, (memory, commands, flags, steps, output))
+    counters["flown"] += 1
+    counters["result"] = result
     if result > largest_result:
         return False
     copy_all(sent, taken)
     if len(sensing[1]) > 0:
         resets_before = _total(resets)
-        at = record_at + counters[SENSED]
+        at = record_at + counters["sensed"]
         record_times[at] = time_us
-        measure_slow(slow_calls, slow, time_us + following[5], memory, sensing[2], sensing[3])
+        measure_slow(slow_calls, slow, time_us + following[4], memory, sensing[2], sensing[3])
         _sense(calls, sensing, time_us, interval_us, selected, records[at])
         take_slow(slow_calls, slow, time_us, sensing[8], following)
-        counters[SENSED] += 1
+        counters["sensed"] += 1
         if is_known[0] != 0:
             copy_all(known, state)
         log_truth(slow, time_us, following)
         if _total(resets) != resets_before:
-            counters[WAITS] = 1
+            counters["waits"] = 1
             return False
     return True
 
 
 @compiled
 def fly_quiet_ticks(
-    calls: Any, outer_calls: Any, slow_calls: Any, counters: Any, interval_us: int, divisor: int, plant: Any,
+    calls: Any, outer_calls: Any, slow_calls: Any, counters_array: Any, interval_us: int, divisor: int, plant: Any,
     sensing: Any, slow: Any, control: Any, count: int, is_taken: bool, outer_in: int, time_us: int, flags: int,
     flies: bool, last_row: FloatArray, estimate: Any, following: Any, outer: Any, log: Any, imu_log: Any,
 ) -> None:  # fmt: skip
-    """Run ``count`` ticks, or fewer: what was done is in ``counters``.
+    """Run ``count`` ticks, or fewer: what was done is in ``counters_array``, ``marks`` and ``slow``.
 
     The state of the first tick ``is_taken``, or the plant advances to it. The first outer tick is that after
     ``outer_in`` ticks. It stops when the result of the plant is larger than ``largest_result``, after a reset of the
@@ -119,10 +144,10 @@ def fly_quiet_ticks(
     inertial sensor; on the true state there are no ``imus``. ``slow`` and ``following`` are those of ``slow_kernel``.
     """
     rows, row_times, row_at = log
-    state, row, marks = control[0], last_row, outer[0]
-    for i in range(len(counters)):
-        counters[i] = 0
-    marks[OUTERS], marks[FELL_US], marks[FOUND] = 0, 0, 0
+    state, row, counters, marks = control[0], last_row, counters_array[0], outer[0][0]
+    counters["ticks"], counters["flown"], counters["result"], counters["sensed"] = 0, 0, 0, 0
+    counters["waits"] = 0
+    marks["outers"], marks["fell_us"], marks["found"] = 0, 0, 0
     for i in range(count):
         time_us += interval_us
         if (i > 0 or not is_taken) and not _advance(
@@ -133,7 +158,7 @@ def fly_quiet_ticks(
         outer_due = (i - outer_in) % divisor == 0
         if outer_due:
             if not guide(outer_calls, outer, i, time_us, state, row):
-                counters[WAITS] = 1
+                counters["waits"] = 1
                 return
             control[3][0] = 0.0
         row = rows[row_at + i]
@@ -141,4 +166,4 @@ def fly_quiet_ticks(
         _control(calls, control, flies, row, plant[1])
         if outer_due:
             note_outer(outer_calls, outer, time_us, state)
-        counters[TICKS] = i + 1
+        counters["ticks"] = i + 1

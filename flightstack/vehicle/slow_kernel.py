@@ -13,12 +13,11 @@ from flightstack.core.contract import FloatArray
 from flightstack.core.kernel_calls import call_kernel, call_kernel_float
 from flightstack.core.periods import take_due
 from flightstack.core.record_types import dtype_of
+from flightstack.estimation.rings import BARO_RING, MAG_RING
 from flightstack.flight_log.sensor_rows import store_baro, store_mag, store_truth
 
 MAG, BARO = 0, 1
-"""Sensors by the index of their times, cursors and new rows."""
-_ALTITUDE, _TEMPERATURE = 2, 3
-"""Values of the barometer in HIL_SENSOR; the first one is the pressure."""
+"""Sensors by the index of their times."""
 
 
 class SlowCalls(NamedTuple):
@@ -66,22 +65,23 @@ def measure_slow(
 
     ``memory`` has the bytes of the plant.
     """
-    due_us, period_us, marks_array, mag, baro, _row, _truth = slow
+    due_us, period_us, marks_array, parts, mag, baro, _row, _truth = slow
     marks = marks_array[0]
     marks["is_mag_new"], marks["is_baro_new"] = 0, 0
     if take_due(due_us, period_us, MAG, time_us):
-        mags, out, noise, cursor, values, current_a = mag
+        mags, out, noise, cursor, current_a = mag
         call_kernel(calls.measure_mag, (mags, state, current_a[0], _next_row(noise, cursor)))
         for i in range(3):
-            values[i] = out[i]
+            parts[0]["mag_gauss"][i] = out[i]
         marks["is_mag_new"] = 1
     if take_due(due_us, period_us, BARO, time_us):
-        baros, out, noise, cursor, values = baro
+        baros, out, noise, cursor = baro
         airspeed_m_s = call_kernel_float(calls.airspeed, (memory,))
         call_kernel(
             calls.measure_baro, (baros, time_us, state, airspeed_m_s, rotor_speeds, _next_row(noise, cursor))
         )
-        values[0], values[_ALTITUDE], values[_TEMPERATURE] = out[0], out[1], out[2]
+        values = parts[0]
+        values["pressure_hpa"], values["altitude_m"], values["temperature_c"] = out[0], out[1], out[2]
         marks["is_baro_new"] = 1
 
 
@@ -98,30 +98,33 @@ def _push(calls: Any, filters: Any, ring: int, values: FloatArray, row: FloatArr
 def take_slow(calls: Any, slow: Any, time_us: int, filters: Any, following: Any) -> None:
     """Give new measurements at ``time_us``, the vehicle's time, to the filters and the log.
 
-    Those that are not finite are none. ``following`` has rings, delays and logs, and the simulator's time at the start
+    Those that are not finite are none. ``following`` has delays and logs, and the simulator's time at the start
     of the vehicle's.
     """
-    _due_us, _period_us, marks_array, mag, baro, rows, _truth = slow
-    marks = marks_array[0]
-    rings, delay_s, mag_log, baro_log, _truth_log, _boot_us = following
+    _due_us, _period_us, marks_array, parts, _mag, _baro, rows, _truth = slow
+    marks, values = marks_array[0], parts[0]
+    delays_s, mag_log, baro_log, _truth_log, _boot_us = following
     mag_sample, mag_copy, baro_sample, baro_copy = rows
+    mag_delay_s, baro_delay_s = delays_s
     if marks["is_mag_new"] != 0:
-        x, y, z = float(mag[4][0]), float(mag[4][1]), float(mag[4][2])
+        field = values["mag_gauss"]
+        x, y, z = float(field[0]), float(field[1]), float(field[2])
         if math.isfinite(x + y + z):
-            mag_sample[0] = time_us * 1e-6 - delay_s[MAG]
+            mag_sample[0] = time_us * 1e-6 - mag_delay_s
             mag_sample[1], mag_sample[2], mag_sample[3] = x, y, z
-            _push(calls, filters, rings[MAG], mag_sample, mag_copy)
+            _push(calls, filters, MAG_RING, mag_sample, mag_copy)
             store_mag(_log_row(mag_log, marks["mag_rows"], time_us), time_us, x, y, z)
             marks["mag_rows"] += 1
             marks["mag_us"] = time_us
     if marks["is_baro_new"] != 0:
-        altitude_m = float(baro[4][_ALTITUDE])
+        altitude_m = float(values["altitude_m"])
         if math.isfinite(altitude_m):
-            baro_sample[0], baro_sample[1] = time_us * 1e-6 - delay_s[BARO], altitude_m
-            _push(calls, filters, rings[BARO], baro_sample, baro_copy)
+            baro_sample[0], baro_sample[1] = time_us * 1e-6 - baro_delay_s, altitude_m
+            _push(calls, filters, BARO_RING, baro_sample, baro_copy)
             row = _log_row(baro_log, marks["baro_rows"], time_us)
             marks["baro_rows"] += 1
-            store_baro(row, time_us, float(baro[4][0]), altitude_m, float(baro[4][_TEMPERATURE]))
+            pressure_hpa, temperature_c = float(values["pressure_hpa"]), float(values["temperature_c"])
+            store_baro(row, time_us, pressure_hpa, altitude_m, temperature_c)
             marks["baro_us"] = time_us
 
 
@@ -140,7 +143,7 @@ def log_truth(slow: Any, time_us: int, following: Any) -> None:
     marks = slow[2][0]
     if time_us < marks["truth_us"]:
         return
-    state, offset_m, interval_us = slow[6]
+    state, offset_m, interval_us = slow[7]
     marks["truth_us"] = (time_us // interval_us + 1) * interval_us
-    store_truth(_log_row(following[4], marks["truth_rows"], time_us), state, offset_m)
+    store_truth(_log_row(following[3], marks["truth_rows"], time_us), state, offset_m)
     marks["truth_rows"] += 1

@@ -30,15 +30,9 @@ from flightstack.params.vehicle import Vehicle
 from flightstack.simulator_link.hot_frames import PlantStateFrame
 from flightstack.simulator_link.sensor_frames import (
     ACCEL,
-    ACCEL_AT,
-    ALTITUDE_AT,
     BARO,
     GYRO,
-    GYRO_AT,
     MAG,
-    MAG_AT,
-    PRESSURE_AT,
-    TEMPERATURE_AT,
     HilGps,
     HilMeasurement,
     HilSensorFrame,
@@ -98,11 +92,10 @@ class SensorSuite:
         self.imus = ImuSet(vehicle, seed, truth.state)
         count = len(self.imus.records)
         self._frames = [HilSensorFrame(*sender) for _ in range(count)]
-        self._values = self._frames[0].values
         self._all_imus = [_IMU] * count
         self._fields = self._all_imus.copy()
         self._apart: SingleArray = np.zeros((count, 6), "<f4")  # measurements that go through channels
-        self._wires = self._values[:6].reshape(1, 6) if count == 1 else self._apart
+        self._wires = self._frames[0].values[:6].reshape(1, 6) if count == 1 else self._apart
         self.imu_wires: tuple[SingleArray, ...] = tuple(self._wires)
         """Newest measurement of each inertial sensor as in HIL_SENSOR: specific force and rates, shape (6,)."""
         self._gps_seq = 0
@@ -220,17 +213,22 @@ class SensorSuite:
         """``imu_wires`` as one array, shape (sensors, 6)."""
         return self._wires
 
-    @property
-    def values(self) -> SingleArray:
-        """Newest values of HIL_SENSOR of the first inertial sensor, with magnetometer and barometer."""
-        return self._values
-
     def pass_by(self, count: int, fields: int) -> None:
         """Count quiet measurements that kernels made; ``fields`` are those of other sensors in the last one."""
         self.imus.take_rows(count)
         self._fields[:] = self._all_imus
         self._fields[0] |= fields
-        self._next_us = min(self._due_us[MAG_SLOT], self._due_us[BARO_SLOT], self._next_other_us)
+        self._next_us = min(*self._due_us[: BARO_SLOT + 1], self._next_other_us)
+
+    @property
+    def values(self) -> SingleArray:
+        """Newest values of HIL_SENSOR of the first inertial sensor, in the order of the message."""
+        return self._frames[0].values
+
+    @property
+    def parts(self) -> RecordArray:
+        """``values`` as a record of ``HIL_VALUES``, shape (1,)."""
+        return self._frames[0].parts
 
     @property
     def is_quiet(self) -> bool:
@@ -269,14 +267,14 @@ class SensorSuite:
 
     def _pass_on_imu(self, time_us: int, index: int) -> None:
         """Send the measurement of an inertial sensor that its faults leave."""
-        out, values, fields = self.imus.records["out"][index], self._frames[index].values, 0
-        for name, at, part, bits in (
-            ("gyro", GYRO_AT, out[:3], GYRO),
-            ("accel", ACCEL_AT, out[3:], ACCEL),
+        out, parts, fields = self.imus.records["out"][index], self._frames[index].parts[0], 0
+        for name, key, part, bits in (
+            ("gyro", "gyro_rad_s", out[:3], GYRO),
+            ("accel", "accel_m_s2", out[3:], ACCEL),
         ):
             sent = self._channels[name, index].pass_on(time_us, part.copy())
             if sent is not None:
-                values[at] = sent
+                parts[key] = sent
                 fields |= bits
         self._fields[index] = fields
 
@@ -304,7 +302,7 @@ class SensorSuite:
         return mag.measure(self._truth.state, self._plant.current_a)
 
     def _send_mag(self, _time_us: int, out: FloatArray) -> None:
-        self._values[MAG_AT] = out
+        self.parts["mag_gauss"] = out
         self._fields[0] |= MAG
 
     def _measure_baro(self, baro: Barometer, time_us: int) -> FloatArray:
@@ -312,7 +310,8 @@ class SensorSuite:
         return baro.measure(time_us, truth.state, self._plant.airspeed_m_s(), truth.rotor_speed_rad_s)
 
     def _send_baro(self, _time_us: int, out: FloatArray) -> None:
-        self._values[PRESSURE_AT], self._values[ALTITUDE_AT], self._values[TEMPERATURE_AT] = out.tolist()
+        parts = self.parts
+        parts["pressure_hpa"], parts["altitude_m"], parts["temperature_c"] = out.tolist()
         self._fields[0] |= BARO
 
     def _measure_gnss(self, time_us: int) -> Fix:

@@ -21,13 +21,9 @@ from flightstack.mavlink.link import Link
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, ActuatorsFrame
 from flightstack.simulator_link.sensor_frames import (
     ACCEL,
-    ACCEL_AT,
     BARO,
     GYRO,
-    GYRO_AT,
     MAG,
-    MAG_AT,
-    PRESSURE_AT,
     HilGps,
 )
 from flightstack.simulator_link.sensor_inbox import FlowReport, HilReport, RangeReport, SensorInbox
@@ -94,11 +90,12 @@ class Stream(NamedTuple):
 
 def _measurements(content: Any, frame: LocalFrame) -> list[tuple[str, tuple[float, ...]]]:
     if isinstance(content, HilReport):
+        values = content.values
         parts = (
-            ("gyro", GYRO, GYRO_AT), ("accel", ACCEL, ACCEL_AT), ("mag", MAG, MAG_AT),
-            ("baro", BARO, slice(PRESSURE_AT, PRESSURE_AT + 1)),
+            ("gyro", GYRO, values.gyro_rad_s), ("accel", ACCEL, values.accel_m_s2), ("mag", MAG, values.mag_gauss),
+            ("baro", BARO, (values.pressure_hpa,)),
         )  # fmt: skip
-        return [(name, content.values[at]) for name, bits, at in parts if content.fields & bits == bits]
+        return [(name, part) for name, bits, part in parts if content.fields & bits == bits]
     if isinstance(content, HilGps):
         place = frame.to_ned(GeoPoint(content.latitude_deg, content.longitude_deg, content.altitude_m))
         return [("gnss", tuple(place)), ("gnss velocity", content.velocity_ned_m_s),

@@ -25,7 +25,7 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, ActuatorsFrame
-from flightstack.simulator_link.sensor_frames import ACCEL, ACCEL_AT, BARO, GYRO, GYRO_AT, MAG
+from flightstack.simulator_link.sensor_frames import ACCEL, BARO, GYRO, MAG
 from flightstack.simulator_link.sensor_inbox import MOST_WAITING, HilReport
 from sim_bridge.server.endpoint import FlightStackEndpoint
 from sim_bridge.simulator import Simulator
@@ -56,7 +56,7 @@ def pairs_of(time_s: float, content: Any) -> Iterator[tuple[int, Any]]:
         yield getattr(content, "number", 0), sample_of(time_s, content)
         return
     if content.fields & (ACCEL | GYRO) == ACCEL | GYRO and content.step_us > 0:
-        rates, forces = Vector3(*content.values[GYRO_AT]), Vector3(*content.values[ACCEL_AT])
+        rates, forces = Vector3(*content.values.gyro_rad_s), Vector3(*content.values.accel_m_s2)
         yield content.number, ImuSample(time_s, content.step_us * 1e-6, rates, forces)
     for sample in slow_samples(time_s, content):
         yield content.number, sample
