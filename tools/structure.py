@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import gc
-import re
 import statistics
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
@@ -28,7 +27,8 @@ COLUMNS = (
 LIBRARY_NAMES = {"_replace", "_fields", "_asdict", "_header", "_pack", "_timestamp", "_link", "_time"}
 """Private by their form: of named tuples, of messages of pymavlink, and a module of Textual."""
 _KINDS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
-INDEX = re.compile(r"[A-Z]+_[A-Z0-9_]+$")
+ROWS = ("flightstack.estimation.error_state", "flightstack.estimation.kalman")
+"""Modules whose numbers name the rows of the covariance and of the filter's observations, as PX4's ``State::``."""
 
 
 @cache
@@ -71,7 +71,7 @@ def walk(tree: ast.Module) -> list[ast.AST]:
 
 def forget() -> None:
     """Drop the modules and their nodes, of which each garbage collection would look at millions."""
-    for kept in (sources, nodes, walk):
+    for kept in (sources, nodes, walk, numbers_of):
         kept.cache_clear()
 
 
@@ -168,11 +168,56 @@ def _name(called: ast.expr) -> str:
     )
 
 
-def index_constants(tree: ast.Module) -> int:
-    """Return how often an array is indexed by a named constant such as ``M_SPEED``."""
-    slices = (node.slice for node in walk(tree) if isinstance(node, ast.Subscript))
-    parts = (part for index in slices for part in (index.elts if isinstance(index, ast.Tuple) else [index]))
-    return sum(isinstance(part, ast.Name) and bool(INDEX.match(part.id)) for part in parts)
+def index_constants(name: str) -> list[str]:
+    """Return where a module takes an element of an array by a number of its own or of another module.
+
+    That is ``array[NUMBER]`` or ``array[NUMBER + i]``, not a key of a dictionary, a bound of a slice or a size in an
+    annotation. Names of ``ROWS`` do not count: a matrix has no fields.
+    """
+    numbers = _known_numbers(name)
+    found = []
+    for node in nodes(name.partition(".")[0])[name]:
+        if isinstance(node, ast.Subscript) and _name(node.value) != "Annotated":
+            index = node.slice
+            parts = index.elts if isinstance(index, ast.Tuple) else [index]
+            firsts = [
+                part.left if isinstance(part, ast.BinOp) and isinstance(part.op, ast.Add) else part
+                for part in parts
+            ]
+            if any(isinstance(part, ast.Name) and part.id in numbers for part in firsts):
+                found.append(f"{name}:{node.lineno}: {ast.unparse(node)}")
+    return found
+
+
+@cache
+def numbers_of(name: str) -> set[str]:
+    """Return the constants that a module of the programs sets to whole numbers."""
+    program = name.partition(".")[0]
+    tree = sources(program).get(name) if program in PROGRAMS and name not in ROWS else None
+    assigned = (node for node in (tree.body if tree is not None else ()) if isinstance(node, ast.Assign))
+    return set[str]().union(*(_numbers(target, node.value) for node in assigned for target in node.targets))
+
+
+def _known_numbers(name: str) -> set[str]:
+    """Return the constants that are whole numbers in a module: its own and imported ones."""
+    found = set(numbers_of(name))
+    for node in sources(name.partition(".")[0])[name].body:
+        if isinstance(node, ast.ImportFrom) and node.module:
+            theirs = numbers_of(node.module)
+            found |= {alias.asname or alias.name for alias in node.names if alias.name in theirs}
+    return found
+
+
+def _numbers(target: ast.expr, value: ast.expr) -> set[str]:
+    """Return the names of ``target`` that get whole numbers."""
+    if isinstance(target, ast.Tuple):
+        names = [part.id for part in target.elts if isinstance(part, ast.Name)]
+        if isinstance(value, ast.Tuple):
+            pairs = zip(target.elts, value.elts, strict=False)
+            return set[str]().union(*(_numbers(part, number) for part, number in pairs))
+        return set(names) if isinstance(value, ast.Call) and _name(value.func) == "range" else set()
+    is_number = isinstance(value, ast.Constant) and type(value.value) is int
+    return {target.id} if is_number and isinstance(target, ast.Name) else set()
 
 
 def imported(module: Iterable[ast.AST]) -> set[str]:
@@ -233,7 +278,7 @@ def main() -> None:
             sum(map(has_one_definition, modules.values())),
             sum(map(has_one_small_definition, modules.values())),
             len(list(long_functions(modules))),
-            sum(map(index_constants, modules.values())),
+            sum(len(index_constants(name)) for name in modules),
             len(cycles(modules)),
         )
         print("|", " | ".join(map(str, row)), "|")

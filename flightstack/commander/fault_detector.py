@@ -49,7 +49,6 @@ FAULTS = (
     (ROTOR_FAULT, Failsafe.ROTOR),
 )
 
-ROLL, PITCH, TILT_ERROR, POSITION, ROTORS = range(5)
 TIMERS = 5
 DETECTORS = np.dtype([("time", "f8", TIMERS), ("triggered", "i8", TIMERS)])
 """For each detector its output, and the time [s] for which the input has contradicted this output."""
@@ -57,6 +56,7 @@ LIMITS = np.dtype(
     [
         ("limit", "f8", TIMERS),  # rad, rad, rad, m, share of the rotor speed; 0 is off
         ("time", "f8", TIMERS),  # s beyond the limit before a detector triggers
+        ("checks_speeds", "i8"),  # 1 with a limit of the rotor speed
         ("rotors", "i8"),
         ("slow", "f8"),  # rad/s; the relative error's least denominator
         ("thrust", "f8", MAX_ROTORS),  # N s²
@@ -107,6 +107,7 @@ def detector_limits(behaviour: Behaviour, vehicle: Vehicle) -> RecordArray:
     limits["time"] = (
         b.max_roll_s, b.max_pitch_s, b.max_tilt_error_s, b.max_position_error_s, b.rotor_error_ms * 1e-3
     )  # fmt: skip
+    limits["checks_speeds"] = b.rotor_check and b.rotor_error > 0.0
     limits["rotors"] = len(vehicle.rotors)
     limits["thrust"][0, : len(vehicle.rotors)] = [rotor.thrust_coefficient_n_s2 for rotor in vehicle.rotors]
     limits["slow"] = 0.1 * min(1e4, *(rotor.max_speed_rad_s for rotor in vehicle.rotors))
@@ -247,7 +248,7 @@ def detect(
     if _is_moving(now.velocity_ned_m_s, now.rates_frd_rad_s):
         result |= MOVING
     for i in range(limits["rotors"]):
-        if limits["limit"][ROTORS] > 0.0 and speeds["missing"][i] >= UNMEASURED_AFTER_S:
+        if limits["checks_speeds"] != 0 and speeds["missing"][i] >= UNMEASURED_AFTER_S:
             result |= UNMEASURED
     w, x, y, z = now.attitude
     roll, pitch = roll_angle(w, x, y, z), pitch_angle(w, x, y, z)

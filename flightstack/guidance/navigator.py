@@ -60,7 +60,6 @@ ARRIVED_M = 0.5
 """Distance from a commanded position at which the vehicle has arrived."""
 # looking up a member of an enumeration takes seven times as long as looking up a name or a key
 _OFFBOARD = Mode.OFFBOARD
-_YAW_AT = 9  # of trajectory and setpoint
 _STREAM_NUMBERS = frozenset(int(mode) for mode in STREAM_MODES)
 
 
@@ -269,7 +268,7 @@ class Navigator:
         for x in (self._trajectory, self.setpoint):
             x[0:3] += position_m
             x[3:6] += velocity_m_s
-            x[_YAW_AT] += yaw_rad
+            x[9] += yaw_rad
         goal, is_landing = self._mode_target, lands(mode, self._mode_target[0])
         if mode == Mode.MISSION:
             goal, is_landing = self._mission, mission_lands(self._mission[0], self._plan)

@@ -17,7 +17,6 @@ from pathlib import Path
 
 _PINNED_EXCHANGES = 8192  # exchanges: a fraction of a second at full speed
 _FREE_EXCHANGES = 16
-_CPU_FIELD = 36  # of /proc/…/stat, counted after the name in parentheses
 
 
 def _allowed() -> set[int]:
@@ -31,7 +30,8 @@ def _set_affinity(cpus: set[int]) -> None:
 
 def _current_cpu() -> int:
     stat = Path("/proc/thread-self/stat").read_text(encoding="ascii", errors="replace")
-    return int(stat.rpartition(")")[2].split()[_CPU_FIELD])
+    after_name = stat.rpartition(")")[2].split()
+    return int(after_name[36])  # "processor" in proc_pid_stat(5)
 
 
 class AffinityLeader:

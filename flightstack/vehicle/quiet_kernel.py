@@ -19,7 +19,6 @@ from flightstack.vehicle.slow_kernel import log_truth, measure_slow, take_slow
 _REFERENCE, _COMMAND, _SPEED = (
     columns.start for columns in (LoopRow.REFERENCE_ATTITUDE, LoopRow.ROTOR_COMMAND, LoopRow.ROTOR_SPEED)
 )
-_QUATERNION_AT = 6
 
 
 class QuietCalls(NamedTuple):
@@ -79,7 +78,7 @@ def _rest(row: FloatArray, idle: FloatArray, state: FloatArray, speeds: Any) -> 
     copy_all(idle, row)
     copy_all(state, row)
     for i in range(4):
-        row[_REFERENCE + i] = state[_QUATERNION_AT + i]
+        row[_REFERENCE + i] = state[6 + i]
     copy_all(speeds, row[_SPEED:])
 
 

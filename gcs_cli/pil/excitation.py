@@ -48,7 +48,7 @@ def excitation(setup: LoopsSetup) -> Recording:
     roll, pitch = (_TILT_RAD * size * _wave(time_s, number) for number in (30, 31))
     yaw = _YAW_RAD * size * _wave(time_s, 32)
     inputs[:, 6:10] = _quaternions(roll, pitch, yaw)
-    inputs[:, SETPOINT_AT + 9] = yaw + 0.1 * size * _wave(time_s, 33)
+    inputs[:, SETPOINT_AT:TARGET_AT][:, 9] = yaw + 0.1 * size * _wave(time_s, 33)
     is_outer = np.arange(count) % setup.divisor == 0
     flags = np.where(is_outer, LoopFlags.OUTER_DUE, 0)
     _add_bias(inputs, time_s)
@@ -100,4 +100,4 @@ def _add_given(
     axes = [np.where((number // 2) % 3 == axis, sign, 0.0) for axis in range(3)]
     inputs[given, TARGET_AT : TARGET_AT + 4] = _quaternions(*axes)[given]
     weight_n = setup.vehicle.mass_kg * 9.80665
-    inputs[given, INPUT_SIZE - 1] = _GIVEN_THRUST * weight_n * (1.0 + 0.2 * _wave(time_s, 34)[given])
+    inputs[given, -1] = _GIVEN_THRUST * weight_n * (1.0 + 0.2 * _wave(time_s, 34)[given])

@@ -21,7 +21,6 @@ METRICS = (
     "battery_percent",
 )  # fmt: skip
 """Names of the metrics; ``battery_percent`` is the smallest charge, tilt the larger of roll and pitch."""
-_DOWN = 2
 
 
 def figures_of(flight: Flight) -> tuple[Figure, ...]:
@@ -69,7 +68,7 @@ def _heights(flight: Flight) -> Iterator[Series]:
         ("setpoint", flight.data.position_setpoint, "s3"),
         ("flown", flight.data.actual_position, "s1"),
     ):
-        up = -series.values[:, _DOWN]
+        up = -series.values[:, 2]
         shown = np.isfinite(up) & (series.time_s >= low) & (series.time_s <= high)
         x, y = decimated(series.time_s[shown], up[shown], _BUCKETS)
         dash = "dot" if name == "setpoint" else "solid"
@@ -83,4 +82,4 @@ def _events(flight: Flight) -> Iterator[Series]:
     if len(at_s):
         at = np.clip(np.searchsorted(time_s, at_s), 0, len(time_s) - 1)
         hints = [f"{event.name} at t = {event.time_s:.2f} s" for event in flight.caused]
-        yield Series("event", at_s, -position[at, _DOWN], "s4", "none", marker="diamond", hints=hints)
+        yield Series("event", at_s, -position[at, 2], "s4", "none", marker="diamond", hints=hints)

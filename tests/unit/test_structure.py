@@ -26,7 +26,7 @@ ONE_DEFINITION = {"flightstack": 22, "sim_bridge": 4, "gcs_cli": 22}
 SMALL_WITHOUT_REASON = {"flightstack": 2, "sim_bridge": 0, "gcs_cli": 1}
 """Files with one small definition whose docstring does not say why it is a module of its own."""
 LONG_FUNCTIONS = {"flightstack": 2, "sim_bridge": 0, "gcs_cli": 0}
-INDEX_CONSTANTS = {"flightstack": 66, "sim_bridge": 6, "gcs_cli": 8}
+INDEX_CONSTANTS = {"flightstack": 76, "sim_bridge": 0, "gcs_cli": 0}
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -62,8 +62,8 @@ def test_functions_of_more_than_40_lines_do_not_grow_in_number(program: str) -> 
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_index_constants_do_not_grow_in_number(program: str) -> None:
-    found = {name: count for name, tree in sources(program).items() if (count := index_constants(tree))}
-    assert sum(found.values()) <= INDEX_CONSTANTS[program], found
+    found = [place for name in sources(program) for place in index_constants(name)]
+    assert len(found) <= INDEX_CONSTANTS[program], found
 
 
 def test_tests_use_no_private_names_of_the_programs() -> None:

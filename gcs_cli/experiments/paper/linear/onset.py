@@ -105,7 +105,7 @@ def growth(case: Case, axis: str) -> float:
     """Return the final growth of a small kick about ``axis`` in one inner tick, as a logarithm."""
     ticks = max(FEWEST_TICKS, math.ceil(LEAST_S * case.inner_hz))
     flight = fly_attitude(case, ticks, axis, kick_rad_s=KICK_RAD_S, alone=True, ends_at_rad_s=GROWN_RAD_S)
-    return growth_of(np.abs(flight.states[1:, RATES_AT + ATTITUDE_AXES.index(axis)]), KICK_RAD_S)
+    return growth_of(np.abs(flight.states[1:, RATES_AT:][:, ATTITUDE_AXES.index(axis)]), KICK_RAD_S)
 
 
 def growth_of(rates: FloatArray, kick: float) -> float:
