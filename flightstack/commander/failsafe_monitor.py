@@ -16,9 +16,11 @@ from flightstack.commander.failsafe import Action, Decision, Failsafe, Phase, ac
 from flightstack.commander.failsafe_step import (
     IDLE,
     Announcement,
+    Memory,
     Situation,
     active_failsafes,
     failsafe_step,
+    goes_on,
     override,
     restart,
 )
@@ -113,6 +115,7 @@ class FailsafeMonitor:
         self._state = state
         self._behaviour = behaviour
         self._memory = IDLE
+        self._settled: tuple[Memory, frozenset[Failsafe], Situation] | None = None
         self._user_takeover = UserTakeover()
         self._phase = Phase.DISARMED
         self._time_us = 0
@@ -193,7 +196,7 @@ class FailsafeMonitor:
 
     def set_behaviour(self, behaviour: Behaviour) -> None:
         """Set new parameters, from the next outer tick on."""
-        self._behaviour = behaviour
+        self._behaviour, self._settled = behaviour, None
         self.faults.set_behaviour(behaviour)
         self.fence.set_behaviour(behaviour)
         self._reading = None
@@ -258,10 +261,24 @@ class FailsafeMonitor:
         links, memory = self.links, self._memory
         return bool(memory.entries or self._estimate or self.battery_level or links.gcs_lost)
 
-    def is_nominal(self) -> bool:
-        """Return True if ``update`` returns None for a new state in which fence and detectors find nothing."""
+    def is_nominal(self, phase: Phase, mode: Mode) -> bool:
+        """Return True if an update changes nothing for a new state in which fence and detectors find nothing.
+
+        Either no failsafe is active, or those that are go on as in the last update.
+        """
         self._update_battery_level()
-        return self.states.is_new and not (self.fence.is_breached or self._has_conditions)
+        if not self.states.is_new or self.fence.is_breached:
+            return False
+        return not self._has_conditions or self._goes_on(phase, mode)
+
+    def _goes_on(self, phase: Phase, mode: Mode) -> bool:
+        if self._settled is None or not self.faults.is_quiet:
+            return False
+        memory, conditions, situation = self._settled
+        if memory is not self._memory or phase is not situation.phase:
+            return False
+        is_same = self.links.manual_lost is not situation.sticks_are_live
+        return is_same and conditions == self._conditions(False, mode)
 
     def pass_by(self, time_us: int, found: int) -> None:
         """Follow updates up to ``time_us`` that returned None; ``found`` are the last bits of ``detect``."""
@@ -274,7 +291,10 @@ class FailsafeMonitor:
         if entry is not None and entry.overridden and self.fence.has_breach_grown:
             self._memory = restart(self._memory, Failsafe.FENCE)
         situation = Situation(self._time_us, phase, not self.links.manual_lost)
-        self._memory, announcements = failsafe_step(self._memory, conditions, situation, self._behaviour)
+        before = self._memory
+        self._memory, announcements = failsafe_step(before, conditions, situation, self._behaviour)
+        is_settled = self._memory == before and goes_on(self._memory, situation, self._behaviour)
+        self._settled = (self._memory, conditions, situation) if is_settled else None
         return announcements
 
     def _conditions(self, breached: bool, mode: Mode) -> frozenset[Failsafe]:

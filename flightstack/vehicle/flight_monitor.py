@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flightstack.commander.failsafe import Action, Failsafe, phase_of
+from flightstack.commander.failsafe import Action, Failsafe, Phase, phase_of
 from flightstack.commander.failsafe_monitor import EVENTS_OF_ACTION, FailsafeMonitor
 from flightstack.commander.ground_monitor import GroundMonitor, Standing
 from flightstack.commander.transitions import Event
@@ -73,9 +73,16 @@ class FlightMonitor:
             self._modes.choose_loops()
 
     def is_nominal(self) -> bool:
-        """Return True if the next update does nothing unless the new state makes an event: in the air, no failsafe."""
+        """Return True if the next update changes nothing unless the new state makes an event."""
         armed, mode = self._now.status
-        return armed and not self._now.landed and mode not in STREAM_MODES and self._failsafes.is_nominal()
+        if not armed or self._now.landed or mode in STREAM_MODES:
+            return False
+        return self._failsafes.is_nominal(self._phase, mode)
+
+    @property
+    def _phase(self) -> Phase:
+        armed, mode = self._now.status
+        return phase_of(armed, self._now.landed, mode, self._navigator.goes_elsewhere)
 
     def pass_by(self, time_us: int, found: int, fell_us: int) -> None:
         """Follow updates up to ``time_us`` that did nothing; arguments as in ``Autopilot.pass_outer``."""
@@ -87,8 +94,7 @@ class FlightMonitor:
         """Evaluate the failsafes and apply their decision."""
         now, failsafes = self._now, self._failsafes
         before = failsafes.decision
-        phase = phase_of(now.status.armed, now.landed, now.status.mode, self._navigator.goes_elsewhere)
-        for severity, text in failsafes.evaluate(conditions, phase):
+        for severity, text in failsafes.evaluate(conditions, self._phase):
             self._journal.say(severity, text)
         decision = failsafes.decision
         acts = decision.action > Action.WARN

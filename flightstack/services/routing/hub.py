@@ -237,7 +237,7 @@ class GroundHub:
         0 or less if it may send something now. The link clock and the vehicle clock must run alike.
         """
         has_changed = self._now.status != self._shown or self._area.home != self._home
-        if has_changed or self._to_forward or self._texts or self._journal.has_events:
+        if has_changed or self._to_forward or self._journal.has_events or (self._texts and self._is_heard):
             return 0.0
         vehicle_s = self._now.time_us * 1e-6
         idle_s = min(self._schedule.idle_s(now_s), self._forget_due_s - now_s)
@@ -309,7 +309,7 @@ class GroundHub:
         self._take_events()  # texts of the services in this poll
         if not self._texts:
             return
-        if not any(peer.heard for peer in self._peers.values()):
+        if not self._is_heard:
             del self._texts[:-KEPT_TEXTS]
             return
         sent_us = None
@@ -320,6 +320,10 @@ class GroundHub:
             for message in status_texts(severity, text):
                 self._send_to_all(message)
         self._texts.clear()
+
+    @property
+    def _is_heard(self) -> bool:
+        return any(peer.heard for peer in self._peers.values())
 
     def _announce(self, message_id: int) -> None:
         for message in self._telemetry.requested(message_id):
