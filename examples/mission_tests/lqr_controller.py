@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from flightstack.control.attitude_controller import AttitudeController, AttitudeInputs
+from flightstack.control.control_law import AttitudeController, AttitudeInputs
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import Vector3
 from flightstack.params.toml_file import Table

@@ -1,4 +1,9 @@
-"""Interface of control laws: of attitude, position, guidance and mixer (``controller``)."""
+"""Interface of control laws: of attitude, position, guidance and mixer (``controller``).
+
+A package of a user registers a law of attitude, an ``AttitudeController``, in the entry point group
+``flightstack.attitude_controllers`` (``controller_loading``) of its own ``pyproject.toml``; ``--controller name``
+selects it. docs/tutorials/controller.md shows an example, and laws of the other roles.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +11,10 @@ import hashlib
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from flightstack.control.law_sources import LawSources, law_sources
+from flightstack.core.contract import AttitudeReference, Quaternion, Vector3
 from flightstack.params.toml_file import Table
 from flightstack.params.tunable import Tunable
 from flightstack.params.vehicle import Vehicle
@@ -69,6 +75,29 @@ class ControlLaw(NamedTuple):
         if isinstance(self.step, CStep):
             return LawSources([self.step.header, *self.step.sources], [])
         return law_sources(self.step, (self.memory_type, self.params_type))
+
+
+class AttitudeInputs(NamedTuple):
+    """Inputs of an attitude controller in one tick.
+
+    ``error_rad`` is the rotation from the vehicle to the reference as a rotation vector in the body frame; for a
+    rotation about one axis it is the angle error. ``relative_rotor_speed_rad_s`` is the paper's Ω_r from the previous
+    tick. ``saturation`` is −1, 0 or +1 for each axis: the direction in which the mixer was saturated.
+    """
+
+    attitude: Quaternion
+    rates_frd_rad_s: Vector3
+    reference: AttitudeReference
+    error_rad: Vector3
+    relative_rotor_speed_rad_s: float
+    saturation: Vector3
+
+
+AttitudeController: TypeAlias = ControlLaw
+"""A law of attitude: ``step(memory, inputs, params, dt_s) -> (memory, torque)``.
+
+``inputs`` are ``AttitudeInputs``; the torque is a ``Vector3`` in N m about the body axes.
+"""
 
 
 class NoMemory(NamedTuple):

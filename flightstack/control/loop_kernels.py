@@ -11,14 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from flightstack.control.attitude_controller import AttitudeInputs
 from flightstack.control.attitude_reference import (
     ReferenceMemory,
     ReferenceParams,
     attitude_reference_step,
     in_body_frame,
 )
-from flightstack.control.control_law import ControlLaw, NoMemory, NoParams
+from flightstack.control.control_law import AttitudeInputs, ControlLaw, NoMemory, NoParams
 from flightstack.control.controller import ATTITUDE, GUIDANCE, MIXER, POSITION
 from flightstack.control.controller_loading import fields_of
 from flightstack.control.guidance_direct import direct_step

@@ -12,14 +12,13 @@ from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from flightstack.control.attitude_controller import AttitudeInputs
 from flightstack.control.attitude_reference import (
     ReferenceMemory,
     ReferenceParams,
     attitude_reference_step,
     in_body_frame,
 )
-from flightstack.control.control_law import CStep, NoMemory, NoParams
+from flightstack.control.control_law import AttitudeInputs, CStep, NoMemory, NoParams
 from flightstack.control.controller import ATTITUDE, GUIDANCE, MIXER, POSITION, Controller, controller_of
 from flightstack.control.controller_loading import check_python
 from flightstack.control.loop_kernels import (

@@ -9,7 +9,6 @@ from flightstack.control.attitude_backstepping import (
     BacksteppingParams,
     attitude_backstepping_step,
 )
-from flightstack.control.attitude_controller import AttitudeInputs
 from flightstack.control.attitude_pid import PidMemory, PidParams, attitude_pid_step
 from flightstack.control.attitude_reference import (
     ReferenceMemory,
@@ -17,6 +16,7 @@ from flightstack.control.attitude_reference import (
     attitude_reference_step,
     in_body_frame,
 )
+from flightstack.control.control_law import AttitudeInputs
 from flightstack.control.mixer import WORK_ROWS, mix, relative_rotor_speed
 from flightstack.control.position_pid import PositionMemory, PositionParams, position_pid_step
 from flightstack.core.array_items import as_tuple, store

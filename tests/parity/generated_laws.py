@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from flightstack.control.attitude_controller import AttitudeInputs
+from flightstack.control.control_law import AttitudeInputs
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Quaternion, Vector3
 from flightstack.core.geometry import conjugate, cross, quaternion_product, rotate

@@ -13,9 +13,9 @@ import pytest
 
 from flightstack.control import mixer as mixing
 from flightstack.control.attitude_backstepping import attitude_backstepping_step
-from flightstack.control.attitude_controller import AttitudeController
 from flightstack.control.attitude_pid import attitude_pid_step
 from flightstack.control.attitude_reference import attitude_reference_step, in_body_frame
+from flightstack.control.control_law import AttitudeController
 from flightstack.control.position_pid import position_pid_step
 from flightstack.core import geometry, portable_math
 from flightstack.core.compiled import compiled

@@ -15,7 +15,6 @@ from flightstack.control.attitude_backstepping import (
     attitude_backstepping_step,
     read_backstepping_params,
 )
-from flightstack.control.attitude_controller import AttitudeInputs
 from flightstack.control.attitude_pid import (
     PidMemory,
     PidParams,
@@ -23,6 +22,7 @@ from flightstack.control.attitude_pid import (
     paper_arm_m,
     read_pid_params,
 )
+from flightstack.control.control_law import AttitudeInputs
 from flightstack.core.contract import AttitudeReference, Quaternion, Vector3
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle

@@ -16,7 +16,7 @@ from flightstack.control.attitude_backstepping import (
     BacksteppingParams,
     attitude_backstepping_step,
 )
-from flightstack.control.attitude_controller import AttitudeInputs
+from flightstack.control.control_law import AttitudeInputs
 from flightstack.core.contract import AttitudeReference, Quaternion, Vector3
 from sim_bridge.plant.compiled_plant import CompiledPlant
 from sim_bridge.plant.plant import InitialState, PlantOptions

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from flightstack.control.attitude_controller import AttitudeController
+from flightstack.control.control_law import AttitudeController
 from flightstack.control.controller_loading import load_controller
 from flightstack.core.errors import ConfigError
 from flightstack.firmware.law_parity import Parity, law_parity

@@ -10,9 +10,8 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 from flightstack.control.attitude_backstepping import CONTROLLER as BACKSTEPPING
-from flightstack.control.attitude_controller import AttitudeController, AttitudeInputs
 from flightstack.control.attitude_pid import CONTROLLER as PID
-from flightstack.control.control_law import ControlLaw, NoMemory, NoParams
+from flightstack.control.control_law import AttitudeController, AttitudeInputs, ControlLaw, NoMemory, NoParams
 from flightstack.control.loops import PythonLoops
 from flightstack.control.mixer import mixer_for
 from flightstack.core.compiled import compiled

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from flightstack.control import mixer
-from flightstack.control.attitude_controller import AttitudeInputs
 from flightstack.control.attitude_reference import (
     ReferenceMemory,
     ReferenceParams,
     attitude_reference_step,
     in_body_frame,
 )
-from flightstack.control.control_law import ControlLaw, CStep
+from flightstack.control.control_law import AttitudeInputs, ControlLaw, CStep
 from flightstack.control.controller import BUILT_IN
 from flightstack.core import contract, geometry
 from flightstack.firmware.generator.law_tables import TABLES, controllers_header, controllers_source

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from flightstack.control.control_law import AttitudeInputs
 from flightstack.core import portable_math
 from flightstack.core.compiled import IS_DISABLED
 from flightstack.firmware.generator.calls import c_prototype
@@ -31,8 +32,10 @@ from flightstack.firmware.generator.types import (
 WRITTEN_BY_HAND = (portable_math.sin_cos, portable_math.arc_tangent_series)
 """Functions of firmware/core with polynomials for each precision."""
 _LAW_MATH = re.compile(r"\bfs_(floor|copysign|is_nan|to_int|ldexp|frexp)\(|\bFS_(NAN|INFINITY)\b")
-PROVIDED = {"flightstack.core.contract": "fs_types", "flightstack.control.attitude_controller": "fs_types"}
+PROVIDED = {"flightstack.core.contract": "fs_types"}
 """Modules whose types are in firmware/core."""
+PROVIDED_TYPES: Mapping[type, str] = {AttitudeInputs: "fs_types"}
+"""Types in firmware/core of other modules."""
 NOTICE = "Generated from Python by flightstack.firmware.generator: do not edit."
 
 
@@ -175,7 +178,7 @@ class Program:
         self.below, self.names, self.inline = below, dict(names or {}), frozenset(inline)
         self.accepts_plain = accepts_plain or IS_DISABLED  # then nothing is marked
         self.units: dict[str, Unit] = {}
-        self.types: dict[type, str] = dict(types or {})
+        self.types: dict[type, str] = {**PROVIDED_TYPES, **(types or {})}
         """Header of each record that is not declared by its unit."""
         self._functions: dict[Callable[..., Any], Function] = {}
         self._open: list[Callable[..., Any]] = []
