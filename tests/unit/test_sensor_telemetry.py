@@ -17,10 +17,9 @@ from flightstack.estimation.estimator_report import ControlFlags, RejectionFlags
 from flightstack.estimation.health import STUCK_SAMPLES
 from flightstack.estimation.imu_track import ImuTrack
 from flightstack.estimation.motion_covariance import motion_covariance, pose_covariance, twist_covariance
-from flightstack.estimation.sensed import Sensed
+from flightstack.estimation.sensed import Sensed, vibration_of
 from flightstack.estimation.sensor_feed import NewestSamples
 from flightstack.estimation.sensor_samples import BaroSample, GnssFix, GnssSample, MagSample
-from flightstack.estimation.vibration import vibration_of
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 from flightstack.services.telemetry.streams import (
