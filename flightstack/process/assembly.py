@@ -36,7 +36,6 @@ from flightstack.services.logs.log_store import NO_LOGS, LogStore
 from flightstack.services.routing.hub import GroundHub
 from flightstack.services.telemetry.telemetry import Telemetry
 from flightstack.simulator_link.endpoint import SimulatorEndpoint
-from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.assembly import VehicleParts, assemble
 from flightstack.vehicle.autopilot import TickingAutopilot
 from flightstack.vehicle.estimation import Estimation, SensorAutopilot, Users
@@ -46,6 +45,7 @@ from flightstack.vehicle.parameters import (
     connect_parameters,
     load_parameters,
 )
+from flightstack.vehicle.plans import FlightArea
 from flightstack.vehicle.status import VehicleStatus, vehicle_info, vehicle_status
 
 _KERNELS = (

@@ -18,12 +18,11 @@ from flightstack.guidance.params import guidance_params
 from flightstack.guidance.safe_places import SafePlaces, plan_limits
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
-from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.autopilot import Autopilot
 from flightstack.vehicle.flight_monitor import FlightMonitor
 from flightstack.vehicle.flight_state import FlightState, Journal
-from flightstack.vehicle.mission import Mission
 from flightstack.vehicle.mode_control import ModeControl, Readiness, Takeoff
+from flightstack.vehicle.plans import FlightArea, Mission
 from flightstack.vehicle.requests import FlightRequests
 
 

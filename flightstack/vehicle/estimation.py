@@ -30,9 +30,9 @@ from flightstack.params.estimator import ESTIMATOR_SPECS, MULTI_IMU
 from flightstack.params.store import ParamStore
 from flightstack.params.vehicle import GRAVITY_M_S2
 from flightstack.simulator_link.sensor_inbox import SensorInbox
-from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.autopilot import Autopilot
 from flightstack.vehicle.flight_state import FlightState, Journal
+from flightstack.vehicle.plans import FlightArea
 
 HEALTH_US = 50_000
 """Interval of the health, in the time of the sensors."""

@@ -8,10 +8,9 @@ from flightstack.commander.ground_monitor import GroundMonitor, Standing
 from flightstack.commander.transitions import Event
 from flightstack.core.enums import STREAM_MODES, Mode, Severity
 from flightstack.guidance.navigator import Navigator
-from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.flight_state import FlightState, Journal
-from flightstack.vehicle.mission import Mission
 from flightstack.vehicle.mode_control import ModeControl, Takeoff
+from flightstack.vehicle.plans import FlightArea, Mission
 
 AIRBORNE_MODES = (Mode.TAKEOFF, Mode.MISSION)
 """Modes that take off, at once or after a delay."""

@@ -11,9 +11,8 @@ from flightstack.core.enums import STREAM_MODES, Mode, Severity
 from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.params import SpeedOverrides
 from flightstack.guidance.safe_places import SafePlaces, plan_limits
-from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.flight_state import FlightState, Journal
-from flightstack.vehicle.mission import Mission
+from flightstack.vehicle.plans import FlightArea, Mission
 
 
 class Readiness:

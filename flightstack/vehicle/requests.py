@@ -13,8 +13,8 @@ from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.setpoints import Sticks
 from flightstack.plan import MissionItem
 from flightstack.vehicle.flight_state import FlightState, Journal
-from flightstack.vehicle.mission import Mission
 from flightstack.vehicle.mode_control import ModeControl, Readiness
+from flightstack.vehicle.plans import Mission
 
 PHASE_OF_REQUEST: dict[Event, Phase] = {
     rule.event: PHASE_OF_MODE[rule.mode] for rule in RULES if rule.mode is not None and rule.selects

@@ -12,11 +12,10 @@ from flightstack.mavlink.link import Address
 from flightstack.params.store import ParamStore
 from flightstack.services.logs.log_store import NO_LOGS, LogStore
 from flightstack.services.logs.log_stream import LogTail
-from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.assembly import VehicleParts
 from flightstack.vehicle.flight_state import FlightState, Journal
-from flightstack.vehicle.mission import Mission
 from flightstack.vehicle.mode_control import Readiness, Takeoff
+from flightstack.vehicle.plans import FlightArea, Mission
 from flightstack.vehicle.requests import FlightRequests
 
 ACCEPTED = int(mavlink.MAV_RESULT_ACCEPTED)
