@@ -23,7 +23,7 @@ from flightstack.firmware.choice import (
 )
 from flightstack.firmware.law_tree import firmware_for
 from flightstack.firmware.pil.client import DEFAULT_TIMING, PilTiming
-from flightstack.firmware.pil.free_loops import FreeLoops
+from flightstack.firmware.pil.free_running import FreeLoops
 from flightstack.firmware.pil.line_model import free_running_baud
 from flightstack.firmware.pil.session import RatedLink, negotiate_baud
 from flightstack.firmware.pil.target_filter import HostFilter, TargetFilter

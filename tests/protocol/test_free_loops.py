@@ -14,7 +14,7 @@ import pytest
 from flightstack.core.contract import LoopRow
 from flightstack.core.errors import ConfigError, TargetError
 from flightstack.firmware.c_loops import CLoops
-from flightstack.firmware.pil.free_loops import STATE_TIMEOUT_MS, FreeLoops
+from flightstack.firmware.pil.free_running import STATE_TIMEOUT_MS, FreeLoops
 from flightstack.firmware.pil.line_model import STATE_OCTETS
 from flightstack.firmware.pil.target_loops import TargetLoops
 from flightstack.firmware.targets import finish_loops, make_loops
