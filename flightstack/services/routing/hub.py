@@ -1,7 +1,7 @@
 """Hub of all ground stations and companions: links, services and telemetry. No I/O.
 
 Each peer has its own link (sequence numbers, message rates). Times are on the link clock: wall time in a process,
-simulated time in tests. Telemetry rates count simulated time too (``telemetry.streams``).
+simulated time in tests. Telemetry rates count simulated time too (``telemetry.telemetry``).
 """
 
 from __future__ import annotations
@@ -24,8 +24,7 @@ from flightstack.services.registry import Schedule, Service, make_services
 from flightstack.services.routing.peer import Peer, PeerAddress
 from flightstack.services.routing.router import Router
 from flightstack.services.routing.signing_setup import NEVER_FORWARDED, link_signing, signing_setup
-from flightstack.services.telemetry.streams import Streams, default_rates_hz
-from flightstack.services.telemetry.telemetry import Telemetry
+from flightstack.services.telemetry.telemetry import Streams, Telemetry, default_rates_hz
 from flightstack.services.telemetry.vehicle import status_texts, system_time_at
 from flightstack.vehicle.assembly import VehicleParts
 from flightstack.vehicle.flight_state import ItemReached, Text
