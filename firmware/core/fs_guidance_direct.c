@@ -4,7 +4,7 @@
 
 #include "fs_math.h"
 
-/* guidance_direct.py:11 */
+/* guidance_direct.py:14 */
 void fs_direct_step(const fs_no_memory *memory, const fs_vehicle_state *state, const fs_position_setpoint *setpoint,
                     const fs_no_params *params, fs_real dt_s, fs_no_memory *memory_out,
                     fs_position_setpoint *setpoint_out)

@@ -1,4 +1,7 @@
-"""The built-in guidance law: the setpoint of mission and modes, unchanged."""
+"""The built-in guidance law: the setpoint of mission and modes, unchanged.
+
+A module of its own, as each built-in law: the firmware has a C file of it.
+"""
 
 from __future__ import annotations
 
