@@ -15,7 +15,7 @@ from flightstack.mavlink.ftp_messages import Opcode, Packet, ftp_message
 from flightstack.mavlink.link import SILENT_AFTER_S, Address
 from flightstack.process.connections import PAUSE_NS, SimulatorPace, serve_while_idle
 from flightstack.process.process_config import Ended, ProcessConfig
-from flightstack.services.registry import Schedule
+from flightstack.services.routing.router import Schedule
 from flightstack.transports.tcp import TcpClient
 from flightstack.transports.vehicle_ports import PortsConfig
 from tests.support.hub_net import ALICE, BOB, Net, Station

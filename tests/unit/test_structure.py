@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Iterator
 
 import pytest
 
 from tools.structure import (
     PROGRAMS,
+    ROOT,
     cycles,
     forget,
     has_one_definition,
@@ -22,6 +25,7 @@ from tools.structure import (
 )
 
 LONGEST_FILE = 400
+MOST_HOPS = 12
 ONE_DEFINITION = {"flightstack": 15, "sim_bridge": 4, "gcs_cli": 22}
 SMALL_WITHOUT_REASON = {"flightstack": 0, "sim_bridge": 0, "gcs_cli": 1}
 """Files with one small definition whose docstring does not say why it is a module of its own."""
@@ -64,6 +68,16 @@ def test_functions_of_more_than_40_lines_do_not_grow_in_number(program: str) -> 
 def test_index_constants_do_not_grow_in_number(program: str) -> None:
     found = [place for name in sources(program) for place in index_constants(name)]
     assert len(found) <= INDEX_CONSTANTS[program], found
+
+
+def test_an_offboard_setpoint_passes_few_files_from_the_socket_to_guidance() -> None:
+    command = [sys.executable, "-m", "tools.hops"]
+    printed = subprocess.run(
+        command, capture_output=True, text=True, check=True, cwd=ROOT
+    ).stdout.splitlines()
+    assert printed[0] == "process/connections.py"
+    assert "guidance/setpoints.py" in printed
+    assert len(printed[:-1]) <= MOST_HOPS
 
 
 def test_tests_use_no_private_names_of_the_programs() -> None:

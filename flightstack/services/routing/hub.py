@@ -20,9 +20,9 @@ from flightstack.services.commands.context import VehicleContext
 from flightstack.services.files.ftp_server import FtpServer
 from flightstack.services.logs.log_server import LogServer
 from flightstack.services.mission.mission_server import MissionService
-from flightstack.services.registry import Schedule, Service, make_services
+from flightstack.services.registry import make_services
 from flightstack.services.routing.peer import Peer, PeerAddress
-from flightstack.services.routing.router import Router
+from flightstack.services.routing.router import Router, Schedule, Service
 from flightstack.services.routing.signing_setup import NEVER_FORWARDED, link_signing, signing_setup
 from flightstack.services.telemetry.telemetry import Streams, Telemetry, default_rates_hz
 from flightstack.services.telemetry.vehicle import status_texts, system_time_at

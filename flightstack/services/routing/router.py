@@ -1,4 +1,4 @@
-"""Forward messages between the peers of a vehicle, by the rules of MAVLink's routing guide. Pure.
+"""Where a message goes: to peers, by the rules of MAVLink's routing guide, and to services. Pure.
 
 https://mavlink.io/en/guide/routing.html. The router learns which systems and components each peer has. A message with
 a target goes to the peers of that target, a broadcast to every peer that was heard, and neither back to its sender.
@@ -7,9 +7,10 @@ Frames are forwarded unchanged: sequence numbers and signatures stay valid.
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
-from collections.abc import Hashable
-from typing import Generic, NamedTuple, TypeVar
+from collections.abc import Hashable, Iterable, Sequence
+from typing import Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Message, is_unknown, sender
@@ -122,3 +123,92 @@ class Router(Generic[Peer]):
         if len(self._passed) > MAX_REMEMBERED:
             self._passed.popitem(last=False)
         return peers
+
+
+class Service(Protocol):
+    """A MAVLink protocol as a state machine without I/O.
+
+    ``now_s`` is the link clock, which runs on while simulated time stands still.
+    """
+
+    @property
+    def handles(self) -> frozenset[str]:
+        """Type names of the messages that ``receive`` takes."""
+        ...
+
+    def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
+        """Take a message from ``peer``. Ignore messages for other vehicles; never raise."""
+        ...
+
+    def poll(self, now_s: float) -> Iterable[tuple[Hashable | None, Message]]:
+        """Return the messages to send now, each with its peer; None stands for every peer that was heard."""
+        ...
+
+    def next_deadline(self) -> float | None:
+        """Return the link time of the next poll if no message arrives before; None for never.
+
+        −inf stands for every poll. The hub takes this at its word: before that time it does not poll the service.
+        """
+        ...
+
+
+@runtime_checkable
+class CountsVehicleTime(Protocol):
+    """A service whose poll is due by the vehicle's clock."""
+
+    def idle_s(self) -> float:
+        """Return the vehicle time for which ``poll`` does nothing, if no message arrives [s]."""
+        ...
+
+
+OWN_MESSAGES = frozenset({"MISSION_ITEM", "MISSION_ITEM_INT", "MISSION_REQUEST", "MISSION_REQUEST_INT"})
+"""Messages that come by the thousand in a transfer, and change no service but their own."""
+
+
+class Schedule:
+    """Polls each service when it is due, and all of them after a message: in flight one of thirteen is due.
+
+    A message for one service may change another: a command sets a parameter, which the parameter server announces.
+    After one of ``OWN_MESSAGES``, only its services are polled.
+    """
+
+    def __init__(self, services: Sequence[Service]) -> None:
+        self._services = services
+        self._own: dict[str, list[int]] = {
+            kind: [index for index, service in enumerate(services) if kind in service.handles]
+            for kind in OWN_MESSAGES
+        }
+        self._clocks = {
+            i: service for i, service in enumerate(services) if isinstance(service, CountsVehicleTime)
+        }
+        self._due_s: dict[int, float] = {}  # by the index of the service; not of those that are never due
+        self.wake()
+
+    def wake(self, message_type: str = "") -> None:
+        """Poll all services at the next poll, or those that a message of this type may change."""
+        if message_type in self._own:
+            self._due_s.update(dict.fromkeys(self._own[message_type], -math.inf))
+            return
+        self._due_s = dict.fromkeys(range(len(self._services)), -math.inf)
+
+    def idle_s(self, now_s: float) -> float:
+        """Return the time for which no service is due, if link clock and vehicle clock run alike [s]."""
+        idle_s = math.inf
+        for index, due_s in self._due_s.items():
+            clock = self._clocks.get(index) if due_s == -math.inf else None
+            idle_s = min(idle_s, due_s - now_s if clock is None else clock.idle_s())
+        return idle_s
+
+    def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
+        """Return the messages to send now, each with its peer; None stands for every peer that was heard."""
+        addressed: list[tuple[Hashable | None, Message]] = []
+        due = sorted([index for index, due_s in self._due_s.items() if due_s <= now_s])  # in sending order
+        for index in due:
+            addressed += self._services[index].poll(now_s)
+        for index in due:
+            due_s = self._services[index].next_deadline()
+            if due_s is None:
+                del self._due_s[index]
+            else:
+                self._due_s[index] = due_s
+        return addressed
