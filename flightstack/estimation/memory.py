@@ -16,7 +16,7 @@ from flightstack.estimation.kalman import Filter
 from flightstack.estimation.rate_filter import RateFilter
 from flightstack.estimation.rings import RINGS, TRACK_COLUMNS, Mean, Rings
 from flightstack.estimation.source_checks import Checks
-from flightstack.estimation.yaw_estimator import Models
+from flightstack.estimation.yaw_estimator import YawBank
 
 NOTHING = -1
 """Returned by a source without a measurement that is due; else it returns its next axis, 0 after the last one."""
@@ -159,7 +159,7 @@ class EstimatorMemory(NamedTuple):
     field: Annotated[FloatArray, 3]
     """Of the body [gauss], the last one at the horizon."""
     before_gnss: Annotated[Record, BeforeGnss]
-    yaw_models: Models
+    yaw_bank: Annotated[Record, YawBank]
     rings: Rings
 
 

@@ -169,24 +169,24 @@ def predict_yaw(m: MemoryRecord, f: Filter, step: DeltaSample) -> None:
     if m["yaw_fix"]["updates"] > 0.0:
         angle = less_bias(step.angle_rad, read_vector(f.nominal, 10), step.dt_s)
         velocity = less_bias(step.velocity_m_s, read_vector(f.nominal, 13), step.dt_s)
-        predict_models(m["yaw_models"], angle, velocity, step.dt_s)
+        predict_models(m["yaw_bank"], angle, velocity, step.dt_s)
 
 
 @compiled
 def take_velocity(m: MemoryRecord, f: Filter, row: FloatArray) -> None:
     """Weigh the models with a GNSS velocity; reset the yaw if it is unknown, or wrong."""
-    models, fix, flags = m["yaw_models"], m["yaw_fix"], m["flags"]
+    bank, fix, flags = m["yaw_bank"], m["yaw_fix"], m["flags"]
     if flags["landed"] == 1 or flags["has_gnss"] == 0:
         fix["updates"] = 0.0
         return
     attitude, noise_m_s = read_nominal(f.nominal).attitude, max(speed_accuracy(row), 0.1)
     if fix["updates"] == 0.0:
-        start_models(models, attitude, row[4], row[5], noise_m_s * noise_m_s)
+        start_models(bank, attitude, row[4], row[5], noise_m_s * noise_m_s)
     else:
-        update_models(models, row[4], row[5], noise_m_s * noise_m_s)
+        update_models(bank, row[4], row[5], noise_m_s * noise_m_s)
     fix["updates"] += 1.0
-    fix["turn_rad"] = mean_turn(models, attitude)
-    fix["variance"] = variance_of(models, attitude, fix["turn_rad"])
+    fix["turn_rad"] = mean_turn(bank, attitude)
+    fix["variance"] = variance_of(bank, attitude, fix["turn_rad"])
     if fix["variance"] > _CONVERGED_RAD * _CONVERGED_RAD:
         return
     if flags["has_yaw"] == 0:
@@ -214,13 +214,13 @@ def _is_wrong(m: MemoryRecord, time_s: float) -> bool:
 def _reset_to_models(m: MemoryRecord, f: Filter, row: FloatArray) -> None:
     """Take tilt and yaw from the models, velocity and position from GNSS."""
     m["yaw_fix"]["wrong_s"] = 0.0
-    models, before = m["yaw_models"], read_nominal(f.nominal).attitude
-    best = likeliest(models)
-    q = attitude_of(models, best)
+    bank, before = m["yaw_bank"], read_nominal(f.nominal).attitude
+    best = bank["models"][likeliest(bank)]
+    q = attitude_of(best)
     q = turned(q, Vector3(0.0, 0.0, m["yaw_fix"]["turn_rad"] - turn_between(before, q)))
     f.nominal[0], f.nominal[1], f.nominal[2], f.nominal[3] = q.w, q.x, q.y, q.z
     for axis in range(2):
-        reset_variance(f.covariance, ATTITUDE + axis, 1, tilt_variance(models, best, axis))
+        reset_variance(f.covariance, ATTITUDE + axis, 1, tilt_variance(best, axis))
     reset_variance(f.covariance, ATTITUDE + 2, 1, m["yaw_fix"]["variance"])
     count_yaw_reset(m, turn_between(before, q))
     m["flags"]["has_yaw"] = 1

@@ -14,6 +14,7 @@
 #include "fs_rings.h"
 #include "fs_source_checks.h"
 #include "fs_types.h"
+#include "fs_yaw_estimator.h"
 
 /*
  * Do the next part of the work; return False if no step older than the horizon is open or waits.

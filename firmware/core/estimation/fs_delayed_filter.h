@@ -14,6 +14,7 @@
 #include "fs_rings.h"
 #include "fs_source_checks.h"
 #include "fs_types.h"
+#include "fs_yaw_estimator.h"
 
 /*
  * Store a measurement of a ring (GNSS_RING, to) until the horizon reaches its time.

@@ -11,6 +11,7 @@
 #include "fs_rings.h"
 #include "fs_source_checks.h"
 #include "fs_types.h"
+#include "fs_yaw_estimator.h"
 
 /*
  * Write the summary of an estimator's record, shape (12,); it holds the mean ratios of the last call. health.py:104

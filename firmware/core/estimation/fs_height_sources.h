@@ -14,6 +14,7 @@
 #include "fs_rings.h"
 #include "fs_source_checks.h"
 #include "fs_types.h"
+#include "fs_yaw_estimator.h"
 
 /*
  * Fuse a pressure altitude. The first one, and the first after the barometer was stuck, gives its bias.

@@ -10,6 +10,7 @@
 #include "fs_rings.h"
 #include "fs_source_checks.h"
 #include "fs_types.h"
+#include "fs_yaw_estimator.h"
 
 /* Time without samples of the IMU in all, and the number of such gaps. */
 typedef struct {
@@ -110,7 +111,7 @@ typedef struct {
     fs_real earth[4];
     fs_real field[3];
     fs_before_gnss before_gnss;
-    fs_real yaw_models[5][32];
+    fs_yaw_bank yaw_bank;
     fs_rings rings;
 } fs_estimator_memory;
 

@@ -14,6 +14,7 @@
 #include "fs_rings.h"
 #include "fs_source_checks.h"
 #include "fs_types.h"
+#include "fs_yaw_estimator.h"
 
 /* Return True if a GNSS velocity was accepted within the last second. position_sources.py:158 */
 bool fs_is_velocity_measured(const fs_filter *f);

@@ -14,6 +14,7 @@
 #include "fs_rings.h"
 #include "fs_source_checks.h"
 #include "fs_types.h"
+#include "fs_yaw_estimator.h"
 
 /* Count a change of the yaw. resets.py:74 */
 void fs_count_yaw_reset(fs_estimator_memory *m, fs_real turn_rad);

@@ -39,7 +39,7 @@ void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_s
         const fs_vector3 angle = fs_less_bias(&step->angle_rad, &read_vector, step->dt_s);
         const fs_vector3 read_vector_2 = fs_read_vector(f->nominal, 13);
         const fs_vector3 velocity = fs_less_bias(&step->velocity_m_s, &read_vector_2, step->dt_s);
-        fs_predict_models(m->yaw_models, &angle, &velocity, step->dt_s);
+        fs_predict_models(&m->yaw_bank, &angle, &velocity, step->dt_s);
     }
 }
 
@@ -196,10 +196,11 @@ int32_t fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[],
 static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 {
     m->yaw_fix.wrong_s = FS_LIT(0.0);
+    fs_yaw_bank *bank = &m->yaw_bank;
     const fs_nominal read_nominal = fs_read_nominal(f->nominal);
     const fs_quaternion before = read_nominal.attitude;
-    const int32_t best = fs_likeliest((const fs_real(*)[32])m->yaw_models);
-    fs_quaternion q = fs_attitude_of((const fs_real(*)[32])m->yaw_models, best);
+    fs_yaw_model *best = &bank->models[fs_likeliest(bank)];
+    fs_quaternion q = fs_attitude_of(best);
     const fs_vector3 world_rotation = {
         .x = FS_LIT(0.0),
         .y = FS_LIT(0.0),
@@ -211,8 +212,7 @@ static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real 
     f->nominal[2] = q.y;
     f->nominal[3] = q.z;
     for (int32_t axis = 0; axis < 2; axis++) {
-        fs_reset_variance(f->covariance, FS_ATTITUDE + axis, 1,
-                          fs_tilt_variance((const fs_real(*)[32])m->yaw_models, best, axis));
+        fs_reset_variance(f->covariance, FS_ATTITUDE + axis, 1, fs_tilt_variance(best, axis));
     }
     fs_reset_variance(f->covariance, FS_ATTITUDE + 2, 1, m->yaw_fix.variance);
     fs_count_yaw_reset(m, fs_turn_between(&before, &q));
@@ -244,6 +244,7 @@ static bool is_wrong(fs_estimator_memory *m, fs_real time_s)
 /* yaw_sources.py:176 */
 void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 {
+    fs_yaw_bank *bank = &m->yaw_bank;
     fs_yaw_fix *fix = &m->yaw_fix;
     fs_flags *flags = &m->flags;
     if (flags->landed == 1 || flags->has_gnss == 0) {
@@ -254,13 +255,13 @@ void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
     const fs_quaternion attitude = read_nominal.attitude;
     const fs_real noise_m_s = fs_max(fs_speed_accuracy(row), FS_LIT(0.1));
     if (fix->updates == FS_LIT(0.0)) {
-        fs_start_models(m->yaw_models, &attitude, row[4], row[5], noise_m_s * noise_m_s);
+        fs_start_models(bank, &attitude, row[4], row[5], noise_m_s * noise_m_s);
     } else {
-        fs_update_models(m->yaw_models, row[4], row[5], noise_m_s * noise_m_s);
+        fs_update_models(bank, row[4], row[5], noise_m_s * noise_m_s);
     }
     fix->updates += FS_LIT(1.0);
-    fix->turn_rad = fs_mean_turn((const fs_real(*)[32])m->yaw_models, &attitude);
-    fix->variance = fs_variance_of((const fs_real(*)[32])m->yaw_models, &attitude, fix->turn_rad);
+    fix->turn_rad = fs_mean_turn(bank, &attitude);
+    fix->variance = fs_variance_of(bank, &attitude, fix->turn_rad);
     if (fix->variance > FS_CONVERGED_RAD * FS_CONVERGED_RAD) {
         return;
     }

@@ -15,6 +15,7 @@
 #include "fs_rings.h"
 #include "fs_source_checks.h"
 #include "fs_types.h"
+#include "fs_yaw_estimator.h"
 
 /* Move the models over a step of the flight. yaw_sources.py:167 */
 void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_sample *step);

@@ -122,10 +122,15 @@ uint16_t filter_steps_push(filter_steps *s, uint16_t octet)
 uint32_t filter_steps_hash(const filter_steps *s)
 {
     const fs_filter *const f = &s->memory.filter;
+    const fs_yaw_bank *const bank = &s->memory.yaw_bank;
     union {
         fs_observed fields;
         fs_real values[sizeof(fs_observed) / sizeof(fs_real)];
     } view;
+    union {
+        fs_yaw_model fields;
+        fs_real values[sizeof(fs_yaw_model) / sizeof(fs_real)];
+    } model;
     uint32_t hash = hashed(s->hash, f->nominal, (uint16_t)(sizeof f->nominal / sizeof f->nominal[0]));
 
     hash = hashed(hash, &f->covariance[0][0], (uint16_t)(sizeof f->covariance / sizeof f->covariance[0][0]));
@@ -133,7 +138,11 @@ uint32_t filter_steps_hash(const filter_steps *s)
         view.fields = f->observations[i];
         hash = hashed(hash, view.values, (uint16_t)(sizeof view.values / sizeof view.values[0]));
     }
-    return hashed(hash, &s->memory.yaw_models[0][0], (uint16_t)(sizeof s->memory.yaw_models / sizeof s->row[0]));
+    for (uint16_t i = 0U; i < (uint16_t)(sizeof bank->models / sizeof bank->models[0]); i++) {
+        model.fields = bank->models[i];
+        hash = hashed(hash, model.values, (uint16_t)(sizeof model.values / sizeof model.values[0]));
+    }
+    return hash;
 }
 
 #define COST(part, call)                \
@@ -171,7 +180,7 @@ void filter_steps_costs(filter_steps *s, uint32_t costs[FILTER_PARTS])
     step.velocity_m_s = force;
     COST(0, fs_predict(f, &step, p));
     COST(14, fs_predict_errors(f, &noise, p));
-    COST(1, fs_predict_models(m->yaw_models, &still, &force, FS_LIT(0.01)));
+    COST(1, fs_predict_models(&m->yaw_bank, &still, &force, FS_LIT(0.01)));
     COST(2, fs_drift_gnss_bias(f, gnss, FS_LIT(0.2), p));
     COST(3, fs_fuse_gnss_velocity(f, gnss, 0, FS_LIT(0.0), p));
     COST(4, fs_fuse_gnss_position(f, gnss, FS_LIT(0.0), 0, FS_LIT(0.0), p));
@@ -186,7 +195,7 @@ void filter_steps_costs(filter_steps *s, uint32_t costs[FILTER_PARTS])
     COST(9, fs_fuse_rest_velocity(f, 0, p));
     COST(10, fs_fuse_rest_rate(f, 0, &still, FS_LIT(1e-6), p));
     COST(11, fs_fuse_hold(f, 0, f->nominal[7], p));
-    COST(12, fs_update_models(m->yaw_models, FS_LIT(0.1), FS_LIT(0.2), FS_LIT(0.1)));
+    COST(12, fs_update_models(&m->yaw_bank, FS_LIT(0.1), FS_LIT(0.2), FS_LIT(0.1)));
     nominal = fs_read_nominal(f->nominal);
     motion = fs_motion_of(&nominal);
     COST(13, fs_follow(&m->rings, m->output, &motion, FS_LIT(0.1), p->gravity_m_s2));
