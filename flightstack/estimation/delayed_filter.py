@@ -127,7 +127,7 @@ def imu_kernel(memory: MemoryArray, sample: FloatArray) -> None:
     delta_velocity = less_bias(scaled(accel, dt_s), read_vector(f.nominal, 13), dt_s)
     dv = in_start_frame(angle, delta_velocity)
     write_motion(output, time_s, moved(read_motion(output), angle, dv, dt_s, params.gravity_m_s2))
-    if sums[0] >= params.period_s - 0.25 * dt_s:
+    if sums["elapsed_s"] >= params.period_s - 0.25 * dt_s:
         step = take_step(sums, time_s)
         for _ in range(MOST_PARTS):
             if r.cursors[IMU_RING, 1] < IMU_ROWS:

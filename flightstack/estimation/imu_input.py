@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, TypeAlias
+from typing import Annotated, NamedTuple, TypeAlias
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray, Quaternion, Vector3
+from flightstack.core.contract import FloatArray, Quaternion, Record, Vector3
 from flightstack.core.geometry import (
     cross,
     normalised,
@@ -18,13 +18,6 @@ from flightstack.estimation.error_state import read_vector, scaled, write_vector
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.prediction import DeltaSample, ImuNoise
 
-SUMS_SIZE = 64
-"""Elapsed time, rotation (4), velocity change (3); smoothed rate and specific force (6); number of samples; noise of
-gyro and accelerometer (6); sums of two steps (7), their last four means (24), and the number of means; variances of
-the unknown rotation and velocity change."""
-Sums: TypeAlias = Annotated[FloatArray, SUMS_SIZE]
-
-_MEAN, _COUNT, _NOISE, _PAIR_S, _PAIR, _PAST, _PAIRS, _UNKNOWN = 8, 14, 15, 21, 22, 28, 52, 53
 _SMOOTHING_S = 0.1
 _NOISE_SMOOTHING_S = 2.0
 _PAIR_LENGTH_S = 0.0155
@@ -38,39 +31,70 @@ _CLIPPED = 0.99
 """Share of the range from which a value may have been cut off."""
 
 
+class ImuSums(NamedTuple):
+    """Sums of the samples since the last step, and what is known of the sensor."""
+
+    elapsed_s: float
+    """Since the last step; rotation and velocity change too."""
+    rotation: Annotated[FloatArray, 4]
+    velocity_m_s: Annotated[FloatArray, 3]
+    rate_rad_s: Annotated[FloatArray, 3]
+    """Smoothed, as the specific force."""
+    force_m_s2: Annotated[FloatArray, 3]
+    samples: float
+    """Number of samples so far."""
+    unknown_angle: float
+    """Variance of the rotation [rad²] that was not measured since the last step."""
+    unknown_velocity: float
+    """The same of the velocity change [m²/s²]."""
+    noise: Annotated[FloatArray, 6]
+    """Densities of gyro and accelerometer, as variances."""
+    pair_s: float
+    """Length of the steps in ``pair``."""
+    pair: Annotated[FloatArray, 6]
+    """Sum of the rotation vectors and velocity changes of up to two steps."""
+    past: Annotated[FloatArray, 6, 4]
+    """Means of the last four pairs, the newest first."""
+    pairs: float
+    """Number of pairs so far."""
+
+
+ImuSumsRecord: TypeAlias = Annotated[Record, ImuSums]
+
+
 @compiled
-def add_sample(sums: Sums, gyro: Vector3, accel: Vector3, dt_s: float) -> None:
+def add_sample(sums: ImuSumsRecord, gyro: Vector3, accel: Vector3, dt_s: float) -> None:
     """Add one raw sample."""
-    angle = scaled(gyro, dt_s)
-    before = Quaternion(sums[1], sums[2], sums[3], sums[4])
+    angle, q, velocity = scaled(gyro, dt_s), sums["rotation"], sums["velocity_m_s"]
+    before = Quaternion(q[0], q[1], q[2], q[3])
     after = normalised(quaternion_product(before, rotation_over(angle, 1.0)))
     dv = rotate(before, in_start_frame(angle, scaled(accel, dt_s)))
-    sums[0] += dt_s
-    sums[1], sums[2], sums[3], sums[4] = after.w, after.x, after.y, after.z
-    sums[5] += dv.x
-    sums[6] += dv.y
-    sums[7] += dv.z
-    share = min(dt_s / _SMOOTHING_S, 1.0) if sums[_COUNT] > 0.0 else 1.0
-    _smooth(sums, _MEAN, gyro, share)
-    _smooth(sums, _MEAN + 3, accel, share)
-    sums[_COUNT] += 1.0
+    sums["elapsed_s"] += dt_s
+    q[0], q[1], q[2], q[3] = after.w, after.x, after.y, after.z
+    velocity[0] += dv.x
+    velocity[1] += dv.y
+    velocity[2] += dv.z
+    share = min(dt_s / _SMOOTHING_S, 1.0) if sums["samples"] > 0.0 else 1.0
+    _smooth(sums["rate_rad_s"], gyro, share)
+    _smooth(sums["force_m_s2"], accel, share)
+    sums["samples"] += 1.0
 
 
 @compiled
-def note_gap(sums: Sums, gap_s: float) -> None:
+def note_gap(sums: ImuSumsRecord, gap_s: float) -> None:
     """Note a time without samples, which the next sample bridges."""
     angle_rad, speed_m_s = _GAP_RATE_RAD_S * gap_s, _GAP_FORCE_M_S2 * gap_s
-    sums[_UNKNOWN] += angle_rad * angle_rad
-    sums[_UNKNOWN + 1] += speed_m_s * speed_m_s
+    sums["unknown_angle"] += angle_rad * angle_rad
+    sums["unknown_velocity"] += speed_m_s * speed_m_s
 
 
 @compiled
-def note_clipping(sums: Sums, gyro: Vector3, accel: Vector3, params: EstimatorParams) -> None:
+def note_clipping(sums: ImuSumsRecord, gyro: Vector3, accel: Vector3, params: EstimatorParams) -> None:
     """Note a sample with a value at the end of its range: the true one may be far larger."""
     if max(abs(gyro.x), abs(gyro.y), abs(gyro.z)) >= _CLIPPED * params.gyro_range_rad_s:
-        sums[_UNKNOWN] += _SHOCK_RAD * _SHOCK_RAD
+        sums["unknown_angle"] += _SHOCK_RAD * _SHOCK_RAD
     if max(abs(accel.x), abs(accel.y), abs(accel.z)) >= _CLIPPED * params.accel_range_m_s2:
-        sums[_UNKNOWN + 1] += _SHOCK_M_S * _SHOCK_M_S
+        sums["unknown_velocity"] += _SHOCK_M_S * _SHOCK_M_S
 
 
 @compiled
@@ -84,79 +108,79 @@ def in_start_frame(angle: Vector3, velocity: Vector3) -> Vector3:
 
 
 @compiled
-def _smooth(sums: Sums, at: int, value: Vector3, share: float) -> None:
-    sums[at] += share * (value.x - sums[at])
-    sums[at + 1] += share * (value.y - sums[at + 1])
-    sums[at + 2] += share * (value.z - sums[at + 2])
+def _smooth(mean: Annotated[FloatArray, 3], value: Vector3, share: float) -> None:
+    mean[0] += share * (value.x - mean[0])
+    mean[1] += share * (value.y - mean[1])
+    mean[2] += share * (value.z - mean[2])
 
 
 @compiled
-def _measure_noise(sums: Sums, sample_dt_s: float, angle: Vector3, velocity: Vector3) -> None:
+def _measure_noise(sums: ImuSumsRecord, sample_dt_s: float, angle: Vector3, velocity: Vector3) -> None:
     """Update the noise densities from the fourth difference of means over two steps, 20 ms.
 
     The vehicle's motion has little power there, and vibration, which averages out within that time, does not count.
     """
-    sums[_PAIR_S] += sample_dt_s
-    sums[_PAIR] += angle.x
-    sums[_PAIR + 1] += angle.y
-    sums[_PAIR + 2] += angle.z
-    sums[_PAIR + 3] += velocity.x
-    sums[_PAIR + 4] += velocity.y
-    sums[_PAIR + 5] += velocity.z
-    length_s = sums[_PAIR_S]
+    pair, past, pairs = sums["pair"], sums["past"], sums["pairs"]
+    sums["pair_s"] += sample_dt_s
+    pair[0] += angle.x
+    pair[1] += angle.y
+    pair[2] += angle.z
+    pair[3] += velocity.x
+    pair[4] += velocity.y
+    pair[5] += velocity.z
+    length_s = sums["pair_s"]
     if length_s < _PAIR_LENGTH_S:
         return
-    share = max(
-        min(length_s / _NOISE_SMOOTHING_S, 1.0), 1.0 / (sums[_PAIRS] - 2.0 if sums[_PAIRS] > 3.0 else 2.0)
-    )
+    share = max(min(length_s / _NOISE_SMOOTHING_S, 1.0), 1.0 / (pairs - 2.0 if pairs > 3.0 else 2.0))
     for i in range(6):
-        mean, at = sums[_PAIR + i] / length_s, _PAST + 4 * i
-        fourth = mean - 4.0 * sums[at] + 6.0 * sums[at + 1] - 4.0 * sums[at + 2] + sums[at + 3]
-        if sums[_PAIRS] >= 4.0:
+        mean = pair[i] / length_s
+        fourth = mean - 4.0 * past[i, 0] + 6.0 * past[i, 1] - 4.0 * past[i, 2] + past[i, 3]
+        if pairs >= 4.0:
             density = fourth * fourth * (length_s / _DIFFERENCE_VARIANCE)
-            sums[_NOISE + i] += share * (density - sums[_NOISE + i])
-        sums[at + 3], sums[at + 2], sums[at + 1], sums[at] = sums[at + 2], sums[at + 1], sums[at], mean
-        sums[_PAIR + i] = 0.0
-    sums[_PAIR_S] = 0.0
-    sums[_PAIRS] += 1.0
+            sums["noise"][i] += share * (density - sums["noise"][i])
+        past[i, 3], past[i, 2], past[i, 1], past[i, 0] = past[i, 2], past[i, 1], past[i, 0], mean
+        pair[i] = 0.0
+    sums["pair_s"] = 0.0
+    sums["pairs"] += 1.0
 
 
 @compiled
-def mean_rate(sums: Sums) -> Vector3:
+def mean_rate(sums: ImuSumsRecord) -> Vector3:
     """Return the rate [rad/s], smoothed over 0.1 s."""
-    return read_vector(sums, _MEAN)
+    return read_vector(sums["rate_rad_s"], 0)
 
 
 @compiled
-def mean_force(sums: Sums) -> Vector3:
+def mean_force(sums: ImuSumsRecord) -> Vector3:
     """Return the specific force [m/s²], smoothed over 0.1 s."""
-    return read_vector(sums, _MEAN + 3)
+    return read_vector(sums["force_m_s2"], 0)
 
 
 @compiled
-def noise_of(sums: Sums) -> ImuNoise:
+def noise_of(sums: ImuSumsRecord) -> ImuNoise:
     """Return the noise that is measured of the sensor."""
-    return ImuNoise(read_vector(sums, _NOISE), read_vector(sums, _NOISE + 3))
+    return ImuNoise(read_vector(sums["noise"], 0), read_vector(sums["noise"], 3))
 
 
 @compiled
-def take_step(sums: Sums, time_s: float) -> DeltaSample:
+def take_step(sums: ImuSumsRecord, time_s: float) -> DeltaSample:
     """Return the accumulated step that ends at ``time_s``, and start the next one."""
-    angle = rotation_vector(Quaternion(sums[1], sums[2], sums[3], sums[4]))
-    velocity = read_vector(sums, 5)
-    _measure_noise(sums, sums[0], angle, velocity)
+    q, v = sums["rotation"], sums["velocity_m_s"]
+    angle = rotation_vector(Quaternion(q[0], q[1], q[2], q[3]))
+    velocity = read_vector(v, 0)
+    _measure_noise(sums, sums["elapsed_s"], angle, velocity)
     sample = DeltaSample(
         time_s,
-        sums[0],
+        sums["elapsed_s"],
         angle,
         velocity,
-        sums[_UNKNOWN],
-        sums[_UNKNOWN + 1],
+        sums["unknown_angle"],
+        sums["unknown_velocity"],
     )
-    sums[_UNKNOWN], sums[_UNKNOWN + 1] = 0.0, 0.0
-    for i in range(8):
-        sums[i] = 0.0
-    sums[1] = 1.0
+    sums["unknown_angle"], sums["unknown_velocity"] = 0.0, 0.0
+    sums["elapsed_s"] = 0.0
+    q[0], q[1], q[2], q[3] = 1.0, 0.0, 0.0, 0.0
+    v[0], v[1], v[2] = 0.0, 0.0, 0.0
     return sample
 
 

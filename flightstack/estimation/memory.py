@@ -11,7 +11,7 @@ from flightstack.core.contract import STATE_SIZE, FloatArray, Record, RecordArra
 from flightstack.core.record_types import dtype_of
 from flightstack.estimation.alignment import Alignment
 from flightstack.estimation.estimator_params import PARAMS_SIZE, EstimatorParams
-from flightstack.estimation.imu_input import Sums
+from flightstack.estimation.imu_input import ImuSums
 from flightstack.estimation.kalman import Filter
 from flightstack.estimation.rate_filter import RateFilter
 from flightstack.estimation.rings import RINGS, TRACK_COLUMNS, Mean, Rings
@@ -148,7 +148,7 @@ class EstimatorMemory(NamedTuple):
     """The measurement that is being fused, a row of its ring."""
     filter: Filter
     params: EstimatorParams
-    sums: Sums
+    sums: Annotated[Record, ImuSums]
     means: Annotated[RecordArray, Mean, RINGS]
     checks: Annotated[Record, Checks]
     alignment: Annotated[Record, Alignment]
@@ -176,7 +176,7 @@ def start_memory(memory: MemoryArray) -> None:
     """Set what is not zero at the start in a memory of zeros that has its parameters."""
     m = memory[0]
     params = EstimatorParams(*as_tuple(m["params"], PARAMS_SIZE))
-    m["sums"][1] = 1.0
+    m["sums"]["rotation"][0] = 1.0
     m["clock"][1] = params.imu_noise_share
     m["earth"][3] = math.nan
 

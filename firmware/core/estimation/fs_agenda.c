@@ -85,7 +85,7 @@ static bool begin(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, fs_re
     fs_predict_yaw(m, f, &step);
     fs_predict(f, &step, params);
     if (is_covariance_due(m, f, r, params)) {
-        const fs_imu_noise noise_of = fs_noise_of(m->sums);
+        const fs_imu_noise noise_of = fs_noise_of(&m->sums);
         fs_predict_errors(f, &noise_of, params);
     }
     fs_add_unknown(f, &step);
@@ -102,8 +102,8 @@ static bool stands(const fs_estimator_memory *m, const fs_estimator_params *para
     if (m->flags.landed == 0) {
         return false;
     }
-    const fs_vector3 rate = fs_mean_rate(m->sums);
-    const fs_vector3 force = fs_mean_force(m->sums);
+    const fs_vector3 rate = fs_mean_rate(&m->sums);
+    const fs_vector3 force = fs_mean_force(&m->sums);
     const fs_vector3 bias = fs_read_vector(m->filter.nominal, 10);
     const fs_real off = fs_sqrt(force.x * force.x + force.y * force.y + force.z * force.z) - params->gravity_m_s2;
     const fs_real largest = fs_max(fs_max(fs_abs(rate.x - bias.x), fs_abs(rate.y - bias.y)), fs_abs(rate.z - bias.z));
@@ -128,10 +128,10 @@ static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int
     if (axis < 3) {
         fs_fuse_rest_velocity(f, axis, params);
     } else {
-        const fs_imu_noise noise_of = fs_noise_of(m->sums);
+        const fs_imu_noise noise_of = fs_noise_of(&m->sums);
         const fs_vector3 noise = noise_of.gyro;
         const fs_real density = fs_max(fs_max(noise.x, noise.y), noise.z);
-        const fs_vector3 mean_rate = fs_mean_rate(m->sums);
+        const fs_vector3 mean_rate = fs_mean_rate(&m->sums);
         fs_fuse_rest_rate(f, axis - 3, &mean_rate, density / FS_REST_MEAN_S, params);
     }
     return axis < 5 ? axis + 1 : 0;
@@ -315,7 +315,7 @@ void fs_take_field_at_rest(fs_estimator_memory *m, fs_filter *f, fs_rings *r, co
         }
         (void)fs_work(m, f, r, f->clock[0], params);
     }
-    const fs_imu_noise noise_of = fs_noise_of(m->sums);
+    const fs_imu_noise noise_of = fs_noise_of(&m->sums);
     fs_predict_errors(f, &noise_of, params);
     int32_t stage = 0;
     for (int32_t count_2 = 0; count_2 < 8; count_2++) {

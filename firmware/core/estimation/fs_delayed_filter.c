@@ -92,7 +92,7 @@ static fs_real real_step(fs_estimator_memory *m, fs_real time_s, fs_real dt_s)
     m->gaps.number += FS_LIT(1.0);
     m->gaps.total_s += elapsed_s - dt_s;
     const fs_real covered_s = fs_min(elapsed_s, FS_LONGEST_GAP_S);
-    fs_note_gap(m->sums, covered_s - dt_s);
+    fs_note_gap(&m->sums, covered_s - dt_s);
     return covered_s;
 }
 
@@ -107,7 +107,7 @@ static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real tim
     const fs_vector3 read_vector = fs_read_vector(m->earth, 0);
     fs_align(f, &m->alignment, &read_vector, m->earth[3], params);
     f->clock[0] = time_s;
-    (void)fs_take_step(m->sums, time_s);
+    (void)fs_take_step(&m->sums, time_s);
     const fs_nominal read_nominal = fs_read_nominal(f->nominal);
     const fs_motion motion_of = fs_motion_of(&read_nominal);
     fs_write_motion(m->output, time_s, &motion_of);
@@ -178,10 +178,11 @@ void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
     const fs_estimator_params *params = &m->params;
     fs_filter *f = &m->filter;
     fs_rings *r = &m->rings;
+    fs_imu_sums *sums = &m->sums;
     const fs_vector3 gyro = fs_read_vector(sample, 2);
     const fs_vector3 accel = fs_read_vector(sample, 5);
-    fs_add_sample(m->sums, &gyro, &accel, dt_s);
-    fs_note_clipping(m->sums, &gyro, &accel, params);
+    fs_add_sample(sums, &gyro, &accel, dt_s);
+    fs_note_clipping(sums, &gyro, &accel, params);
     if (m->flags.aligned == 0) {
         collect(m, &accel, time_s, dt_s, params);
         return;
@@ -196,8 +197,8 @@ void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
     const fs_motion read_motion = fs_read_motion(m->output);
     const fs_motion moved = fs_moved(&read_motion, &angle, &dv, dt_s, params->gravity_m_s2);
     fs_write_motion(m->output, time_s, &moved);
-    if (m->sums[0] >= params->period_s - FS_LIT(0.25) * dt_s) {
-        const fs_delta_sample step = fs_take_step(m->sums, time_s);
+    if (sums->elapsed_s >= params->period_s - FS_LIT(0.25) * dt_s) {
+        const fs_delta_sample step = fs_take_step(sums, time_s);
         for (int32_t count = 0; count < 256; count++) {
             if (r->cursors[FS_IMU_RING][1] < FS_IMU_ROWS) {
                 break;

@@ -10,41 +10,58 @@
 #include "fs_prediction.h"
 #include "fs_types.h"
 
-/* Note a time without samples, which the next sample bridges. imu_input.py:60 */
-void fs_note_gap(fs_real sums[64], fs_real gap_s);
+/* Sums of the samples since the last step, and what is known of the sensor. */
+typedef struct {
+    fs_real elapsed_s;
+    fs_real rotation[4];
+    fs_real velocity_m_s[3];
+    fs_real rate_rad_s[3];
+    fs_real force_m_s2[3];
+    fs_real samples;
+    fs_real unknown_angle;
+    fs_real unknown_velocity;
+    fs_real noise[6];
+    fs_real pair_s;
+    fs_real pair[6];
+    fs_real past[6][4];
+    fs_real pairs;
+} fs_imu_sums;
+
+/* Note a time without samples, which the next sample bridges. imu_input.py:84 */
+void fs_note_gap(fs_imu_sums *sums, fs_real gap_s);
 
 /*
  * Return a sample's change of the velocity in the frame at its start, to first order of its rotation vector.
  *
  * The mean specific force acts in the attitude in the middle of the sample.
  *
- * imu_input.py:77
+ * imu_input.py:101
  */
 fs_vector3 fs_in_start_frame(const fs_vector3 *angle, const fs_vector3 *velocity);
 
-/* Add one raw sample. imu_input.py:42 */
-void fs_add_sample(fs_real sums[64], const fs_vector3 *gyro, const fs_vector3 *accel, fs_real dt_s);
+/* Add one raw sample. imu_input.py:66 */
+void fs_add_sample(fs_imu_sums *sums, const fs_vector3 *gyro, const fs_vector3 *accel, fs_real dt_s);
 
-/* Note a sample with a value at the end of its range: the true one may be far larger. imu_input.py:68 */
-void fs_note_clipping(fs_real sums[64], const fs_vector3 *gyro, const fs_vector3 *accel,
+/* Note a sample with a value at the end of its range: the true one may be far larger. imu_input.py:92 */
+void fs_note_clipping(fs_imu_sums *sums, const fs_vector3 *gyro, const fs_vector3 *accel,
                       const fs_estimator_params *params);
 
-/* Return the accumulated step that ends at time_s, and start the next one. imu_input.py:143 */
-fs_delta_sample fs_take_step(fs_real sums[64], fs_real time_s);
+/* Return the accumulated step that ends at time_s, and start the next one. imu_input.py:166 */
+fs_delta_sample fs_take_step(fs_imu_sums *sums, fs_real time_s);
 
-/* Read a step from a row of the IMU ring. imu_input.py:173 */
+/* Read a step from a row of the IMU ring. imu_input.py:197 */
 fs_delta_sample fs_read_step(const fs_real row[]);
 
-/* Return the noise that is measured of the sensor. imu_input.py:137 */
-fs_imu_noise fs_noise_of(const fs_real sums[64]);
+/* Return the noise that is measured of the sensor. imu_input.py:160 */
+fs_imu_noise fs_noise_of(const fs_imu_sums *sums);
 
-/* Return the rate [rad/s], smoothed over 0.1 s. imu_input.py:125 */
-fs_vector3 fs_mean_rate(const fs_real sums[64]);
+/* Return the rate [rad/s], smoothed over 0.1 s. imu_input.py:148 */
+fs_vector3 fs_mean_rate(const fs_imu_sums *sums);
 
-/* Return the specific force [m/s^2], smoothed over 0.1 s. imu_input.py:131 */
-fs_vector3 fs_mean_force(const fs_real sums[64]);
+/* Return the specific force [m/s^2], smoothed over 0.1 s. imu_input.py:154 */
+fs_vector3 fs_mean_force(const fs_imu_sums *sums);
 
-/* Write a step to a row of the IMU ring, shape (10,). imu_input.py:164 */
+/* Write a step to a row of the IMU ring, shape (10,). imu_input.py:188 */
 void fs_write_step(fs_real row[], const fs_delta_sample *sample);
 
 #endif

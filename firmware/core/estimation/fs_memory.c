@@ -10,7 +10,7 @@ void fs_start_memory(fs_estimator_memory *memory)
 {
     fs_estimator_memory *m = memory;
     const fs_estimator_params *params = &m->params;
-    m->sums[1] = FS_LIT(1.0);
+    m->sums.rotation[0] = FS_LIT(1.0);
     m->filter.clock[1] = params->imu_noise_share;
     m->earth[3] = FS_NAN;
 }

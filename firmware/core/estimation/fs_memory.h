@@ -5,6 +5,7 @@
 
 #include "fs_alignment.h"
 #include "fs_estimator_params.h"
+#include "fs_imu_input.h"
 #include "fs_kalman.h"
 #include "fs_rate_filter.h"
 #include "fs_rings.h"
@@ -102,7 +103,7 @@ typedef struct {
     fs_real pending[10];
     fs_filter filter;
     fs_estimator_params params;
-    fs_real sums[64];
+    fs_imu_sums sums;
     fs_mean means[5];
     fs_checks checks;
     fs_alignment alignment;

@@ -8,6 +8,7 @@
 
 #include "fs_alignment.h"
 #include "fs_estimator_params.h"
+#include "fs_imu_input.h"
 #include "fs_kalman.h"
 #include "fs_memory.h"
 #include "fs_rate_filter.h"

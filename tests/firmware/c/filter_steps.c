@@ -160,7 +160,7 @@ void filter_steps_costs(filter_steps *s, uint32_t costs[FILTER_PARTS])
     static const fs_vector3 still = {FS_LIT(0.001), FS_LIT(0.002), FS_LIT(0.003)};
     static const fs_vector3 force = {FS_LIT(0.1), FS_LIT(0.2), FS_LIT(-0.4)};
     static fs_real gnss[10];
-    const fs_imu_noise noise = fs_noise_of(m->sums);
+    const fs_imu_noise noise = fs_noise_of(&m->sums);
     static fs_delta_sample step;
     fs_motion motion;
     fs_nominal nominal;
