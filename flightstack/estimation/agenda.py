@@ -42,10 +42,11 @@ from flightstack.estimation.rings import (
     RANGE_RING,
     RANGE_ROWS,
     Rings,
+    count_of,
     is_due,
+    oldest_slot,
     pop,
     read_row,
-    slot_of,
 )
 from flightstack.estimation.source_checks import add_fault_noise
 from flightstack.estimation.yaw_sources import predict_yaw, take_earth_field, take_field, take_velocity
@@ -130,10 +131,10 @@ def take_field_at_rest(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorPa
 def _begin(m: MemoryRecord, f: Filter, r: Rings, horizon_s: float, params: EstimatorParams) -> bool:
     """Predict a step that is not later than the horizon; return False if there is none."""
     agenda = m["agenda"]
-    if r.cursors[IMU_RING, 1] == 0:
+    if count_of(r, IMU_RING) == 0:
         return False
-    slot = slot_of(r, IMU_RING, IMU_ROWS, 0)
-    if r.imu[slot, 0] > horizon_s:
+    slot = oldest_slot(r, IMU_RING)
+    if r.imu[slot]["time_s"] > horizon_s:
         return False
     step = read_step(r.imu[slot])
     predict_yaw(m, f, step)
@@ -155,17 +156,17 @@ def _is_covariance_due(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorPa
     if f.behind[0] > _BEHIND_S or is_asked or params.drag_is_fused > 0.0 or not is_velocity_measured(f):
         return True
     return (
-        is_due(r, MAG_RING, r.mag[slot_of(r, MAG_RING, MAG_ROWS, 0), 0], now_s)
-        or is_due(r, BARO_RING, r.baro[slot_of(r, BARO_RING, BARO_ROWS, 0), 0], now_s)
-        or is_due(r, RANGE_RING, r.range[slot_of(r, RANGE_RING, RANGE_ROWS, 0), 0], now_s)
-        or is_due(r, GNSS_RING, r.gnss[slot_of(r, GNSS_RING, GNSS_ROWS, 0), 0], now_s)
+        is_due(r, MAG_RING, r.mag[oldest_slot(r, MAG_RING)], now_s)
+        or is_due(r, BARO_RING, r.baro[oldest_slot(r, BARO_RING)], now_s)
+        or is_due(r, RANGE_RING, r.range[oldest_slot(r, RANGE_RING)], now_s)
+        or is_due(r, GNSS_RING, r.gnss[oldest_slot(r, GNSS_RING)], now_s)
     )
 
 
 @compiled
 def _finish(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorParams) -> None:
     """Move the output as the filter has moved, and close the step."""
-    agenda, dt_s = m["agenda"], r.imu[slot_of(r, IMU_RING, IMU_ROWS, 0), 1]
+    agenda, dt_s = m["agenda"], r.imu[oldest_slot(r, IMU_RING)]["dt_s"]
     is_reset = count_of_resets(m) != m["followed"]  # between two steps, by the Earth's field
     share = 1.0 if is_reset or params.output_s <= dt_s else dt_s / params.output_s
     if is_reset or agenda["has_fused"] == 1 or share < 1.0:  # else the output has moved as the filter has
@@ -223,22 +224,16 @@ def _measured(m: MemoryRecord, f: Filter, r: Rings, source: int, axis: int, para
 def _take_row(m: MemoryRecord, f: Filter, r: Rings, source: int) -> bool:
     """Move the oldest row of a source that is due to ``pending``; drop those that are too late."""
     now_s, row = f.clock[0], m["pending"]
-    late_s = _LATE_S if r.imu[slot_of(r, IMU_RING, IMU_ROWS, 0), 1] < _GAP_S else _GAP_LATE_S
+    late_s = _LATE_S if r.imu[oldest_slot(r, IMU_RING)]["dt_s"] < _GAP_S else _GAP_LATE_S
     for _ in range(MAG_ROWS):
         if source == MAG_SOURCE:
-            found = _next_row(r, MAG_RING, MAG_ROWS, r.mag[slot_of(r, MAG_RING, MAG_ROWS, 0)], now_s, row)
+            found = _next_row(r, MAG_RING, MAG_ROWS, r.mag[oldest_slot(r, MAG_RING)], now_s, row)
         elif source == BARO_SOURCE:
-            found = _next_row(
-                r, BARO_RING, BARO_ROWS, r.baro[slot_of(r, BARO_RING, BARO_ROWS, 0)], now_s, row
-            )
+            found = _next_row(r, BARO_RING, BARO_ROWS, r.baro[oldest_slot(r, BARO_RING)], now_s, row)
         elif source == RANGE_SOURCE:
-            found = _next_row(
-                r, RANGE_RING, RANGE_ROWS, r.range[slot_of(r, RANGE_RING, RANGE_ROWS, 0)], now_s, row
-            )
+            found = _next_row(r, RANGE_RING, RANGE_ROWS, r.range[oldest_slot(r, RANGE_RING)], now_s, row)
         else:
-            found = _next_row(
-                r, GNSS_RING, GNSS_ROWS, r.gnss[slot_of(r, GNSS_RING, GNSS_ROWS, 0)], now_s, row
-            )
+            found = _next_row(r, GNSS_RING, GNSS_ROWS, r.gnss[oldest_slot(r, GNSS_RING)], now_s, row)
         if not found:
             return False
         if row[0] > now_s - late_s:
@@ -249,7 +244,7 @@ def _take_row(m: MemoryRecord, f: Filter, r: Rings, source: int) -> bool:
 @compiled
 def _next_row(r: Rings, ring: int, size: int, oldest: FloatArray, now_s: float, row: FloatArray) -> bool:
     """Move the oldest row of a ring to ``row``; return False if none is due."""
-    if not is_due(r, ring, oldest[0], now_s):
+    if not is_due(r, ring, oldest, now_s):
         return False
     read_row(oldest, row)
     pop(r, ring, size)
@@ -295,6 +290,6 @@ def _drag(m: MemoryRecord, f: Filter, r: Rings, axis: int, params: EstimatorPara
         if params.drag_is_fused == 0.0 or m["flags"]["landed"] == 1 or waits or not is_velocity_measured(f):
             return NOTHING
         m["drag_s"] = f.clock[0]
-    step = read_step(r.imu[slot_of(r, IMU_RING, IMU_ROWS, 0)])
+    step = read_step(r.imu[oldest_slot(r, IMU_RING)])
     fuse_drag(f, axis, scaled(step.velocity_m_s, 1.0 / step.dt_s), params)
     return 1 - axis

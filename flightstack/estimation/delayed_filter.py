@@ -42,9 +42,10 @@ from flightstack.estimation.rings import (
     RANGE_RING,
     RANGE_ROWS,
     Rings,
+    count_of,
     newest_fix_time,
+    oldest_slot,
     push,
-    slot_of,
     take_mean,
     write_row,
 )
@@ -130,7 +131,7 @@ def imu_kernel(memory: MemoryArray, sample: FloatArray) -> None:
     if sums["elapsed_s"] >= params.period_s - 0.25 * dt_s:
         step = take_step(sums, time_s)
         for _ in range(MOST_PARTS):
-            if r.cursors[IMU_RING, 1] < IMU_ROWS:
+            if count_of(r, IMU_RING) < IMU_ROWS:
                 break
             work(m, f, r, time_s, params)  # move early, so that the filter integrates every step
         slot = push(r, IMU_RING, IMU_ROWS)
@@ -145,8 +146,8 @@ def imu_kernel(memory: MemoryArray, sample: FloatArray) -> None:
 @compiled
 def _is_behind(r: Rings, horizon_s: float) -> bool:
     """Return True if the filter is so far behind the horizon that a sample does more than a part of its work."""
-    oldest_s: float = r.imu[slot_of(r, IMU_RING, IMU_ROWS, 0), 0]
-    return r.cursors[IMU_RING, 1] > 0 and oldest_s < horizon_s - _BACKLOG_S
+    oldest_s: float = r.imu[oldest_slot(r, IMU_RING)]["time_s"]
+    return count_of(r, IMU_RING) > 0 and oldest_s < horizon_s - _BACKLOG_S
 
 
 @compiled
@@ -201,7 +202,7 @@ def _collect(m: MemoryRecord, accel: Vector3, time_s: float, dt_s: float, params
     write_motion(m["output"], time_s, motion_of(read_nominal(f.nominal)))
     m["flags"]["aligned"] = 1
     for ring in range(MAG_RING, IMU_RING):
-        m["cursors"][ring, 1] = 0  # older than the state; the fields are in its yaw
+        m["cursors"][ring]["rows"] = 0  # older than the state; the fields are in its yaw
     if m["alignment"]["fields"] > 0.0:
         m["flags"]["has_mag"], m["flags"]["has_yaw"] = 1, 1
         for i in range(3):

@@ -17,6 +17,7 @@ from flightstack.core.geometry import (
 from flightstack.estimation.error_state import read_vector, scaled, write_vector
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.prediction import DeltaSample, ImuNoise
+from flightstack.estimation.rings import StepRecord
 
 _SMOOTHING_S = 0.1
 _NOISE_SMOOTHING_S = 2.0
@@ -185,22 +186,22 @@ def take_step(sums: ImuSumsRecord, time_s: float) -> DeltaSample:
 
 
 @compiled
-def write_step(row: FloatArray, sample: DeltaSample) -> None:
-    """Write a step to a row of the IMU ring, shape (10,)."""
-    row[0], row[1] = sample.time_s, sample.dt_s
-    write_vector(row, 2, sample.angle_rad)
-    write_vector(row, 5, sample.velocity_m_s)
-    row[8], row[9] = sample.unknown_angle, sample.unknown_velocity
+def write_step(row: StepRecord, sample: DeltaSample) -> None:
+    """Write a step to a row of the IMU ring."""
+    row["time_s"], row["dt_s"] = sample.time_s, sample.dt_s
+    write_vector(row["angle_rad"], 0, sample.angle_rad)
+    write_vector(row["velocity_m_s"], 0, sample.velocity_m_s)
+    row["unknown_angle"], row["unknown_velocity"] = sample.unknown_angle, sample.unknown_velocity
 
 
 @compiled
-def read_step(row: FloatArray) -> DeltaSample:
+def read_step(row: StepRecord) -> DeltaSample:
     """Read a step from a row of the IMU ring."""
     return DeltaSample(
-        row[0],
-        row[1],
-        read_vector(row, 2),
-        read_vector(row, 5),
-        row[8],
-        row[9],
+        row["time_s"],
+        row["dt_s"],
+        read_vector(row["angle_rad"], 0),
+        read_vector(row["velocity_m_s"], 0),
+        row["unknown_angle"],
+        row["unknown_velocity"],
     )

@@ -7,7 +7,7 @@ from flightstack.core.contract import FloatArray, Quaternion, Vector3
 from flightstack.core.geometry import conjugate, quaternion_product, rotate, rotation_over, rotation_vector
 from flightstack.estimation.error_state import read_vector, write_vector
 from flightstack.estimation.prediction import Motion
-from flightstack.estimation.rings import IMU_RING, IMU_ROWS, Rings, slot_of
+from flightstack.estimation.rings import IMU_RING, IMU_ROWS, Rings, count_of, oldest_slot, slot_of
 
 
 @compiled
@@ -54,7 +54,7 @@ def follow(rings: Rings, output: FloatArray, target: Motion, share: float, gravi
     ``target`` is the filter's state at the time of that row. Times after it are corrected for the effect of the
     difference until then.
     """
-    oldest = rings.track[slot_of(rings, IMU_RING, IMU_ROWS, 0)]
+    oldest = rings.track[oldest_slot(rings, IMU_RING)]
     start, start_s = read_motion(oldest), oldest[0]
     turn = rotation_vector(quaternion_product(target.attitude, conjugate(start.attitude)))
     correction = rotation_over(turn, share)
@@ -64,7 +64,7 @@ def follow(rings: Rings, output: FloatArray, target: Motion, share: float, gravi
         _between(start.position_ned_m, target.position_ned_m, share),
     )
     for number in range(IMU_ROWS):
-        if number >= rings.cursors[IMU_RING, 1]:
+        if number >= count_of(rings, IMU_RING):
             break
         row = rings.track[slot_of(rings, IMU_RING, IMU_ROWS, number)]
         _replayed(row, correction, start, after, gravity, start_s)

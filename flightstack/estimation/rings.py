@@ -5,33 +5,51 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple, TypeAlias
 
-import numpy as np
-
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray, Record
+from flightstack.core.contract import FloatArray, Record, RecordArray
 
 GNSS_ROWS, MAG_ROWS, BARO_ROWS, RANGE_ROWS, IMU_ROWS = 8, 32, 32, 32, 64
 GNSS_RING, MAG_RING, BARO_RING, RANGE_RING, IMU_RING, RINGS = 0, 1, 2, 3, 4, 5
-IMU_COLUMNS, TRACK_COLUMNS = 10, 11
+TRACK_COLUMNS = 11
 _MOST_VALUES = 4
 _ROUNDING_S = 2.5e-4
 """Means of samples end at the time of a step: the rounding of a float32 must not decide in which step they count."""
 
-Cursors: TypeAlias = "Annotated[np.ndarray[tuple[int, int], np.dtype[np.int64]], RINGS, 2]"
-"""For each ring the slot of its oldest row, and the number of its rows."""
+
+class Cursor(NamedTuple):
+    """Rows of a ring that are in use."""
+
+    oldest: int
+    """Slot of the oldest row."""
+    rows: int
+    """Number of rows from it on."""
+
+
+class StepRow(NamedTuple):
+    """A ``DeltaSample``."""
+
+    time_s: float
+    dt_s: float
+    angle_rad: Annotated[FloatArray, 3]
+    velocity_m_s: Annotated[FloatArray, 3]
+    unknown_angle: float
+    unknown_velocity: float
+
+
+StepRecord: TypeAlias = Annotated[Record, StepRow]
 
 
 class Rings(NamedTuple):
-    """Measurements in the order of their arrival; the first column of each row is the time."""
+    """Measurements in the order of their arrival; the first column of each row of floats is the time."""
 
     gnss: Annotated[FloatArray, GNSS_ROWS, 10]
     mag: Annotated[FloatArray, MAG_ROWS, 4]
     baro: Annotated[FloatArray, BARO_ROWS, 2]
     range: Annotated[FloatArray, RANGE_ROWS, 2]
-    imu: Annotated[FloatArray, IMU_ROWS, IMU_COLUMNS]
+    imu: Annotated[RecordArray, StepRow, IMU_ROWS]
     track: Annotated[FloatArray, IMU_ROWS, TRACK_COLUMNS]
     """The output at the time of each row of ``imu``: time, attitude, velocity, position."""
-    cursors: Cursors
+    cursors: Annotated[RecordArray, Cursor, RINGS]
 
 
 class Mean(NamedTuple):
@@ -51,41 +69,47 @@ class Mean(NamedTuple):
 @compiled
 def slot_of(rings: Rings, ring: int, size: int, number: int) -> int:
     """Return the slot of row ``number``, counted from the oldest."""
-    slot: int = rings.cursors[ring, 0] + number
+    slot: int = rings.cursors[ring]["oldest"] + number
     return slot - size if slot >= size else slot
 
 
 @compiled
-def count_of_measurements(rings: Rings) -> int:
-    """Return the number of rows that wait in all rings but that of the IMU."""
-    total: int = 0
-    for ring in range(IMU_RING):
-        total += rings.cursors[ring, 1]
-    return total
+def oldest_slot(rings: Rings, ring: int) -> int:
+    """Return the slot of the oldest row."""
+    slot: int = rings.cursors[ring]["oldest"]
+    return slot
 
 
 @compiled
-def is_due(rings: Rings, ring: int, row_s: float, now_s: float) -> bool:
-    """Return True if the ring has rows and its oldest one, measured at ``row_s``, is not in the future."""
-    count: int = rings.cursors[ring, 1]
-    return count > 0 and row_s <= now_s + _ROUNDING_S
+def count_of(rings: Rings, ring: int) -> int:
+    """Return the number of rows that wait."""
+    count: int = rings.cursors[ring]["rows"]
+    return count
+
+
+@compiled
+def is_due(rings: Rings, ring: int, oldest: FloatArray, now_s: float) -> bool:
+    """Return True if the ring has rows and ``oldest``, its oldest one, was not measured in the future."""
+    return count_of(rings, ring) > 0 and oldest[0] <= now_s + _ROUNDING_S
 
 
 @compiled
 def push(rings: Rings, ring: int, size: int) -> int:
     """Return the slot for a new row; the oldest row of a full ring is dropped."""
-    if rings.cursors[ring, 1] >= size:
+    cursor = rings.cursors[ring]
+    if cursor["rows"] >= size:
         pop(rings, ring, size)
-    slot = slot_of(rings, ring, size, rings.cursors[ring, 1])
-    rings.cursors[ring, 1] += 1
+    slot = slot_of(rings, ring, size, cursor["rows"])
+    cursor["rows"] += 1
     return slot
 
 
 @compiled
 def pop(rings: Rings, ring: int, size: int) -> None:
     """Remove the oldest row."""
-    rings.cursors[ring, 0] = slot_of(rings, ring, size, 1)
-    rings.cursors[ring, 1] -= 1
+    cursor = rings.cursors[ring]
+    cursor["oldest"] = slot_of(rings, ring, size, 1)
+    cursor["rows"] -= 1
 
 
 @compiled
@@ -111,7 +135,7 @@ def take_mean(mean: Annotated[Record, Mean], row: FloatArray, period_s: float) -
 @compiled
 def newest_fix_time(rings: Rings) -> float:
     """Return the time of the newest row of GNSS, or minus infinity."""
-    count: int = rings.cursors[GNSS_RING, 1]
+    count = count_of(rings, GNSS_RING)
     if count == 0:
         return -math.inf
     newest_s: float = rings.gnss[slot_of(rings, GNSS_RING, GNSS_ROWS, count - 1), 0]

@@ -20,17 +20,12 @@
 
 #define FS_IDLE 0
 #define FS_IMU_RING 4
-#define FS_IMU_ROWS 64
 #define FS_REST_PERIOD_S FS_LIT(0.1)
 #define FS_BEHIND_S FS_LIT(0.035)
 #define FS_MAG_RING 1
-#define FS_MAG_ROWS 32
 #define FS_BARO_RING 2
-#define FS_BARO_ROWS 32
 #define FS_RANGE_RING 3
-#define FS_RANGE_ROWS 32
 #define FS_GNSS_RING 0
-#define FS_GNSS_ROWS 8
 #define FS_EARTH_SOURCE 1
 #define FS_SOURCES 9
 #define FS_REST_SOURCE 2
@@ -45,13 +40,18 @@
 #define FS_LATE_S FS_LIT(0.3)
 #define FS_GAP_LATE_S FS_LIT(0.02)
 #define FS_MAG_SOURCE 4
+#define FS_MAG_ROWS 32
 #define FS_BARO_SOURCE 5
+#define FS_BARO_ROWS 32
 #define FS_RANGE_SOURCE 6
+#define FS_RANGE_ROWS 32
+#define FS_GNSS_ROWS 8
 #define FS_YAW_STAGE 6
+#define FS_IMU_ROWS 64
 
 /*
  * Return True if a measurement may be fused in the step at hand, or the covariance is behind by the most.
- * agenda.py:150
+ * agenda.py:151
  */
 static bool is_covariance_due(const fs_estimator_memory *m, const fs_filter *f, const fs_rings *r,
                               const fs_estimator_params *params)
@@ -63,25 +63,25 @@ static bool is_covariance_due(const fs_estimator_memory *m, const fs_filter *f, 
         !fs_is_velocity_measured(f)) {
         return true;
     }
-    return fs_is_due(r, FS_MAG_RING, r->mag[fs_slot_of(r, FS_MAG_RING, FS_MAG_ROWS, 0)][0], now_s) ||
-           fs_is_due(r, FS_BARO_RING, r->baro[fs_slot_of(r, FS_BARO_RING, FS_BARO_ROWS, 0)][0], now_s) ||
-           fs_is_due(r, FS_RANGE_RING, r->range[fs_slot_of(r, FS_RANGE_RING, FS_RANGE_ROWS, 0)][0], now_s) ||
-           fs_is_due(r, FS_GNSS_RING, r->gnss[fs_slot_of(r, FS_GNSS_RING, FS_GNSS_ROWS, 0)][0], now_s);
+    return fs_is_due(r, FS_MAG_RING, r->mag[fs_oldest_slot(r, FS_MAG_RING)], now_s) ||
+           fs_is_due(r, FS_BARO_RING, r->baro[fs_oldest_slot(r, FS_BARO_RING)], now_s) ||
+           fs_is_due(r, FS_RANGE_RING, r->range[fs_oldest_slot(r, FS_RANGE_RING)], now_s) ||
+           fs_is_due(r, FS_GNSS_RING, r->gnss[fs_oldest_slot(r, FS_GNSS_RING)], now_s);
 }
 
-/* Predict a step that is not later than the horizon; return False if there is none. agenda.py:130 */
+/* Predict a step that is not later than the horizon; return False if there is none. agenda.py:131 */
 static bool begin(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, fs_real horizon_s,
                   const fs_estimator_params *params)
 {
     fs_agenda *agenda = &m->agenda;
-    if (r->cursors[FS_IMU_RING][1] == 0) {
+    if (fs_count_of(r, FS_IMU_RING) == 0) {
         return false;
     }
-    const int32_t slot = fs_slot_of(r, FS_IMU_RING, FS_IMU_ROWS, 0);
-    if (r->imu[slot][0] > horizon_s) {
+    const int32_t slot = fs_oldest_slot(r, FS_IMU_RING);
+    if (r->imu[slot].time_s > horizon_s) {
         return false;
     }
-    const fs_delta_sample step = fs_read_step(r->imu[slot]);
+    const fs_delta_sample step = fs_read_step(&r->imu[slot]);
     fs_predict_yaw(m, f, &step);
     fs_predict(f, &step, params);
     if (is_covariance_due(m, f, r, params)) {
@@ -96,7 +96,7 @@ static bool begin(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, fs_re
     return true;
 }
 
-/* Return True if the vehicle is on the ground and nothing moves it. agenda.py:260 */
+/* Return True if the vehicle is on the ground and nothing moves it. agenda.py:255 */
 static bool stands(const fs_estimator_memory *m, const fs_estimator_params *params)
 {
     if (m->flags.landed == 0) {
@@ -110,7 +110,7 @@ static bool stands(const fs_estimator_memory *m, const fs_estimator_params *para
     return fs_abs(off) < FS_STILL_FORCE_M_S2 && largest < FS_STILL_RATE_RAD_S;
 }
 
-/* Fuse rest ten times a second: three axes of the velocity, three of the rate. agenda.py:272 */
+/* Fuse rest ten times a second: three axes of the velocity, three of the rate. agenda.py:267 */
 static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t stage,
                     const fs_estimator_params *params)
 {
@@ -137,7 +137,7 @@ static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int
     return axis < 5 ? axis + 1 : 0;
 }
 
-/* Fuse drag in flight while the velocity over ground is measured, twenty times a second. agenda.py:291 */
+/* Fuse drag in flight while the velocity over ground is measured, twenty times a second. agenda.py:286 */
 static int32_t drag(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t axis,
                     const fs_estimator_params *params)
 {
@@ -148,17 +148,17 @@ static int32_t drag(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int
         }
         m->drag_s = f->clock[0];
     }
-    const fs_delta_sample step = fs_read_step(r->imu[fs_slot_of(r, FS_IMU_RING, FS_IMU_ROWS, 0)]);
+    const fs_delta_sample step = fs_read_step(&r->imu[fs_oldest_slot(r, FS_IMU_RING)]);
     const fs_vector3 scaled = fs_scaled(&step.velocity_m_s, FS_LIT(1.0) / step.dt_s);
     fs_fuse_drag(f, axis, &scaled, params);
     return 1 - axis;
 }
 
-/* Move the oldest row of a ring to row; return False if none is due. agenda.py:250 */
+/* Move the oldest row of a ring to row; return False if none is due. agenda.py:245 */
 static bool next_row(fs_rings *r, int32_t ring, int32_t size, const fs_real oldest[], int32_t oldest_size,
                      fs_real now_s, fs_real row[])
 {
-    if (!fs_is_due(r, ring, oldest[0], now_s)) {
+    if (!fs_is_due(r, ring, oldest, now_s)) {
         return false;
     }
     fs_read_row(oldest, oldest_size, row);
@@ -166,28 +166,27 @@ static bool next_row(fs_rings *r, int32_t ring, int32_t size, const fs_real olde
     return true;
 }
 
-/* Move the oldest row of a source that is due to pending; drop those that are too late. agenda.py:223 */
+/* Move the oldest row of a source that is due to pending; drop those that are too late. agenda.py:224 */
 static bool take_row(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, int32_t source)
 {
     const fs_real now_s = f->clock[0];
-    const fs_real late_s = r->imu[fs_slot_of(r, FS_IMU_RING, FS_IMU_ROWS, 0)][1] < FS_GAP_S ? FS_LATE_S :
-                           FS_GAP_LATE_S;
+    const fs_real late_s = r->imu[fs_oldest_slot(r, FS_IMU_RING)].dt_s < FS_GAP_S ? FS_LATE_S : FS_GAP_LATE_S;
     for (int32_t count = 0; count < 32; count++) {
         bool found;
         if (source == FS_MAG_SOURCE) {
-            found = next_row(r, FS_MAG_RING, FS_MAG_ROWS, r->mag[fs_slot_of(r, FS_MAG_RING, FS_MAG_ROWS, 0)], 4,
-                             now_s, m->pending);
+            found = next_row(r, FS_MAG_RING, FS_MAG_ROWS, r->mag[fs_oldest_slot(r, FS_MAG_RING)], 4, now_s,
+                             m->pending);
         } else {
             if (source == FS_BARO_SOURCE) {
-                found = next_row(r, FS_BARO_RING, FS_BARO_ROWS, r->baro[fs_slot_of(r, FS_BARO_RING, FS_BARO_ROWS, 0)],
-                                 2, now_s, m->pending);
+                found = next_row(r, FS_BARO_RING, FS_BARO_ROWS, r->baro[fs_oldest_slot(r, FS_BARO_RING)], 2, now_s,
+                                 m->pending);
             } else {
                 if (source == FS_RANGE_SOURCE) {
-                    found = next_row(r, FS_RANGE_RING, FS_RANGE_ROWS,
-                                     r->range[fs_slot_of(r, FS_RANGE_RING, FS_RANGE_ROWS, 0)], 2, now_s, m->pending);
+                    found = next_row(r, FS_RANGE_RING, FS_RANGE_ROWS, r->range[fs_oldest_slot(r, FS_RANGE_RING)], 2,
+                                     now_s, m->pending);
                 } else {
-                    found = next_row(r, FS_GNSS_RING, FS_GNSS_ROWS,
-                                     r->gnss[fs_slot_of(r, FS_GNSS_RING, FS_GNSS_ROWS, 0)], 10, now_s, m->pending);
+                    found = next_row(r, FS_GNSS_RING, FS_GNSS_ROWS, r->gnss[fs_oldest_slot(r, FS_GNSS_RING)], 10,
+                                     now_s, m->pending);
                 }
             }
         }
@@ -201,7 +200,7 @@ static bool take_row(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, in
     return false;
 }
 
-/* Fuse the next scalar of a sensor whose rows wait. agenda.py:202 */
+/* Fuse the next scalar of a sensor whose rows wait. agenda.py:203 */
 static int32_t measured(fs_estimator_memory *m, fs_filter *f, fs_rings *r, int32_t source, int32_t axis,
                         const fs_estimator_params *params)
 {
@@ -231,7 +230,7 @@ static int32_t measured(fs_estimator_memory *m, fs_filter *f, fs_rings *r, int32
     return following;
 }
 
-/* Fuse the next scalar of the source at hand. agenda.py:185 */
+/* Fuse the next scalar of the source at hand. agenda.py:186 */
 static int32_t part(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_estimator_params *params)
 {
     const int32_t source = m->agenda.source;
@@ -254,7 +253,7 @@ static int32_t part(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_
     return measured(m, f, r, source, axis, params);
 }
 
-/* Move the output by a share of its difference to the filter. agenda.py:178 */
+/* Move the output by a share of its difference to the filter. agenda.py:179 */
 static void move_output(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, fs_real share,
                         const fs_estimator_params *params)
 {
@@ -264,11 +263,11 @@ static void move_output(fs_estimator_memory *m, const fs_filter *f, fs_rings *r,
     fs_follow(r, m->output, &motion_of, share, params->gravity_m_s2);
 }
 
-/* Move the output as the filter has moved, and close the step. agenda.py:166 */
+/* Move the output as the filter has moved, and close the step. agenda.py:167 */
 static void finish(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, const fs_estimator_params *params)
 {
     fs_agenda *agenda = &m->agenda;
-    const fs_real dt_s = r->imu[fs_slot_of(r, FS_IMU_RING, FS_IMU_ROWS, 0)][1];
+    const fs_real dt_s = r->imu[fs_oldest_slot(r, FS_IMU_RING)].dt_s;
     const bool is_reset = fs_count_of_resets(m) != m->followed; /* between two steps, by the Earth's field */
     const fs_real share = is_reset || params->output_s <= dt_s ? FS_LIT(1.0) : dt_s / params->output_s;
     if (is_reset || agenda->has_fused == 1 || share < FS_LIT(1.0)) { /* else the output has moved as the filter has */
@@ -278,7 +277,7 @@ static void finish(fs_estimator_memory *m, const fs_filter *f, fs_rings *r, cons
     agenda->source = FS_IDLE;
 }
 
-/* agenda.py:91 */
+/* agenda.py:92 */
 bool fs_work(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_s, const fs_estimator_params *params)
 {
     fs_agenda *agenda = &m->agenda;
@@ -306,7 +305,7 @@ bool fs_work(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_
     return true;
 }
 
-/* agenda.py:115 */
+/* agenda.py:116 */
 void fs_take_field_at_rest(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_estimator_params *params)
 {
     for (int32_t count = 0; count < 256; count++) {

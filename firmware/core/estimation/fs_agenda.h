@@ -22,13 +22,13 @@
  *
  * A part is one scalar, with the prediction if that is due, or the end of a step.
  *
- * agenda.py:91
+ * agenda.py:92
  */
 bool fs_work(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_s, const fs_estimator_params *params);
 
 /*
  * Correct the filter with the Earth's field now, after the open step: a vehicle that is ready may arm next.
- * agenda.py:115
+ * agenda.py:116
  */
 void fs_take_field_at_rest(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_estimator_params *params);
 

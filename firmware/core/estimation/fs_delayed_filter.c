@@ -32,7 +32,7 @@
 #define FS_IMU_ROWS 64
 #define FS_BACKLOG_S FS_LIT(0.03)
 
-/* delayed_filter.py:62 */
+/* delayed_filter.py:63 */
 void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], int32_t row_size)
 {
     for (int32_t i = 0; i < row_size; i++) {
@@ -76,7 +76,7 @@ void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], in
 
 /*
  * Return the time that a sample has to cover: its own, or longer after a gap; zero for one that came too late.
- * delayed_filter.py:176
+ * delayed_filter.py:177
  */
 static fs_real real_step(fs_estimator_memory *m, fs_real time_s, fs_real dt_s)
 {
@@ -96,7 +96,7 @@ static fs_real real_step(fs_estimator_memory *m, fs_real time_s, fs_real dt_s)
     return covered_s;
 }
 
-/* Add a sample to the alignment; align when it is long enough. delayed_filter.py:193 */
+/* Add a sample to the alignment; align when it is long enough. delayed_filter.py:194 */
 static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real time_s, fs_real dt_s,
                     const fs_estimator_params *params)
 {
@@ -113,7 +113,7 @@ static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real tim
     fs_write_motion(m->output, time_s, &motion_of);
     m->flags.aligned = 1;
     for (int32_t ring = 1; ring < 4; ring++) {
-        m->rings.cursors[ring][1] = 0; /* older than the state; the fields are in its yaw */
+        m->rings.cursors[ring].rows = 0; /* older than the state; the fields are in its yaw */
     }
     if (m->alignment.fields > FS_LIT(0.0)) {
         m->flags.has_mag = 1;
@@ -126,15 +126,15 @@ static void collect(fs_estimator_memory *m, const fs_vector3 *accel, fs_real tim
 
 /*
  * Return True if the filter is so far behind the horizon that a sample does more than a part of its work.
- * delayed_filter.py:146
+ * delayed_filter.py:147
  */
 static bool is_behind(const fs_rings *r, fs_real horizon_s)
 {
-    const fs_real oldest_s = r->imu[fs_slot_of(r, FS_IMU_RING, FS_IMU_ROWS, 0)][0];
-    return r->cursors[FS_IMU_RING][1] > 0 && oldest_s < horizon_s - FS_BACKLOG_S;
+    const fs_real oldest_s = r->imu[fs_oldest_slot(r, FS_IMU_RING)].time_s;
+    return fs_count_of(r, FS_IMU_RING) > 0 && oldest_s < horizon_s - FS_BACKLOG_S;
 }
 
-/* Do a part of the filter's work, and all of it while it is behind horizon_s. delayed_filter.py:95 */
+/* Do a part of the filter's work, and all of it while it is behind horizon_s. delayed_filter.py:96 */
 static void work_up_to(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_s,
                        const fs_estimator_params *params)
 {
@@ -146,7 +146,7 @@ static void work_up_to(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_rea
     }
 }
 
-/* Write the output in the order of VehicleState. delayed_filter.py:153 */
+/* Write the output in the order of VehicleState. delayed_filter.py:154 */
 static void write_state(fs_estimator_memory *m, const fs_vector3 *rates)
 {
     for (int32_t i = 0; i < 3; i++) {
@@ -161,7 +161,7 @@ static void write_state(fs_estimator_memory *m, const fs_vector3 *rates)
     fs_write_vector(m->state, 10, rates);
 }
 
-/* delayed_filter.py:104 */
+/* delayed_filter.py:105 */
 void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
 {
     for (int32_t i = 0; i < 8; i++) {
@@ -200,13 +200,13 @@ void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
     if (sums->elapsed_s >= params->period_s - FS_LIT(0.25) * dt_s) {
         const fs_delta_sample step = fs_take_step(sums, time_s);
         for (int32_t count = 0; count < 256; count++) {
-            if (r->cursors[FS_IMU_RING][1] < FS_IMU_ROWS) {
+            if (fs_count_of(r, FS_IMU_RING) < FS_IMU_ROWS) {
                 break;
             }
             (void)fs_work(m, f, r, time_s, params); /* move early, so that the filter integrates every step */
         }
         const int32_t slot = fs_push(r, FS_IMU_RING, FS_IMU_ROWS);
-        fs_write_step(r->imu[slot], &step);
+        fs_write_step(&r->imu[slot], &step);
         fs_write_row(r->track[slot], 11, m->output);
     }
     /* between two samples, so that rounding does not matter */
@@ -216,7 +216,7 @@ void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[])
     write_state(m, &less_bias);
 }
 
-/* delayed_filter.py:164 */
+/* delayed_filter.py:165 */
 void fs_field_kernel(fs_estimator_memory *memory)
 {
     fs_estimator_memory *m = memory;

@@ -23,7 +23,7 @@
  * A measurement that is not finite is dropped; only the accuracies of GNSS, behind its velocity, may be missing. row
  * may change.
  *
- * delayed_filter.py:62
+ * delayed_filter.py:63
  */
 void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], int32_t row_size);
 
@@ -33,13 +33,13 @@ void fs_push_kernel(fs_estimator_memory *memory, int32_t ring, fs_real row[], in
  * A sample that is not finite, or without a step in time, or not later than the last one, is dropped. Time without
  * samples is bridged by the next sample.
  *
- * delayed_filter.py:104
+ * delayed_filter.py:105
  */
 void fs_imu_kernel(fs_estimator_memory *memory, const fs_real sample[]);
 
 /*
  * Correct the filter with the Earth's field in earth: on the ground at once, in flight in its next step.
- * delayed_filter.py:164
+ * delayed_filter.py:165
  */
 void fs_field_kernel(fs_estimator_memory *memory);
 

@@ -19,7 +19,7 @@
 #define FS_NOISE_SMOOTHING_S FS_LIT(2.0)
 #define FS_DIFFERENCE_VARIANCE FS_LIT(70.0)
 
-/* imu_input.py:84 */
+/* imu_input.py:85 */
 void fs_note_gap(fs_imu_sums *sums, fs_real gap_s)
 {
     const fs_real angle_rad = FS_GAP_RATE_RAD_S * gap_s;
@@ -28,7 +28,7 @@ void fs_note_gap(fs_imu_sums *sums, fs_real gap_s)
     sums->unknown_velocity += speed_m_s * speed_m_s;
 }
 
-/* imu_input.py:101 */
+/* imu_input.py:102 */
 fs_vector3 fs_in_start_frame(const fs_vector3 *angle, const fs_vector3 *velocity)
 {
     const fs_vector3 turn = fs_cross(angle, velocity);
@@ -39,7 +39,7 @@ fs_vector3 fs_in_start_frame(const fs_vector3 *angle, const fs_vector3 *velocity
     };
 }
 
-/* imu_input.py:111 */
+/* imu_input.py:112 */
 static void smooth(fs_real mean[3], const fs_vector3 *value, fs_real share)
 {
     mean[0] += share * (value->x - mean[0]);
@@ -47,7 +47,7 @@ static void smooth(fs_real mean[3], const fs_vector3 *value, fs_real share)
     mean[2] += share * (value->z - mean[2]);
 }
 
-/* imu_input.py:66 */
+/* imu_input.py:67 */
 void fs_add_sample(fs_imu_sums *sums, const fs_vector3 *gyro, const fs_vector3 *accel, fs_real dt_s)
 {
     const fs_vector3 angle = fs_scaled(gyro, dt_s);
@@ -77,7 +77,7 @@ void fs_add_sample(fs_imu_sums *sums, const fs_vector3 *gyro, const fs_vector3 *
     sums->samples += FS_LIT(1.0);
 }
 
-/* imu_input.py:92 */
+/* imu_input.py:93 */
 void fs_note_clipping(fs_imu_sums *sums, const fs_vector3 *gyro, const fs_vector3 *accel,
                       const fs_estimator_params *params)
 {
@@ -95,7 +95,7 @@ void fs_note_clipping(fs_imu_sums *sums, const fs_vector3 *gyro, const fs_vector
  *
  * The vehicle's motion has little power there, and vibration, which averages out within that time, does not count.
  *
- * imu_input.py:118
+ * imu_input.py:119
  */
 static void measure_noise(fs_imu_sums *sums, fs_real sample_dt_s, const fs_vector3 *angle, const fs_vector3 *velocity)
 {
@@ -135,7 +135,7 @@ static void measure_noise(fs_imu_sums *sums, fs_real sample_dt_s, const fs_vecto
     sums->pairs += FS_LIT(1.0);
 }
 
-/* imu_input.py:166 */
+/* imu_input.py:167 */
 fs_delta_sample fs_take_step(fs_imu_sums *sums, fs_real time_s)
 {
     const fs_quaternion q_2 = {
@@ -168,44 +168,44 @@ fs_delta_sample fs_take_step(fs_imu_sums *sums, fs_real time_s)
     return sample;
 }
 
-/* imu_input.py:197 */
-fs_delta_sample fs_read_step(const fs_real row[])
+/* imu_input.py:198 */
+fs_delta_sample fs_read_step(const fs_step_row *row)
 {
     return (fs_delta_sample){
-        .time_s = row[0],
-        .dt_s = row[1],
-        .angle_rad = fs_read_vector(row, 2),
-        .velocity_m_s = fs_read_vector(row, 5),
-        .unknown_angle = row[8],
-        .unknown_velocity = row[9],
+        .time_s = row->time_s,
+        .dt_s = row->dt_s,
+        .angle_rad = fs_read_vector(row->angle_rad, 0),
+        .velocity_m_s = fs_read_vector(row->velocity_m_s, 0),
+        .unknown_angle = row->unknown_angle,
+        .unknown_velocity = row->unknown_velocity,
     };
 }
 
-/* imu_input.py:160 */
+/* imu_input.py:161 */
 fs_imu_noise fs_noise_of(const fs_imu_sums *sums)
 {
     return (fs_imu_noise){fs_read_vector(sums->noise, 0), fs_read_vector(sums->noise, 3)};
 }
 
-/* imu_input.py:148 */
+/* imu_input.py:149 */
 fs_vector3 fs_mean_rate(const fs_imu_sums *sums)
 {
     return fs_read_vector(sums->rate_rad_s, 0);
 }
 
-/* imu_input.py:154 */
+/* imu_input.py:155 */
 fs_vector3 fs_mean_force(const fs_imu_sums *sums)
 {
     return fs_read_vector(sums->force_m_s2, 0);
 }
 
-/* imu_input.py:188 */
-void fs_write_step(fs_real row[], const fs_delta_sample *sample)
+/* imu_input.py:189 */
+void fs_write_step(fs_step_row *row, const fs_delta_sample *sample)
 {
-    row[0] = sample->time_s;
-    row[1] = sample->dt_s;
-    fs_write_vector(row, 2, &sample->angle_rad);
-    fs_write_vector(row, 5, &sample->velocity_m_s);
-    row[8] = sample->unknown_angle;
-    row[9] = sample->unknown_velocity;
+    row->time_s = sample->time_s;
+    row->dt_s = sample->dt_s;
+    fs_write_vector(row->angle_rad, 0, &sample->angle_rad);
+    fs_write_vector(row->velocity_m_s, 0, &sample->velocity_m_s);
+    row->unknown_angle = sample->unknown_angle;
+    row->unknown_velocity = sample->unknown_velocity;
 }

@@ -87,7 +87,7 @@ static void replayed(fs_real row[], const fs_quaternion *correction, const fs_mo
 /* output_predictor.py:51 */
 void fs_follow(fs_rings *rings, fs_real output[], const fs_motion *target, fs_real share, fs_real gravity)
 {
-    fs_real *oldest = rings->track[fs_slot_of(rings, FS_IMU_RING, FS_IMU_ROWS, 0)];
+    fs_real *oldest = rings->track[fs_oldest_slot(rings, FS_IMU_RING)];
     const fs_motion start = fs_read_motion(oldest);
     const fs_real start_s = oldest[0];
     const fs_quaternion conjugate = fs_conjugate(&start.attitude);
@@ -100,7 +100,7 @@ void fs_follow(fs_rings *rings, fs_real output[], const fs_motion *target, fs_re
         .position_ned_m = between(&start.position_ned_m, &target->position_ned_m, share),
     };
     for (int32_t number = 0; number < 64; number++) {
-        if (number >= rings->cursors[FS_IMU_RING][1]) {
+        if (number >= fs_count_of(rings, FS_IMU_RING)) {
             break;
         }
         fs_real *row = rings->track[fs_slot_of(rings, FS_IMU_RING, FS_IMU_ROWS, number)];

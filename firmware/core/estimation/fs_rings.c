@@ -12,17 +12,24 @@
 #define FS_GNSS_ROWS 8
 #define FS_ROUNDING_S FS_LIT(0.00025)
 
-/* rings.py:52 */
+/* rings.py:84 */
+int32_t fs_count_of(const fs_rings *rings, int32_t ring)
+{
+    const int32_t count = rings->cursors[ring].rows;
+    return count;
+}
+
+/* rings.py:70 */
 int32_t fs_slot_of(const fs_rings *rings, int32_t ring, int32_t size, int32_t number)
 {
-    const int32_t slot = rings->cursors[ring][0] + number;
+    const int32_t slot = rings->cursors[ring].oldest + number;
     return slot >= size ? slot - size : slot;
 }
 
-/* rings.py:112 */
+/* rings.py:136 */
 fs_real fs_newest_fix_time(const fs_rings *rings)
 {
-    const int32_t count = rings->cursors[FS_GNSS_RING][1];
+    const int32_t count = fs_count_of(rings, FS_GNSS_RING);
     if (count == 0) {
         return -FS_INFINITY;
     }
@@ -30,25 +37,27 @@ fs_real fs_newest_fix_time(const fs_rings *rings)
     return newest_s;
 }
 
-/* rings.py:85 */
+/* rings.py:108 */
 void fs_pop(fs_rings *rings, int32_t ring, int32_t size)
 {
-    rings->cursors[ring][0] = fs_slot_of(rings, ring, size, 1);
-    rings->cursors[ring][1] -= 1;
+    fs_cursor *cursor = &rings->cursors[ring];
+    cursor->oldest = fs_slot_of(rings, ring, size, 1);
+    cursor->rows -= 1;
 }
 
-/* rings.py:75 */
+/* rings.py:97 */
 int32_t fs_push(fs_rings *rings, int32_t ring, int32_t size)
 {
-    if (rings->cursors[ring][1] >= size) {
+    fs_cursor *cursor = &rings->cursors[ring];
+    if (cursor->rows >= size) {
         fs_pop(rings, ring, size);
     }
-    const int32_t slot = fs_slot_of(rings, ring, size, rings->cursors[ring][1]);
-    rings->cursors[ring][1] += 1;
+    const int32_t slot = fs_slot_of(rings, ring, size, cursor->rows);
+    cursor->rows += 1;
     return slot;
 }
 
-/* rings.py:129 */
+/* rings.py:153 */
 void fs_write_row(fs_real row[], int32_t row_size, const fs_real values[])
 {
     for (int32_t column = 0; column < row_size; column++) {
@@ -56,7 +65,7 @@ void fs_write_row(fs_real row[], int32_t row_size, const fs_real values[])
     }
 }
 
-/* rings.py:92 */
+/* rings.py:116 */
 bool fs_take_mean(fs_mean *mean, fs_real row[], int32_t row_size, fs_real period_s)
 {
     if (row[0] - mean->last_s > period_s) { /* a gap: the older samples are outdated */
@@ -82,14 +91,20 @@ bool fs_take_mean(fs_mean *mean, fs_real row[], int32_t row_size, fs_real period
     return true;
 }
 
-/* rings.py:68 */
-bool fs_is_due(const fs_rings *rings, int32_t ring, fs_real row_s, fs_real now_s)
+/* rings.py:77 */
+int32_t fs_oldest_slot(const fs_rings *rings, int32_t ring)
 {
-    const int32_t count = rings->cursors[ring][1];
-    return count > 0 && row_s <= now_s + FS_ROUNDING_S;
+    const int32_t slot = rings->cursors[ring].oldest;
+    return slot;
 }
 
-/* rings.py:122 */
+/* rings.py:91 */
+bool fs_is_due(const fs_rings *rings, int32_t ring, const fs_real oldest[], fs_real now_s)
+{
+    return fs_count_of(rings, ring) > 0 && oldest[0] <= now_s + FS_ROUNDING_S;
+}
+
+/* rings.py:146 */
 void fs_read_row(const fs_real row[], int32_t row_size, fs_real values[])
 {
     for (int32_t column = 0; column < row_size; column++) {
