@@ -66,13 +66,13 @@ def _sensing(stack: Stack, simulator: Simulator) -> _Arguments:
     if sensors is None or stack.estimation is None:  # nothing happens on the true state
         return (
             np.zeros(1, MOTION), np.zeros(0, IMU), truth.state, truth.rotor_speed_rad_s, np.zeros((0, 0, 0)),
-            np.zeros((0, 0), np.float32), (np.zeros((0, 0)),), (np.zeros(0, np.int64),), (np.zeros(0, np.uint8),),
-            np.zeros(RECORD_SIZE),
+            np.zeros((0, 0), np.float32), (np.zeros(0, np.uint8),), ((np.zeros((0, 0)), np.zeros(0, np.int64)),),
+            (np.zeros(0, np.uint8),), np.zeros(RECORD_SIZE),
         )  # fmt: skip
     imus, tracks = sensors.imus, [lane.newest.imu_track for lane in stack.estimation.feed.lanes]
     return (
         imus.motion, imus.records, truth.state, truth.rotor_speed_rad_s, imus.noise, sensors.wires,
-        tuple(track.ring for track in tracks), tuple(track.counters for track in tracks),
+        tuple(_bytes(track.memory) for track in tracks), tuple((track.ring, track.taken) for track in tracks),
         tuple(_bytes(estimator.memory) for estimator in stack.estimation.estimators), np.zeros(RECORD_SIZE),
     )  # fmt: skip
 
@@ -130,7 +130,7 @@ class QuietBlock:
             track, record = self._estimation.feed.lanes[0].newest.imu_track, self._no_imu_log.rows[0]
             calls = calls._replace(
                 measure=address_of(measure_imu, *sensing[:6]),
-                take=address_of(take_wire, track.ring, track.counters, sensing[5][0], 0.0, 1, record),
+                take=address_of(take_wire, track.memory, sensing[5][0], 0.0, 1, record),
                 estimate=address_of(imu_kernel, self._estimation.estimators[0].memory, track.ring[0]),
             )
         return calls

@@ -62,13 +62,14 @@ def _sense(
     calls: Any, sensing: Any, time_us: int, interval_us: int, selected: int, record: FloatArray
 ) -> None:
     """Measure with the inertial sensors, and give each filter its sample; ``record`` takes that of the selected one."""
-    motion, imus, true_state, true_speeds, noise, wires, tracks, counters, filters, spare_record = sensing
+    motion, imus, true_state, true_speeds, noise, wires, tracks, rings, filters, spare_record = sensing
     call_kernel(calls.measure, (motion, imus, true_state, true_speeds, noise, wires))
     time_s = time_us * 1e-6
     for k in range(len(tracks)):
-        sample = tracks[k][counters[k][0] % len(tracks[k])]
+        rows, taken = rings[k]
+        sample = rows[taken[0] % len(rows)]
         kept = record if k == selected else spare_record
-        call_kernel(calls.take, (tracks[k], counters[k], wires[k], time_s, interval_us, kept))
+        call_kernel(calls.take, (tracks[k], wires[k], time_s, interval_us, kept))
         call_kernel(calls.estimate, (filters[k], sample))
 
 
@@ -139,7 +140,7 @@ def fly_quiet_ticks(
     The state of the first tick ``is_taken``, or the plant advances to it. The first outer tick is that after
     ``outer_in`` ticks. It stops when the result of the plant is larger than ``largest_result``, after a reset of the
     estimate, which it counts in ``resets``, and at an outer tick that is not nominal: their tick waits.
-    Records and frames are bytes. ``tracks``, ``counters`` and ``filters`` of ``sensing`` have an element for each
+    Records and frames are bytes. ``tracks``, ``rings`` and ``filters`` of ``sensing`` have an element for each
     inertial sensor; on the true state there are no ``imus``. ``slow`` and ``following`` are those of ``slow_kernel``.
     """
     rows, row_times, row_at = log
