@@ -32,7 +32,6 @@ AIDED_S = 1.0
 """Time after its last accepted measurement during which a sensor counts as fused."""
 DEAD_RECKONING_S = 5.0
 """Time without an accepted measurement until a position or velocity is invalid, PX4's EKF2_NOAID_TOUT."""
-_DELAY = EstimatorParams._fields.index("delay_s")
 _TILT_RAD, _YAW_RAD = math.radians(10.0), math.radians(15.0)
 """Deviations above which tilt and yaw are not aligned."""
 _WIND_VARIANCE = 0.5
@@ -174,7 +173,8 @@ def estimator_report(memory: Record, time_s: float, imu_has_failed: bool) -> Est
     """
     rows = [_observation(Observed(*row)) for row in memory["observations"].tolist()]
     variances = tuple(np.diagonal(memory["covariance"]).tolist())
-    now_s, flags = time_s - float(memory["params"][_DELAY]), Flags(*memory["flags"].tolist())
+    params, flags = EstimatorParams(*memory["params"].tolist()), Flags(*memory["flags"].tolist())
+    now_s = time_s - params.delay_s
     velocity, position = rows[GNSS_VELOCITY : GNSS_VELOCITY + 3], rows[GNSS_POSITION : GNSS_POSITION + 3]
     field, height = rows[MAG : MAG + 3], rows[BARO]
     range_finder = rows[RANGE] if flags.has_range else None

@@ -9,6 +9,7 @@ import numpy as np
 
 from flightstack.core.compiled import compiled, direct
 from flightstack.core.contract import FloatArray, Record, RecordArray
+from flightstack.core.record_types import dtype_of
 from flightstack.estimation.error_state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY
 from flightstack.estimation.kalman import (
     BARO,
@@ -77,10 +78,28 @@ NO_HEALTH = EstimateHealth(
     False, False, math.inf, False, math.inf, math.inf, False, math.inf, math.inf, 0.0, False, 0.0,
     math.inf, math.inf, math.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
 )  # fmt: skip
-_LAG, _SUMMARY_SIZE = 2, 12
-"""Columns of the summary: time without accepted positions and velocities, time of refused positions, and from ``_LAG``
-on the fields of ``EstimateHealth`` from ``lag_s`` on."""
-Summary: TypeAlias = Annotated[FloatArray, _SUMMARY_SIZE]
+
+
+class HealthSummary(NamedTuple):
+    """What the estimator's memory says of ``EstimateHealth``."""
+
+    unaided_s: float
+    refused_s: float
+    lag_s: float
+    horizontal_m: float
+    velocity_m_s: float
+    tilt_rad: float
+    gyro_bias_rad_s: float
+    accel_bias_m_s2: float
+    velocity_ratio: float
+    position_ratio: float
+    height_ratio: float
+    heading_ratio: float
+
+
+SUMMARY = dtype_of(HealthSummary)
+SummaryArray: TypeAlias = Annotated[RecordArray, HealthSummary]
+"""An array of one summary, shape (1,)."""
 
 
 @compiled
@@ -101,23 +120,23 @@ def _mean_ratio(mean: float, m: MemoryRecord, first: int, count: int) -> float:
 
 
 @compiled
-def health_kernel(memory: MemoryArray, summary: Summary) -> None:
-    """Write the summary of an estimator's record, shape (12,); it holds the mean ratios of the last call."""
-    m = memory[0]
+def health_kernel(memory: MemoryArray, summary: SummaryArray) -> None:
+    """Write the summary of an estimator's record; it holds the mean ratios of the last call."""
+    m, s = memory[0], summary[0]
     p, o, x = m["covariance"], m["observations"], m["nominal"]
     position_s = min(o[GNSS_POSITION]["fused_s"], o[GNSS_POSITION + 1]["fused_s"])
     velocity_s = min(o[GNSS_VELOCITY]["fused_s"], o[GNSS_VELOCITY + 1]["fused_s"])
-    summary[0] = m["clock"][0] - max(position_s, velocity_s)
-    summary[1] = max(m["refused_s"][3], m["refused_s"][4], m["refused_s"][5])
-    summary[2] = m["output"][0] - m["clock"][0]
-    summary[3] = math.sqrt(p[POSITION, POSITION] + p[POSITION + 1, POSITION + 1])
-    summary[4] = math.sqrt(p[VELOCITY, VELOCITY] + p[VELOCITY + 1, VELOCITY + 1])
-    summary[5] = math.sqrt(max(p[ATTITUDE, ATTITUDE], p[ATTITUDE + 1, ATTITUDE + 1]))
-    summary[6], summary[7] = _largest(x, GYRO_BIAS + 1, 3), _largest(x, ACCEL_BIAS + 1, 3)
-    summary[8] = _mean_ratio(summary[8], m, GNSS_VELOCITY, 3)
-    summary[9] = _mean_ratio(summary[9], m, GNSS_POSITION, 2)
-    summary[10] = _mean_ratio(summary[10], m, BARO, 1)
-    summary[11] = _mean_ratio(summary[11], m, MAG, 3)
+    s["unaided_s"] = m["clock"][0] - max(position_s, velocity_s)
+    s["refused_s"] = max(m["refused_s"][3], m["refused_s"][4], m["refused_s"][5])
+    s["lag_s"] = m["output"][0] - m["clock"][0]
+    s["horizontal_m"] = math.sqrt(p[POSITION, POSITION] + p[POSITION + 1, POSITION + 1])
+    s["velocity_m_s"] = math.sqrt(p[VELOCITY, VELOCITY] + p[VELOCITY + 1, VELOCITY + 1])
+    s["tilt_rad"] = math.sqrt(max(p[ATTITUDE, ATTITUDE], p[ATTITUDE + 1, ATTITUDE + 1]))
+    s["gyro_bias_rad_s"], s["accel_bias_m_s2"] = _largest(x, GYRO_BIAS + 1, 3), _largest(x, ACCEL_BIAS + 1, 3)
+    s["velocity_ratio"] = _mean_ratio(s["velocity_ratio"], m, GNSS_VELOCITY, 3)
+    s["position_ratio"] = _mean_ratio(s["position_ratio"], m, GNSS_POSITION, 2)
+    s["height_ratio"] = _mean_ratio(s["height_ratio"], m, BARO, 1)
+    s["heading_ratio"] = _mean_ratio(s["heading_ratio"], m, MAG, 3)
 
 
 class PressureTrack(NamedTuple):
@@ -183,7 +202,7 @@ class HealthMonitor:
         self._memory = memory
         self._flags: Record = memory["flags"][0]
         self._state: FloatArray = memory["state"][0]
-        self._summary = np.zeros(_SUMMARY_SIZE)
+        self._summary = np.zeros(1, SUMMARY)
         self._accuracy = Accuracy()
         self._pressure = PressureTrack()
         self._baro: BaroSample | None = None
@@ -194,9 +213,8 @@ class HealthMonitor:
     ) -> EstimateHealth:
         """Return the health at ``time_s``; ``limit_m`` is that of the horizontal deviation, -1 for none."""
         self._summarise(self._memory, self._summary)
-        summary = self._summary.tolist()
-        unaided_s, refused_s, _, horizontal_m = summary[: _LAG + 2]
-        self._accuracy = accuracy_step(self._accuracy, horizontal_m, limit_m, time_s)
+        summary = HealthSummary(*self._summary.tolist()[0])
+        self._accuracy = accuracy_step(self._accuracy, summary.horizontal_m, limit_m, time_s)
         fix_age_s, imu = _fix_age_s(samples, time_s), samples.imu
         return EstimateHealth(
             bool(self._flags["aligned"]),
@@ -207,10 +225,19 @@ class HealthMonitor:
             math.inf if samples.baro is None else time_s - samples.baro.time_s,
             self._baro_is_stuck(samples.baro, time_s),
             fix_age_s,
-            unaided_s if has_origin else math.inf,
-            refused_s if has_origin and fix_age_s < MISSING_FIX_S else 0.0,
+            summary.unaided_s if has_origin else math.inf,
+            summary.refused_s if has_origin and fix_age_s < MISSING_FIX_S else 0.0,
             self._accuracy.is_inaccurate,
-            *summary[_LAG:],  # type: ignore[arg-type]  # the fields from lag_s to heading_ratio
+            summary.lag_s,
+            summary.horizontal_m,
+            summary.velocity_m_s,
+            summary.tilt_rad,
+            summary.gyro_bias_rad_s,
+            summary.accel_bias_m_s2,
+            summary.velocity_ratio,
+            summary.position_ratio,
+            summary.height_ratio,
+            summary.heading_ratio,
         )
 
     def _baro_is_stuck(self, baro: BaroSample | None, time_s: float) -> bool:

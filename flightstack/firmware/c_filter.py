@@ -10,6 +10,7 @@ import numpy as np
 
 from flightstack.core.contract import FloatArray, RecordArray
 from flightstack.estimation.estimator_params import EstimatorParams
+from flightstack.estimation.health import SUMMARY, HealthSummary
 from flightstack.estimation.memory import MEMORY, EstimatorMemory
 from flightstack.firmware.generator.types import INT, Array, Table, has_arrays
 from flightstack.firmware.generator.types import Record as RecordType
@@ -76,11 +77,11 @@ class CFilter:
         """Take the Earth's field in the memory."""
         self._library.fs_field_kernel(self._place)
 
-    def health(self, summary: FloatArray) -> FloatArray:
-        """Return the summary of the health after ``summary``, shape (12,)."""
-        made = summary.astype(self._item)
+    def health(self, summary: RecordArray) -> RecordArray:
+        """Return the summary of the health, an array of ``SUMMARY``, after ``summary``."""
+        made = summary.astype(c_layout(HealthSummary, self._item))
         self._library.fs_health_kernel(self._place, made.ctypes.data_as(ctypes.c_void_p))
-        return made.astype(np.float64)
+        return made.astype(SUMMARY)
 
     def call(self, name: str, *numbers: float) -> float:
         """Return the result of a function of numbers, in double: ``exp``, ``log`` or ``atan2``."""

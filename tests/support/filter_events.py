@@ -16,7 +16,7 @@ from flightstack.core.portable_math import atan2, exp, log
 from flightstack.estimation import filter_core
 from flightstack.estimation.delayed_filter import field_kernel, imu_kernel, push_kernel
 from flightstack.estimation.estimator import Estimator
-from flightstack.estimation.health import health_kernel
+from flightstack.estimation.health import SUMMARY, health_kernel
 from flightstack.firmware.c_filter import CFilter
 from flightstack.testing import quiet_ticks
 
@@ -85,7 +85,7 @@ class InPython:
 
     def __init__(self) -> None:
         self.memory = Estimator().memory
-        self.summary = np.zeros(12)
+        self.summary = np.zeros(1, SUMMARY)
         self.numbers: list[float] = []
         """Results of functions."""
 
@@ -118,7 +118,7 @@ class InC:
 
     def __init__(self, real: str = "double") -> None:
         self.filter = CFilter(real=real)
-        self.summary = np.zeros(12)
+        self.summary = np.zeros(1, SUMMARY)
         self.numbers: list[float] = []
         """Results of functions."""
 

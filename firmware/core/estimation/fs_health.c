@@ -15,7 +15,7 @@
 #define FS_BARO 6
 #define FS_MAG 7
 
-/* health.py:87 */
+/* health.py:106 */
 static fs_real largest(const fs_real values[], int32_t first, int32_t count)
 {
     fs_real largest_ = FS_LIT(0.0);
@@ -25,7 +25,7 @@ static fs_real largest(const fs_real values[], int32_t first, int32_t count)
     return largest_;
 }
 
-/* Return a mean of test ratios after the newest one, the largest of count rows. health.py:95 */
+/* Return a mean of test ratios after the newest one, the largest of count rows. health.py:114 */
 static fs_real mean_ratio(fs_real mean, const fs_estimator_memory *m, int32_t first, int32_t count)
 {
     fs_real largest_ = FS_LIT(0.0);
@@ -35,27 +35,28 @@ static fs_real mean_ratio(fs_real mean, const fs_estimator_memory *m, int32_t fi
     return mean + FS_SMOOTHING * (fs_sqrt(largest_) - mean);
 }
 
-/* health.py:104 */
-void fs_health_kernel(const fs_estimator_memory *memory, fs_real summary[12])
+/* health.py:123 */
+void fs_health_kernel(const fs_estimator_memory *memory, fs_health_summary *summary)
 {
     const fs_estimator_memory *m = memory;
+    fs_health_summary *s = summary;
     const fs_real position_s = fs_min(m->filter.observations[FS_GNSS_POSITION].fused_s,
                                       m->filter.observations[FS_GNSS_POSITION + 1].fused_s);
     const fs_real velocity_s = fs_min(m->filter.observations[FS_GNSS_VELOCITY].fused_s,
                                       m->filter.observations[FS_GNSS_VELOCITY + 1].fused_s);
-    summary[0] = m->filter.clock[0] - fs_max(position_s, velocity_s);
-    summary[1] = fs_max(fs_max(m->refused_s[3], m->refused_s[4]), m->refused_s[5]);
-    summary[2] = m->output[0] - m->filter.clock[0];
-    summary[3] = fs_sqrt(m->filter.covariance[FS_POSITION][FS_POSITION] +
-                         m->filter.covariance[FS_POSITION + 1][FS_POSITION + 1]);
-    summary[4] = fs_sqrt(m->filter.covariance[FS_VELOCITY][FS_VELOCITY] +
-                         m->filter.covariance[FS_VELOCITY + 1][FS_VELOCITY + 1]);
-    summary[5] = fs_sqrt(fs_max(m->filter.covariance[FS_ATTITUDE][FS_ATTITUDE],
-                                m->filter.covariance[FS_ATTITUDE + 1][FS_ATTITUDE + 1]));
-    summary[6] = largest(m->filter.nominal, FS_GYRO_BIAS + 1, 3);
-    summary[7] = largest(m->filter.nominal, FS_ACCEL_BIAS + 1, 3);
-    summary[8] = mean_ratio(summary[8], m, FS_GNSS_VELOCITY, 3);
-    summary[9] = mean_ratio(summary[9], m, FS_GNSS_POSITION, 2);
-    summary[10] = mean_ratio(summary[10], m, FS_BARO, 1);
-    summary[11] = mean_ratio(summary[11], m, FS_MAG, 3);
+    s->unaided_s = m->filter.clock[0] - fs_max(position_s, velocity_s);
+    s->refused_s = fs_max(fs_max(m->refused_s[3], m->refused_s[4]), m->refused_s[5]);
+    s->lag_s = m->output[0] - m->filter.clock[0];
+    s->horizontal_m = fs_sqrt(m->filter.covariance[FS_POSITION][FS_POSITION] +
+                              m->filter.covariance[FS_POSITION + 1][FS_POSITION + 1]);
+    s->velocity_m_s = fs_sqrt(m->filter.covariance[FS_VELOCITY][FS_VELOCITY] +
+                              m->filter.covariance[FS_VELOCITY + 1][FS_VELOCITY + 1]);
+    s->tilt_rad = fs_sqrt(fs_max(m->filter.covariance[FS_ATTITUDE][FS_ATTITUDE],
+                                 m->filter.covariance[FS_ATTITUDE + 1][FS_ATTITUDE + 1]));
+    s->gyro_bias_rad_s = largest(m->filter.nominal, FS_GYRO_BIAS + 1, 3);
+    s->accel_bias_m_s2 = largest(m->filter.nominal, FS_ACCEL_BIAS + 1, 3);
+    s->velocity_ratio = mean_ratio(s->velocity_ratio, m, FS_GNSS_VELOCITY, 3);
+    s->position_ratio = mean_ratio(s->position_ratio, m, FS_GNSS_POSITION, 2);
+    s->height_ratio = mean_ratio(s->height_ratio, m, FS_BARO, 1);
+    s->heading_ratio = mean_ratio(s->heading_ratio, m, FS_MAG, 3);
 }

@@ -14,9 +14,23 @@
 #include "fs_types.h"
 #include "fs_yaw_estimator.h"
 
-/*
- * Write the summary of an estimator's record, shape (12,); it holds the mean ratios of the last call. health.py:104
- */
-void fs_health_kernel(const fs_estimator_memory *memory, fs_real summary[12]);
+/* What the estimator's memory says of EstimateHealth. */
+typedef struct {
+    fs_real unaided_s;
+    fs_real refused_s;
+    fs_real lag_s;
+    fs_real horizontal_m;
+    fs_real velocity_m_s;
+    fs_real tilt_rad;
+    fs_real gyro_bias_rad_s;
+    fs_real accel_bias_m_s2;
+    fs_real velocity_ratio;
+    fs_real position_ratio;
+    fs_real height_ratio;
+    fs_real heading_ratio;
+} fs_health_summary;
+
+/* Write the summary of an estimator's record; it holds the mean ratios of the last call. health.py:123 */
+void fs_health_kernel(const fs_estimator_memory *memory, fs_health_summary *summary);
 
 #endif

@@ -76,8 +76,8 @@ static void take(filter_steps *s)
         }
         break;
     case FILTER_HEALTH:
-        fs_health_kernel(m, s->summary);
-        s->hash = hashed(s->hash, s->summary, 12U);
+        fs_health_kernel(m, &s->summary.fields);
+        s->hash = hashed(s->hash, s->summary.values, (uint16_t)(sizeof s->summary / sizeof s->summary.values[0]));
         break;
     case FILTER_NUMBERS:
         numbers[0] = fs_exp(s->row[0]);

@@ -22,7 +22,10 @@ typedef uint32_t (*filter_clock)(void);
 typedef struct {
     fs_estimator_memory memory;
     fs_real row[FILTER_ROOM];
-    fs_real summary[12]; /* of the health */
+    union {
+        fs_health_summary fields;
+        fs_real values[sizeof(fs_health_summary) / sizeof(fs_real)];
+    } summary;
     unsigned char octets[4];
     uint16_t place; /* octets of the event so far */
     uint16_t kind;
