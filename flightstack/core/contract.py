@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import numpy as np  # takes 0.1 s, and a command that only talks to a vehicle has no arrays
 
 FloatArray: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
+SingleArray: TypeAlias = "np.ndarray[Any, np.dtype[np.float32]]"
 RecordArray: TypeAlias = "np.ndarray[Any, np.dtype[np.void]]"
 Record: TypeAlias = Any
 """One element of a ``RecordArray``, indexed by the names of its fields."""

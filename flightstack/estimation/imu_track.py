@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple, TypeAlias
 import numpy as np
 
 from flightstack.core.compiled import compiled, direct
-from flightstack.core.contract import FloatArray, Record, RecordArray, Vector3
+from flightstack.core.contract import FloatArray, Record, RecordArray, SingleArray, Vector3
 from flightstack.core.record_types import dtype_of
 from flightstack.estimation.sensor_samples import ImuSample
 
@@ -21,8 +21,6 @@ IMU_MISSING_S = 0.04
 RECORD_SIZE = 7
 """Recorded form of a sample: duration [µs], rate (3), specific force (3)."""
 _pack = struct.Struct(f"={IMU_SIZE}d").pack_into
-
-SingleArray: TypeAlias = np.ndarray[Any, np.dtype[np.float32]]
 
 
 class ImuRow(NamedTuple):

@@ -9,9 +9,9 @@ from typing import Protocol
 
 import numpy as np
 
-from flightstack.core.contract import FloatArray, Vector3
+from flightstack.core.contract import FloatArray, SingleArray, Vector3
 from flightstack.core.geodesy import LocalFrame
-from flightstack.estimation.imu_track import RECORD_SIZE, ImuTrack, SingleArray
+from flightstack.estimation.imu_track import RECORD_SIZE, ImuTrack
 from flightstack.estimation.sensor_samples import (
     BaroSample,
     FlowSample,
@@ -212,12 +212,15 @@ class SensorFeed:
 
         ``step_us`` is the time since the last one.
         """
-        time_s, selected, recorder = time_us * 1e-6, self._selected, self._recorder
         for lane, wire in zip(self.lanes, wires, strict=False):
-            record = (recorder if lane is selected else NO_RECORDER).imu_row(time_us)
-            lane.measured_us, lane.step_us = time_us, step_us
-            lane.estimator.imu_row(lane.newest.imu_track.take_wire(time_s, step_us, wire, record))
+            self._take_imu(lane, time_us, step_us, wire)
         self._write_state()
+
+    def _take_imu(self, lane: Lane, time_us: int, step_us: int, wire: SingleArray) -> None:
+        recorder = self._recorder if lane is self._selected else NO_RECORDER
+        row = lane.newest.imu_track.take_wire(time_us * 1e-6, step_us, wire, recorder.imu_row(time_us))
+        lane.measured_us, lane.step_us = time_us, step_us
+        lane.estimator.imu_row(row)
 
     def pass_by(self, time_us: int, step_us: int, mag: MagSample | None, baro: BaroSample | None) -> None:
         """Count a measurement of each inertial sensor at ``time_us`` as taken, and those of the others if not None."""
@@ -243,20 +246,12 @@ class SensorFeed:
 
         So is one that is not finite: the sensor counts as missing.
         """
-        number, fields, values, step_us = report
-        time_s, lane = time_us * 1e-6, self.lanes[number]
-        gyro, accel = values.gyro_rad_s, values.accel_m_s2
-        is_measured = fields & _IMU == _IMU and _is_finite(gyro) and _is_finite(accel)
-        if is_measured and step_us > 0:
-            row = lane.newest.imu_track.take(time_s, step_us * 1e-6, gyro, accel)
-            lane.measured_us, lane.step_us = time_us, step_us
-            lane.estimator.imu_row(row)
-            if lane is self._selected:
-                record = self._recorder.imu_row(time_us)
-                record[:] = row[1:]
-                record[0] = step_us
+        number, fields, wire, step_us = report
+        imu = wire[:6]
+        if fields & _IMU == _IMU and step_us > 0 and _is_finite(imu.tolist()):
+            self._take_imu(self.lanes[number], time_us, step_us, imu)
         if fields & ~_IMU and number == 0:
-            for sample in slow_samples(time_s, report):
+            for sample in slow_samples(time_us * 1e-6, report):
                 self._take(sample)
 
     def _take(self, sample: Sample) -> None:

@@ -217,6 +217,14 @@ class SimulatorEndpoint:
     def _receive_sensors(self, data: memoryview, sensors: SensorInbox) -> bool:
         """Process the frames of an exchange one after another, and anything else with the general decoder."""
         fresh, at, end, battery = False, 0, len(data), None
+        if not self.finder.partial_size and self._plant.open(data[: self._plant.size]):  # typical
+            self._uses_hil, at = False, self._plant.size
+            is_clock = sensors.open(data[at:])
+            if is_clock is not None:
+                at = end
+            if is_clock:
+                self._take_clock(sensors)
+                fresh = True
         while not self.finder.partial_size and end - at > HEADER_V2 and data[at] == MAGIC_V2:
             size = HEADER_V2 + data[at + 1] + CHECKSUM_SIZE
             frame = data[at : at + size]

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 import struct
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from fastcrc import crc16
 
+from flightstack.core.contract import SingleArray
 from flightstack.core.portable_math import atan2, distance
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.fields import int16, int32, whole
@@ -94,7 +95,7 @@ class HilValues(NamedTuple):
 class HilMeasurement(NamedTuple):
     """Content of HIL_SENSOR of the first inertial sensor, as in ``HilSensorFrame``."""
 
-    values: np.ndarray[Any, np.dtype[np.float32]]
+    values: SingleArray
     fields: int
 
 

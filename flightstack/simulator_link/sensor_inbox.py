@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
+from flightstack.core.contract import SingleArray
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.simulator_link.sensor_frames import (
@@ -33,16 +34,22 @@ MOST_WAITING = 64
 
 
 class HilReport(NamedTuple):
-    """Measurements of one HIL_SENSOR; ``values`` are valid where ``fields`` has their bits."""
+    """Measurements of one HIL_SENSOR, as in ``HilSensorFrame``; valid where ``fields`` has their bits."""
 
     number: int
     fields: int
-    values: HilValues
+    wire: SingleArray
+    """Of its own, shape (13,)."""
     step_us: int
     """Time since the last inertial measurement of this sensor; 0 in the first one, and in a report without one.
 
     It includes the time of measurements that were lost or not taken, so that the sum is the time that passed.
     """
+
+    @property
+    def values(self) -> HilValues:
+        """The measurements by name."""
+        return HilValues(*self.wire.tolist())
 
 
 class RangeReport(NamedTuple):
@@ -103,7 +110,7 @@ class SensorInbox:
         """Take the contents of HIL_SENSOR by their id; then call ``stamp``, for the first one is the clock."""
         for number in range(len(measurements) - 1, 0, -1):
             values, fields = measurements[number]
-            self._wait(HilReport(number, fields, HilValues(*values.tolist()), 0))
+            self._wait(HilReport(number, fields, values.copy(), 0))
         self._frame.set(time_us, measurements[0])
 
     def take_message(self, message: Message) -> bool:
@@ -144,9 +151,9 @@ class SensorInbox:
         if frame.number == 0:
             return True
         if frame.time_us == self._stamp_us:
-            self._report(self._time_us, frame.number, frame.fields, HilValues(*frame.values.tolist()))
+            self._report(self._time_us, frame.number, frame.fields, frame.values.copy())
         else:
-            self._wait(HilReport(frame.number, frame.fields, HilValues(*frame.values.tolist()), 0))
+            self._wait(HilReport(frame.number, frame.fields, frame.values.copy(), 0))
         return False
 
     def _wait(self, content: Content) -> None:
@@ -165,17 +172,17 @@ class SensorInbox:
                     self._reports.append(Report(time_us, content))
             self._waiting.clear()
         self._time_us, self._stamp_us = time_us, frame.time_us
-        self._report(time_us, 0, frame.fields, HilValues(*frame.values.tolist()))
+        self._report(time_us, 0, frame.fields, frame.values.copy())
         if len(self._reports) > MOST_WAITING:
             self._drop(len(self._reports) - MOST_WAITING)
 
-    def _report(self, time_us: int, number: int, fields: int, values: HilValues) -> None:
+    def _report(self, time_us: int, number: int, fields: int, wire: SingleArray) -> None:
         """Report the measurements of a HIL_SENSOR with the duration of the inertial one."""
         step_us = 0
         if fields & _IMU == _IMU:
             step_us = time_us - self._measured_us.get(number, time_us)
             self._measured_us[number] = time_us
-        self._reports.append(Report(time_us, HilReport(number, fields, values, step_us)))
+        self._reports.append(Report(time_us, HilReport(number, fields, wire, step_us)))
 
     def _drop(self, count: int) -> None:
         """Drop the oldest reports; the next inertial measurement of each sensor lasts as long as all of them."""

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from flightstack.commander.estimate_checks import MISSING_S, estimate_refusals
 from flightstack.commander.failsafe_monitor import FailsafeMonitor
 from flightstack.control.backend import ControlBackend
-from flightstack.core.contract import FloatArray, Vector3
+from flightstack.core.contract import FloatArray, SingleArray, Vector3
 from flightstack.core.enums import Severity
 from flightstack.core.geodesy import earth_field_ned_gauss
 from flightstack.core.periods import next_due
@@ -18,7 +18,6 @@ from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits, tuning_of
 from flightstack.estimation.filter_core import FilterCore
 from flightstack.estimation.health import NO_HEALTH
-from flightstack.estimation.imu_track import SingleArray
 from flightstack.estimation.lanes import Lanes, sum_of_resets
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flightstack.core.compiled import compiled, direct
-from flightstack.core.contract import FloatArray, Quaternion, Record, RecordArray, Vector3
+from flightstack.core.contract import FloatArray, Quaternion, Record, RecordArray, SingleArray, Vector3
 from flightstack.core.geometry import (
     blend,
     conjugate,
@@ -36,7 +36,7 @@ from flightstack.core.geometry import (
 )
 from flightstack.core.portable_math import sin_cos
 from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
-from sim_bridge.sensors.layout import IMU, IMU_NOISE, MOTION, SingleArray, write_numbers
+from sim_bridge.sensors.layout import IMU, IMU_NOISE, MOTION, write_numbers
 from sim_bridge.sensors.noise import NormalStream, gauss_markov, limited, quantised, with_fault
 
 _MATRIX_DEVIATES, _BIAS_DEVIATES = 18, 18

@@ -6,7 +6,7 @@ An angle of the file in degrees is in radians here, and its name ends in ``_rad`
 from __future__ import annotations
 
 import math
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
@@ -16,8 +16,6 @@ from flightstack.params.sensors import TABLES, Numbers
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.plant.dimensions import foot_z_m
 from sim_bridge.plant.plant import PlantOptions
-
-SingleArray: TypeAlias = "np.ndarray[Any, np.dtype[np.float32]]"
 
 IMU_NOISE = 12
 """Normal deviates for one measurement of an inertial sensor: six white ones, six of the biases."""

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flightstack.core.contract import FloatArray, RecordArray
+from flightstack.core.contract import FloatArray, RecordArray, SingleArray
 from flightstack.core.geodesy import GeoPoint, LocalFrame, earth_field_ned_gauss
 from flightstack.core.periods import next_due
 from flightstack.core.portable_math import sin_cos
@@ -44,7 +44,6 @@ from sim_bridge.sensors.barometer import Barometer
 from sim_bridge.sensors.faults import HEALTHY, NEVER_US, Channel, channel_faults
 from sim_bridge.sensors.gnss import Fix, GnssReceiver
 from sim_bridge.sensors.imu import ImuSet
-from sim_bridge.sensors.layout import SingleArray
 from sim_bridge.sensors.magnetometer import Magnetometer
 from sim_bridge.sensors.optical_flow import OpticalFlow
 from sim_bridge.sensors.rangefinder import Rangefinder

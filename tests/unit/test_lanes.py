@@ -12,7 +12,7 @@ from flightstack.estimation.lanes import Lanes
 from flightstack.estimation.selector import LaneFacts
 from flightstack.estimation.sensor_feed import SensorFeed
 from flightstack.mavlink.dialect import mavlink
-from flightstack.simulator_link.sensor_frames import ACCEL, BARO, GYRO, HilGps, HilValues
+from flightstack.simulator_link.sensor_frames import ACCEL, BARO, GYRO, HilGps
 from flightstack.simulator_link.sensor_inbox import HilReport, Report
 
 GOOD = LaneFacts(True, 0.2, Vector3(0.0, 0.0, 0.0), Vector3(0.0, 0.0, -9.8))
@@ -31,7 +31,7 @@ class Pair:
 
     def step(self, time_us: int, number: int, step_us: int = 2000, *, repeats: bool = False) -> None:
         values = np.ones(6) if repeats else self._rng.normal(size=6)
-        report = HilReport(number, ACCEL | GYRO, HilValues(*values.tolist(), *[0.0] * 7), step_us)
+        report = HilReport(number, ACCEL | GYRO, np.array([*values, *[0.0] * 7], np.float32), step_us)
         self.feed.update([Report(time_us, report)])
 
 
@@ -83,7 +83,7 @@ def test_change_counts_as_a_reset_after_those_of_the_former_estimator() -> None:
 
 def test_all_estimators_take_other_sensors_and_one_local_frame() -> None:
     pair = Pair()
-    baro = HilReport(0, BARO, HilValues(*[0.0] * 9, 950.0, 0.0, 540.0, 15.0), 0)
+    baro = HilReport(0, BARO, np.array([0.0] * 9 + [950.0, 0.0, 540.0, 15.0], np.float32), 0)
     fix = HilGps(0, 47.0, 8.0, 500.0, 1.0, 1.0, (0.0, 0.0, 0.0), mavlink.GPS_FIX_TYPE_3D_FIX, 12)
     pair.estimators[1].frame = frame = LocalFrame(GeoPoint(47.0, 8.0, 500.0))
     pair.feed.update([Report(4000, baro), Report(4000, fix)])
