@@ -217,28 +217,18 @@ class SimulatorEndpoint:
     def _receive_sensors(self, data: memoryview, sensors: SensorInbox) -> bool:
         """Process the frames of an exchange one after another, and anything else with the general decoder."""
         fresh, at, end, battery = False, 0, len(data), None
-        if not self.finder.partial_size and self._plant.open(data[: self._plant.size]):  # typical
-            self._uses_hil, at = False, self._plant.size
-            is_clock = sensors.open(data[at:])
-            if is_clock is not None:
-                at = end
-            if is_clock:
-                self._take_clock(sensors)
-                fresh = True
         while not self.finder.partial_size and end - at > HEADER_V2 and data[at] == MAGIC_V2:
             size = HEADER_V2 + data[at + 1] + CHECKSUM_SIZE
             frame = data[at : at + size]
-            is_clock = sensors.open(frame)
-            if is_clock:
+            if self._plant.open(frame):
+                self._uses_hil = False
+            elif (is_clock := sensors.open(frame)) is None:
+                if (report := decode_battery(frame)) is None:
+                    break
+                battery = report
+            elif is_clock:
                 self._take_clock(sensors)
                 fresh = True
-            elif is_clock is None:
-                if self._plant.open(frame):
-                    self._uses_hil = False
-                elif (report := decode_battery(frame)) is not None:
-                    battery = report
-                else:
-                    break
             at += size
         if at < end:
             fresh = self._receive_any(data[at:]) or fresh

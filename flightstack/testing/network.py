@@ -112,12 +112,12 @@ class EngineRunner:
     def __init__(self, engine: Engine, network: Network, after_outer: Callable[[], None]) -> None:
         """Call ``after_outer`` before watches and timers, after each outer tick that may have had an event."""
         self._engine, self._network, self._after_outer = engine, network, after_outer
-        self._watches: list[Callable[[], None]] = []
+        self._watches: list[tuple[Callable[[], None], Callable[[], bool]]] = []
         self._timers: list[tuple[float, Callable[[], None]]] = []
 
-    def watch(self, callback: Callable[[], None]) -> None:
-        """Call ``callback`` after every outer tick."""
-        self._watches.append(callback)
+    def watch(self, callback: Callable[[], None], each_tick: Callable[[], bool]) -> None:
+        """Call ``callback`` after every outer tick, or while ``each_tick`` returns False, after those with an event."""
+        self._watches.append((callback, each_tick))
 
     def after(self, seconds: float, callback: Callable[[], None]) -> None:
         """Call ``callback`` once, ``seconds`` from now."""
@@ -161,7 +161,7 @@ class EngineRunner:
     def _idle_until_s(self) -> float:
         """Return the time from which messages are due, or a watch or a timer; −inf if it may be now."""
         engine = self._engine
-        if self._watches or not engine.was_ready:
+        if not engine.was_ready or any(each_tick() for _, each_tick in self._watches):
             return -math.inf
         now_s = engine.time_s
         until_s = now_s + self._network.idle_s(engine.stack.ground, now_s)
@@ -170,7 +170,7 @@ class EngineRunner:
     def _call_due(self) -> None:
         self._engine.note_readiness()
         self._after_outer()
-        for watch in self._watches:
+        for watch, _ in self._watches:
             watch()
         if self._timers:
             now_s = self._engine.time_s + 1e-9

@@ -83,10 +83,14 @@ class _Run:
         self._world = world
         self._scenario = scenario
         self._waiting = [(event, _trigger(world, event)) for event in scenario.event]
+        self._of_numbers = [event for event in scenario.event if _depends_on_numbers(event)]
         self._due: list[tuple[float, Event]] = []
         self._requests: list[Event] = []
-        if self._waiting:
-            world.watch(self._fire)  # time goes on while a request waits for its answer
+        if self._waiting:  # time goes on while a request waits for its answer
+            world.watch(self._fire, lambda: bool(self._of_numbers))
+        for event in scenario.event:
+            if event.at_s is not None:
+                world.after(event.at_s - world.time_s, self._fire)
 
     def fly(self) -> Outcome | None:
         world, scenario = self._world, self._scenario
@@ -118,6 +122,11 @@ class _Run:
         fired = [event for event, is_due in self._waiting if is_due(state)]
         self._waiting = [(event, is_due) for event, is_due in self._waiting if event not in fired]
         self._due += [(now_s + event.delay_s, event) for event in fired]
+        for event in fired:
+            if event in self._of_numbers:
+                self._of_numbers.remove(event)
+            if event.delay_s > 0.0:
+                world.after(event.delay_s, self._fire)
         due = [event for at_s, event in self._due if at_s <= now_s + 1e-9]
         self._due = [entry for entry in self._due if entry[0] > now_s + 1e-9]
         for event in due:
@@ -138,6 +147,11 @@ class _Run:
             return False
         world.run_on(min(most_s, duration_s - world.time_s))
         return world.time_s >= duration_s
+
+
+def _depends_on_numbers(event: Event) -> bool:
+    """Return True if the event may be due after any outer tick, not only at a time or after another event."""
+    return event.when is not None and not Expression(event.when).has_no_numbers
 
 
 def _trigger(world: World, event: Event) -> Callable[[State], bool]:

@@ -198,9 +198,9 @@ class World:
         """Run until the vehicle may fly on its state, as one on sensors does after seconds."""
         self.run_until(lambda _: self.engine.stack.is_ready, timeout_s)
 
-    def watch(self, callback: Callable[[], None]) -> None:
-        """Call ``callback`` after every outer tick."""
-        self._runner.watch(callback)
+    def watch(self, callback: Callable[[], None], each_tick: Callable[[], bool] = lambda: True) -> None:
+        """Call ``callback`` after every outer tick; while ``each_tick`` is False, after those with an event."""
+        self._runner.watch(callback, each_tick)
 
     def after(self, seconds: float, callback: Callable[[], None]) -> None:
         """Call ``callback`` once, ``seconds`` of simulated time from now."""
