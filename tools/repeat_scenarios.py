@@ -15,6 +15,7 @@ from pathlib import Path
 from random import Random
 from typing import NamedTuple
 
+from flightstack.testing import is_scenario, load_scenario, run_scenario
 from tools.beside_load import busy
 
 
@@ -28,8 +29,6 @@ class Flown(NamedTuple):
 
 def fly(path: Path) -> Flown:
     """Fly the first seed of a scenario."""
-    from flightstack.testing import load_scenario, run_scenario  # noqa: PLC0415  # in the worker
-
     verdict = run_scenario(load_scenario(path))
     return Flown(path, verdict.passed, hashlib.sha256(verdict.flight.log.content).hexdigest())
 
@@ -42,8 +41,6 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--without", default="long", help="folder that is left out")
     given = parser.parse_args()
-    from flightstack.testing import is_scenario  # noqa: PLC0415
-
     found = sorted(path for folder in given.paths for path in folder.rglob("*.toml") if is_scenario(path))
     paths = [path for path in found if given.without not in path.parts]
     cores = os.cpu_count() or 1

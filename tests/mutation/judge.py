@@ -13,6 +13,7 @@ import signal
 import sys
 import tempfile
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
@@ -251,21 +252,20 @@ def _in_double_first(libraries: list[Library]) -> list[Library]:
 
 
 def _helpers() -> tuple[ModuleType, ModuleType, ModuleType]:
-    from tests.firmware import (  # noqa: PLC0415  pytest must have loaded tests/conftest.py before
-        app_support,
-        codec_support,
-        core_support,
+    """Return the helpers of the tests, which may be imported once pytest has loaded ``tests/conftest.py``."""
+    core_support, codec_support, app_support = (
+        import_module(f"tests.firmware.{name}") for name in ("core_support", "codec_support", "app_support")
     )
-
     return core_support, codec_support, app_support
 
 
 def _shrink_samples() -> None:
-    from tests.firmware import test_core_math  # noqa: PLC0415
-    from tests.parity import test_c_laws, test_c_mixer  # noqa: PLC0415
-
-    test_c_laws.COUNT = test_c_mixer.COUNT = test_core_math.COUNT = COUNT
-    test_c_mixer.mixed.__defaults__ = (COUNT // 5,)
+    core_math, laws, mixer = (
+        import_module(f"tests.{name}")
+        for name in ("firmware.test_core_math", "parity.test_c_laws", "parity.test_c_mixer")
+    )
+    laws.COUNT = mixer.COUNT = core_math.COUNT = COUNT  # type: ignore[attr-defined]
+    mixer.mixed.__defaults__ = (COUNT // 5,)
 
 
 def _forget() -> None:

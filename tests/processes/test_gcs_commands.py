@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 import flightstack
+from flightstack.plan import load_plan, save_plan
 from flightstack.transports.udp import UdpSocket
 from gcs_cli.__main__ import main
 from gcs_cli.clients.command_client import CommandClient, CommandTiming
@@ -83,8 +84,6 @@ def test_a_vehicle_that_does_not_answer_is_a_timeout(monkeypatch: pytest.MonkeyP
 
 
 def test_a_mission_goes_up_and_comes_down_the_same(tmp_path: Path) -> None:
-    from flightstack.plan import load_plan  # noqa: PLC0415
-
     vehicle, copy = FakeVehicle(), tmp_path / "copy.plan"
     assert told(vehicle, "mission", "upload", MISSIONS / "every_item.plan").returncode == 0
     result = told(vehicle, "mission", "download", copy)
@@ -99,8 +98,6 @@ def test_a_mission_goes_up_and_comes_down_the_same(tmp_path: Path) -> None:
 
 
 def test_a_plan_goes_up_and_comes_down_with_its_geofence_and_rally_points(tmp_path: Path) -> None:
-    from flightstack.plan import load_plan  # noqa: PLC0415
-
     vehicle, copy = FakeVehicle(), tmp_path / "copy.plan"
     result = told(vehicle, "mission", "upload", MISSIONS / "fenced_square.plan")
     assert result.stdout.splitlines() == [
@@ -121,8 +118,6 @@ def test_a_plan_goes_up_and_comes_down_with_its_geofence_and_rally_points(tmp_pa
 
 def test_a_plan_replaces_another_whole_or_not_at_all(tmp_path: Path) -> None:
     """On a real vehicle: each fence refuses the other's mission, and a plan that is refused leaves the one before."""
-    from flightstack.plan import load_plan, save_plan  # noqa: PLC0415
-
     fenced, home = load_plan(MISSIONS / "fenced_square.plan"), load_plan(MISSIONS / "hop.plan")
     small = replace(home, fence=(circle((0.0, 0.0), 3.0),))
     refused = replace(fenced, fence=small.fence, rally=())
@@ -153,8 +148,6 @@ def contents(vehicle: FakeVehicle) -> dict[int, list[tuple[float, ...]]]:
 
 @pytest.mark.parametrize(("refused", "name"), [(0, "mission"), (1, "geofence"), (2, "list of rally points")])
 def test_a_refused_part_leaves_the_plans_of_before(tmp_path: Path, refused: int, name: str) -> None:
-    from flightstack.plan import load_plan, save_plan  # noqa: PLC0415
-
     plan, changed = load_plan(MISSIONS / "fenced_square.plan"), tmp_path / "changed.plan"
     save_plan(changed, replace(plan, items=plan.items[:4], fence=plan.fence[:4], rally=plan.rally * 2))
     vehicle = FakeVehicle()

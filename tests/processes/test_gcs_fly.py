@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from pymavlink import mavutil
 
 from flightstack.core.port_numbers import simulator_port, vehicle_ground_port
 from flightstack.process.signing_file import create_key
@@ -177,8 +178,6 @@ def test_overwrite_replaces_another_flight(tmp_path: Path) -> None:
 
 
 def test_the_tlog_holds_both_directions(flown: tuple[Path, Ended]) -> None:
-    from pymavlink import mavutil  # noqa: PLC0415
-
     log = mavutil.mavlink_connection(str(flown[0] / "gcs.tlog"))
     senders: dict[int, set[str]] = {1 + instance(): set(), 255: set()}
     while (message := log.recv_match()) is not None:

@@ -14,7 +14,9 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
+from flightstack.firmware.toolchain.build import host_program
 from flightstack.testing.instances import free_instance
+from flightstack.transports.serial_port import SerialPort
 from tests.support.commands import flightstack_command, gcs
 from tests.support.process import await_output, ends_of
 from tests.support.warm_children import warm_children
@@ -167,8 +169,6 @@ def test_a_port_on_which_nobody_answers_is_given_up() -> None:
 
 
 def test_a_port_that_another_program_uses_is_refused() -> None:
-    from flightstack.transports.serial_port import SerialPort  # noqa: PLC0415
-
     ours, theirs = pty.openpty()
     name = os.ttyname(theirs)
     port = SerialPort(name, 115_200)
@@ -183,8 +183,6 @@ def test_a_port_that_another_program_uses_is_refused() -> None:
 
 def test_the_firmware_behind_a_serial_port_flies(tmp_path: Path, in_c: ULog) -> None:
     """As a board would: the flight stack opens a device by its name."""
-    from flightstack.firmware.toolchain.build import host_program  # noqa: PLC0415
-
     program = subprocess.Popen(
         [str(host_program())], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )

@@ -6,10 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from pyulog import ULog
 
 from flightstack.core.contract import LoopFlags, LoopRow, LoopStatus
 from flightstack.core.errors import ConfigError, TargetError
 from flightstack.firmware.c_loops import CLoops, HostLoops
+from flightstack.firmware.toolchain import build as building
 from flightstack.firmware.toolchain.build import host_library
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.config import StackConfig
@@ -56,8 +58,6 @@ def test_two_flights_in_c_leave_the_same_log(tmp_path) -> None:
 
 
 def test_the_log_tells_when_the_loops_begin_and_when_guidance_gives_the_target(tmp_path) -> None:
-    from pyulog import ULog  # noqa: PLC0415
-
     world = World(loops="c")
     world.gcs.streams["offboard"] = lambda: mavlink.MAVLink_set_attitude_target_message(
         0, 1, 1, 0b00000111, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0, 0.75
@@ -174,8 +174,6 @@ def test_user_controller_flies_in_generated_c(monkeypatch) -> None:
 
 
 def test_without_a_compiler_one_sentence_says_what_to_do(monkeypatch) -> None:
-    from flightstack.firmware.toolchain import build as building  # noqa: PLC0415
-
     building.host_compiler.cache_clear()
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr(building.shutil, "which", lambda _: None)
@@ -240,8 +238,6 @@ def story(loops: str) -> World:
 
 
 def test_a_flight_on_a_target_behind_a_bad_line_is_the_flight_in_c(on_a_bad_line, tmp_path) -> None:
-    from pyulog import ULog  # noqa: PLC0415
-
     logs = []
     for loops in ("host", "c"):
         world = story(loops)

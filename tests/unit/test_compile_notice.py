@@ -17,7 +17,10 @@ from typing import Any
 import pytest
 
 from flightstack.core.compiled import compiled
+from flightstack.params.config import StackConfig
+from flightstack.process import assembly
 from flightstack.process.compile_notice import CompileNotice
+from sim_bridge import plants
 
 JIT = pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
 ROOT = Path(__file__).resolve().parents[2]
@@ -138,20 +141,15 @@ def test_compile_notice_names_a_kernel_that_is_not_listed() -> None:
     ("setup", "config"), [("python", {}), ("c", {"loops": "c"}), ("real time", {"lockstep": False})]
 )
 def test_kernels_of_the_stack_are_those_it_loads(setup: str, config: dict[str, Any]) -> None:
-    from flightstack.params.config import StackConfig  # noqa: PLC0415
-    from flightstack.process.assembly import kernels_of  # noqa: PLC0415
-
-    assert loaded_kernels()[setup] == sorted(kernels_of(StackConfig(**config)))
+    assert loaded_kernels()[setup] == sorted(assembly.kernels_of(StackConfig(**config)))
 
 
 @JIT
 @pytest.mark.parametrize("plant", ["rigid", "paper", "multibody"])
 def test_kernels_of_a_plant_are_those_it_loads(plant: str) -> None:
-    from sim_bridge.plants import kernels_of  # noqa: PLC0415
-
     if plant == "multibody":
         pytest.importorskip("mujoco")
-    assert loaded_kernels()[plant] == sorted(kernels_of(plant))
+    assert loaded_kernels()[plant] == sorted(plants.kernels_of(plant))
 
 
 @JIT

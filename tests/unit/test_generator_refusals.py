@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import linecache
 import sys
 from pathlib import Path
 from typing import Any
@@ -174,8 +175,6 @@ def refused(folder: Path, source: str) -> OutsideSubsetError:
     module: Any = importlib.util.module_from_spec(spec)
     sys.modules["a_law"] = module
     spec.loader.exec_module(module)
-    import linecache  # noqa: PLC0415
-
     linecache.checkcache(str(path))
     with pytest.raises(OutsideSubsetError) as caught:
         Program().add(module.law)

@@ -75,9 +75,7 @@ def test_other_parameters_of_the_law_make_other_firmware(lqr: AttitudeController
 def test_oldest_generated_firmware_is_removed(
     lqr: AttitudeController, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from flightstack.firmware import law_tree as trees  # noqa: PLC0415
-
-    monkeypatch.setattr(trees, "KEPT_TREES", 1)
+    monkeypatch.setattr("flightstack.firmware.law_tree.KEPT_TREES", 1)
     first = law_tree(lqr)
     os.utime(first, (1.0, 1.0))
     second = law_tree(lqr._replace(name="other"))

@@ -16,8 +16,10 @@ from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import LocalFrame
 from flightstack.guidance.rally import HOME as AT_HOME
 from flightstack.guidance.rally import NEAREST, RALLY_FIRST, ReturnPlace, choose, rally_points
+from flightstack.mavlink.dialect import mavlink
 from flightstack.plan import (
     DEFAULT_LIMITS,
+    RALLY_POINT,
     Command,
     FenceCommand,
     Frame,
@@ -287,9 +289,6 @@ def test_older_versions_are_kept_but_not_read(tmp_path: Path) -> None:
 
 
 def test_numbers_of_items_are_mavlinks() -> None:
-    from flightstack.mavlink.dialect import mavlink  # noqa: PLC0415
-    from flightstack.plan import RALLY_POINT  # noqa: PLC0415
-
     for command in FenceCommand:
         assert getattr(mavlink, f"MAV_CMD_NAV_FENCE_{command.name}") == command
     assert mavlink.MAV_CMD_NAV_RALLY_POINT == RALLY_POINT

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from flightstack.mavlink.dialect import NAME_IN_VERSION, EscStatus, FsLoopTiming, ardupilot_dialect, mavlink
 from flightstack.mavlink.link import Link
 from gcs_cli.vehicle.status_texts import PIECE_TIMEOUT_S
-from gcs_cli.vehicle.vehicle_view import update
+from gcs_cli.vehicle.vehicle_view import FOLDS, update
 from gcs_cli.vehicle.view_types import TEXTS_KEPT, VehicleView
 from tests.support.folded_vehicle import HOLD_MODE, Vehicle, heartbeat
 
@@ -315,8 +315,6 @@ def test_no_payload_raises(messages: list[tuple[int, bytes]]) -> None:
 
 
 def test_the_list_of_folded_messages_is_whole() -> None:
-    from gcs_cli.vehicle.vehicle_view import FOLDS  # noqa: PLC0415
-
     assert {mavlink.mavlink_map[number].msgname for number in FOLDED} == set(FOLDS)
 
 

@@ -16,6 +16,7 @@ from flightstack.flight_log.poses_file import Poses
 from flightstack.params.vehicle import built_in_vehicles, load_vehicle
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.multibody.frames import flip_vector
+from sim_bridge.multibody.mjcf import model_xml
 from sim_bridge.render import offscreen
 from sim_bridge.render.cameras import CAMERAS, Site, View, project, view
 from sim_bridge.render.overlay import Label, Overlay, scale_bar
@@ -328,8 +329,6 @@ def test_failing_renderer_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_plain_mujoco_reads_the_scene(tmp_path: Path) -> None:
-    from sim_bridge.multibody.mjcf import model_xml  # noqa: PLC0415
-
     file = tmp_path / "scene.xml"
     file.write_text(model_xml(load_vehicle("paper_quad"), scene=True))
     assert mujoco.MjModel.from_xml_path(str(file)).ngeom > 100
