@@ -138,11 +138,15 @@ def _options_of(group: Any, without: Collection[str]) -> list[inspect.Parameter]
     hints = get_type_hints(group, include_extras=True)
     return [
         inspect.Parameter(
-            field.name, inspect.Parameter.KEYWORD_ONLY, default=field.default, annotation=hints[field.name]
+            field.name, inspect.Parameter.KEYWORD_ONLY, default=_default(field), annotation=hints[field.name]
         )
         for field in dataclasses.fields(group)
         if field.name not in without and hasattr(hints[field.name], "__metadata__")
     ]
+
+
+def _default(field: dataclasses.Field[Any]) -> Any:
+    return inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default
 
 
 def own_program(module: str, *arguments: str) -> list[str]:

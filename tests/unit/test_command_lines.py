@@ -128,3 +128,13 @@ def test_unknown_option_is_refused_in_one_sentence(program: str) -> None:
     result = run(program, "--no-such-option")
     assert (result.returncode, result.stdout) == (2, "")
     assert re.fullmatch(rf"{program}: No such option: --no-such-option.*\n", result.stderr)
+
+
+@pytest.mark.parametrize(
+    ("command", "words", "name"),
+    [("gcs", "campaign", "argument 'FILE'"), ("sim-bridge", "open-loop --seconds 1", "option '--rotors'")],
+)
+def test_missing_argument_of_a_group_of_options_is_named(command: str, words: str, name: str) -> None:
+    ended = COMMANDS[command](*words.split())
+    assert ended.returncode == 2
+    assert f"Missing {name}" in ended.stderr
