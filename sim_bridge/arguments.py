@@ -6,6 +6,7 @@ import math
 from importlib.util import find_spec
 
 from flightstack.core.contract import Vector3
+from flightstack.core.errors import INSTALL_MULTIBODY
 from flightstack.core.geodesy import GeoPoint
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.errors import UsageProblemError
@@ -14,6 +15,7 @@ from sim_bridge.plant.faults.checks import Flight, check_faults
 from sim_bridge.plant.faults.schedule import Fault, parse_fault, shortened
 from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.plants import MULTIBODY, NO_MUJOCO, PLANT_NAMES
+from sim_bridge.simulator import FASTEST_PHYSICS_HZ, SLOWEST_PHYSICS_HZ
 
 _LONGEST_QUOTE = 60
 
@@ -84,6 +86,12 @@ def check_plant(name: str) -> str:
     return name
 
 
+def require(what: str, *modules: str) -> None:
+    """Raise UsageProblemError if a module of the extra ``multibody`` is not installed."""
+    if any(find_spec(module) is None for module in ("mujoco", *modules)):
+        raise UsageProblemError(f"{what} needs MuJoCo: {INSTALL_MULTIBODY}")
+
+
 def parse_speed(text: str) -> float:
     """Parse a speed; "max" is infinite."""
     if text == "max":
@@ -97,8 +105,6 @@ def parse_speed(text: str) -> float:
 
 def check_physics_hz(value: float) -> float:
     """Return a valid rate of the integration steps."""
-    from sim_bridge.simulator import FASTEST_PHYSICS_HZ, SLOWEST_PHYSICS_HZ  # noqa: PLC0415  # slow to load
-
     return check_range("--physics-hz", value, SLOWEST_PHYSICS_HZ, FASTEST_PHYSICS_HZ)
 
 

@@ -102,3 +102,28 @@ NoLag = Annotated[
     typer.Option("--no-lag", help="Start the rotors at their speeds, without lag."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+
+
+@dataclass(frozen=True)
+class OpenLoopOptions:
+    """The options of an open-loop flight, as given."""
+
+    rotors: Rotors
+    seconds: Seconds
+    vehicle: Vehicle = "paper_quad"
+    plant: Plant = "rigid"
+    pos: Position = "0,0,0"
+    vel: Velocity = "0,0,0"
+    euler_deg: EulerDeg = "0,0,0"
+    rates: Rates = "0,0,0"
+    dt: Step = 0.001
+    no_ground: NoGround = False
+    no_lag: NoLag = False
+    wind: Wind = "0,0"
+    gust: Gust = 0.0
+    drag: Drag = False
+    force: Force = "0,0,0"
+    torque: Torque = "0,0,0"
+    torque_gust: TorqueGust = 0.0
+    seed: Seed = 1
+    as_json: Json = False

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import typer
 
 from flightstack.process import console
-
-if TYPE_CHECKING:
-    from flightstack.params.vehicle import Vehicle
 
 
 def say(text: object) -> None:
@@ -20,15 +15,6 @@ def say(text: object) -> None:
 def complain(text: object) -> None:
     """Print a warning or an error."""
     console.complain(f"sim-bridge: {text}")
-
-
-def load_named_vehicle(name: str) -> Vehicle:
-    """Load the vehicle of ``--vehicle``; warn if a built-in vehicle hides a file of that name. Raises ConfigError."""
-    from flightstack.params.vehicle import hidden_vehicle, load_vehicle  # noqa: PLC0415
-
-    if (sentence := hidden_vehicle(name)) is not None:
-        complain(sentence)
-    return load_vehicle(name)
 
 
 def print_result(text: str) -> None:

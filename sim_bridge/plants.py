@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from flightstack.core.errors import INSTALL_MULTIBODY
+from flightstack.params.vehicle import Vehicle
 from sim_bridge.errors import UsageProblemError
-
-if TYPE_CHECKING:
-    from flightstack.params.vehicle import Vehicle
-    from sim_bridge.plant.plant import Plant, PlantOptions
+from sim_bridge.plant.compiled_plant import CompiledPlant
+from sim_bridge.plant.disturbance import check_wind
+from sim_bridge.plant.plant import Plant, PlantOptions
 
 MULTIBODY = "multibody"
 PLANT_NAMES = ("rigid", "paper", MULTIBODY)
@@ -28,14 +26,11 @@ def make_plant(vehicle: Vehicle, name: str, options: PlantOptions) -> Plant:
 
     Raises UsageProblemError if MuJoCo is not installed or wind cannot act, ConfigError for a mesh that is not a solid.
     """
-    from sim_bridge.plant.compiled_plant import CompiledPlant  # noqa: PLC0415  # slow to load
-    from sim_bridge.plant.disturbance import check_wind  # noqa: PLC0415
-
     check_wind(vehicle, name, options.disturbance)
     if name != MULTIBODY:
         return CompiledPlant(vehicle, name, options)
     try:
-        from sim_bridge.multibody.plant import MultibodyPlant  # noqa: PLC0415  # needs the extra
+        from sim_bridge.multibody.plant import MultibodyPlant
     except ImportError:
         raise UsageProblemError(NO_MUJOCO) from None
     return MultibodyPlant(vehicle, options)

@@ -27,6 +27,7 @@ from sim_bridge.multibody.assembly import Assembly, assemble
 from sim_bridge.multibody.frames import flip_quaternion, flip_vector
 from sim_bridge.multibody.mesh_file import corners_and_faces, read_mesh
 from sim_bridge.multibody.placing import PlacedPart
+from sim_bridge.multibody.scene import add_scene
 from sim_bridge.multibody.xml import add, exact
 from sim_bridge.plant.contact import DAMPING_RATIO, FRICTION, contact_model
 from sim_bridge.plant.dimensions import foot_z_m
@@ -115,8 +116,6 @@ def model_xml(vehicle: Vehicle, *, scene: bool = False, lean: bool = False) -> s
     if not lean:
         _add_actuators(root, vehicle)
     if scene:
-        from sim_bridge.multibody.scene import add_scene  # noqa: PLC0415  # only views need it
-
         add_scene(root, vehicle)
     indent(root)
     return tostring(root, encoding="unicode") + "\n"

@@ -64,7 +64,7 @@ def _newton(residual: Residual, x: FloatArray, limits: FloatArray) -> tuple[Floa
 
 def _least_squares(residual: Residual, x: FloatArray, limits: FloatArray) -> FloatArray:
     """Return the least-squares solution within the limits, starting from ``x``."""
-    from scipy.optimize import least_squares  # noqa: PLC0415  # slow to load, rarely needed
+    from scipy.optimize import least_squares
 
     inside = np.clip(x, -0.99 * limits, 0.99 * limits)
     found: FloatArray = least_squares(

@@ -62,7 +62,7 @@ def write_film(path: Path, frame_at: FrameAt, count: int, fps: float) -> None:
 
 def _write_mp4(path: Path, frame_at: FrameAt, count: int, fps: float) -> None:
     """Write H.264 with yuv420p, which every player supports; it needs even sizes."""
-    import imageio_ffmpeg  # noqa: PLC0415  # contains ffmpeg
+    import imageio_ffmpeg
 
     first = frame_at(0)
     writer: Any = imageio_ffmpeg.write_frames(

@@ -14,12 +14,10 @@ import numpy as np
 
 from flightstack.core.contract import FloatArray
 from flightstack.core.errors import ConfigError
-from flightstack.flight_log.poses_file import NO_POINTS
-from flightstack.params.vehicle import load_vehicle
 from flightstack.process.console import complain
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.render.live_view import READY, SNAPSHOT
-from sim_bridge.render.poses import Moment
+from sim_bridge.render.poses import MOST_TRAIL, Moment
 
 _TRAIL_STEP_M = 0.08
 _LONGEST_STEP_S = 0.1  # of rotor rotation between two pictures
@@ -85,24 +83,19 @@ def _snapshots(file: int) -> Iterator[bytes | None]:
 def main(vehicle: str) -> int:
     """Show a vehicle; return the exit code."""
     try:
-        from sim_bridge.render.marks import MOST_TRAIL, Marks  # noqa: PLC0415  # with MuJoCo
-        from sim_bridge.render.renderer import Stage  # noqa: PLC0415
-        from sim_bridge.render.viewer import require_display, show  # noqa: PLC0415
+        from sim_bridge.render.viewer import LiveWindow
 
-        require_display()
-        loaded = load_vehicle(vehicle)
-        stage = Stage(loaded)
+        window = LiveWindow(vehicle)
     except (UsageProblemError, ConfigError, ImportError) as error:
         complain(error)
         return 2
-    flight = LiveFlight(len(loaded.rotors), MOST_TRAIL)
-    marks = Marks(flight.trail, NO_POINTS, stage.span_m, stage.ground_m)
+    flight = LiveFlight(len(window.vehicle.rotors), MOST_TRAIL)
     with contextlib.suppress(OSError):  # for threads started from here on: the simulator waits for the start
         os.nice(_NICENESS)
     sys.stdout.buffer.write(READY)
     sys.stdout.flush()
     moments = (None if snapshot is None else flight.update(snapshot) for snapshot in _snapshots(0))
-    show(stage, moments, marks)
+    window.show(moments, flight.trail)
     return 0
 
 

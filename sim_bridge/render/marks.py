@@ -13,9 +13,8 @@ from flightstack.core.contract import FloatArray
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.multibody import appearance
 from sim_bridge.multibody.frames import flip_vector
-from sim_bridge.render.poses import Moment
+from sim_bridge.render.poses import MOST_TRAIL, Moment
 
-MOST_TRAIL = 1500
 _LEAST_LINE_PX, _LEAST_SPHERE_PX = 1.3, 4.5
 _TRAIL_NEW, _TRAIL_OLD = np.array([1.0, 0.78, 0.10, 0.95]), np.array([0.98, 0.90, 0.55, 0.28])
 _TARGET = np.array([0.95, 0.10, 0.62, 0.75])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any, TypeAlias
 
+import mujoco
 import numpy as np
 
 Image: TypeAlias = np.ndarray[Any, np.dtype[np.float64]]
@@ -17,8 +18,6 @@ _BAND = 0.35
 
 def paint(model: Any) -> None:
     """Replace the plain textures of a model; one without them is not changed."""
-    import mujoco  # noqa: PLC0415  # an extra
-
     for index in range(model.ntex):
         painter = _PAINTERS.get(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_TEXTURE, index))
         if painter is None:

@@ -18,6 +18,8 @@ _TRAIL_MISS_M = 0.003
 _TRAIL_LONGEST_M = 0.5
 """Largest distance from the flown path, and largest length, of a segment of the trail."""
 _TRAIL_SAMPLES = 20_000  # examined, which bounds the start-up time of a long flight
+MOST_TRAIL = 1500
+"""Points of the trail that is drawn."""
 
 
 class Moment(NamedTuple):

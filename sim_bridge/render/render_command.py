@@ -6,44 +6,31 @@ import contextlib
 import re
 import signal
 from collections.abc import Iterator
-from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import NamedTuple
 
 import typer
 
 from flightstack.core.atomic_file import check_new
-from flightstack.core.errors import INSTALL_MULTIBODY, ConfigError
+from flightstack.core.errors import ConfigError
+from flightstack.flight_log.poses_file import read_poses
+from flightstack.params.vehicle import Vehicle, load_vehicle
 from flightstack.process import console
-from flightstack.process.command_line import PictureOptions, expand_options
+from flightstack.process.command_line import PictureOptions
 from sim_bridge import arguments
 from sim_bridge.errors import UsageProblemError
-
-if TYPE_CHECKING:
-    from flightstack.params.vehicle import Vehicle
-    from sim_bridge.render.poses import FlightPath
+from sim_bridge.render.cameras import CAMERAS
+from sim_bridge.render.offscreen import choose_backend
+from sim_bridge.render.poses import FlightPath
 
 _MOST_FRAMES = 100_000
 _SMALLEST_PX, _LARGEST_PX = 16, 4096
 _MOST_PICTURES = 1000
 _FILM_NAMES, _PICTURE_NAMES = (".mp4", ".gif"), (".png",)
-_NAME = "sim-bridge render"
 
 
-def require(what: str, *modules: str) -> None:
-    """Raise UsageProblemError if a module of the extra ``multibody`` is not installed."""
-    if any(find_spec(module) is None for module in ("mujoco", *modules)):
-        raise UsageProblemError(f"{what} needs MuJoCo: {INSTALL_MULTIBODY}")
-
-
-@expand_options
-def render(
-    poses: Annotated[Path, typer.Argument(help="File of poses (.npz), as gcs log draw writes it.")],
-    options: PictureOptions,
-    vehicle: Annotated[str | None, typer.Option(help="Vehicle to draw.  [default: the file's]")] = None,
-    caller: Annotated[str, typer.Option(hidden=True, help="Command named in error messages.")] = _NAME,
-) -> None:
-    """Draw pictures or a film of a flight."""
+def draw(poses: Path, options: PictureOptions, vehicle: str | None, caller: str) -> None:
+    """Draw pictures or a film of a flight; errors name the command ``caller``."""
     with _errors_reported(caller):
         _render(poses, options, vehicle, caller)
 
@@ -51,11 +38,7 @@ def render(
 def _render(poses: Path, options: PictureOptions, vehicle: str | None, caller: str) -> None:
     request = parse_request(options)
     is_mp4 = request.video is not None and request.video.suffix.lower() == ".mp4"
-    require(caller.split(maxsplit=1)[-1], "PIL", *(["imageio_ffmpeg"] if is_mp4 else []))
-    from flightstack.flight_log.poses_file import read_poses  # noqa: PLC0415
-    from flightstack.params.vehicle import load_vehicle  # noqa: PLC0415
-    from sim_bridge.render.poses import FlightPath  # noqa: PLC0415
-
+    arguments.require(caller.split(maxsplit=1)[-1], "PIL", *(["imageio_ffmpeg"] if is_mp4 else []))
     content = read_poses(poses)
     path = FlightPath(content)
     loaded = load_vehicle(vehicle or content.vehicle)
@@ -64,7 +47,7 @@ def _render(poses: Path, options: PictureOptions, vehicle: str | None, caller: s
     if first > last:
         raise UsageProblemError(f"--from {first:g}, --to {last:g}: the film would end before it begins")
     if options.view:
-        from sim_bridge.render.viewer import play  # noqa: PLC0415
+        from sim_bridge.render.viewer import play
 
         with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C closes the window
             play(loaded, path, first, last, request.speed, caller)
@@ -73,10 +56,8 @@ def _render(poses: Path, options: PictureOptions, vehicle: str | None, caller: s
 
 
 def _write(request: RenderRequest, vehicle: Vehicle, path: FlightPath, first: float, last: float) -> None:
-    from sim_bridge.render.offscreen import choose_backend  # noqa: PLC0415
-
-    choose_backend()
-    from sim_bridge.render.pictures import SHEET_PICTURES, Pictures, PictureStyle, film_of, numbered, spread  # noqa: PLC0415
+    choose_backend()  # before MuJoCo is imported
+    from sim_bridge.render.pictures import SHEET_PICTURES, Pictures, PictureStyle, film_of, numbered, spread
 
     times = [_within("--at", time_s, path) for time_s in request.times_s]
     if request.png is not None:
@@ -182,8 +163,6 @@ def _check_conflicts(options: PictureOptions) -> None:
 
 
 def _check_request(request: RenderRequest) -> None:
-    from sim_bridge.render.cameras import CAMERAS  # noqa: PLC0415
-
     for flag, file, endings in (
         ("--png", request.png, _PICTURE_NAMES), ("--sheet", request.sheet, _PICTURE_NAMES),
         ("--video", request.video, _FILM_NAMES),

@@ -14,10 +14,10 @@ from sim_bridge.multibody.frames import flip_quaternion, flip_vector
 from sim_bridge.multibody.mjcf import model_xml
 from sim_bridge.plant.dimensions import foot_z_m
 from sim_bridge.render.cameras import Site, View, view
-from sim_bridge.render.marks import MOST_TRAIL, Marks, RotorAppearance
+from sim_bridge.render.marks import Marks, RotorAppearance
 from sim_bridge.render.offscreen import make_context
 from sim_bridge.render.paint import paint
-from sim_bridge.render.poses import FlightPath, Moment
+from sim_bridge.render.poses import MOST_TRAIL, FlightPath, Moment
 
 Picture: TypeAlias = np.ndarray[Any, np.dtype[np.uint8]]
 """Shape (height, width, 3), red, green, blue."""

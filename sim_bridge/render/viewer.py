@@ -10,7 +10,9 @@ import warnings
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from flightstack.params.vehicle import Vehicle
+from flightstack.core.contract import FloatArray
+from flightstack.flight_log.poses_file import NO_POINTS
+from flightstack.params.vehicle import Vehicle, load_vehicle
 from flightstack.process.console import complain
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.render.marks import Marks
@@ -63,7 +65,7 @@ def require_display() -> None:
             "--view: no display (neither DISPLAY nor WAYLAND_DISPLAY is set); run it in a desktop session, "
             "or make a film: gcs log draw RUN --video FILE"
         )
-    import glfw  # noqa: PLC0415
+    import glfw
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the error below replaces its warning
@@ -93,11 +95,25 @@ def play(vehicle: Vehicle, path: FlightPath, begin_s: float, end_s: float, speed
     show(stage, moments(), marks, playback.press)
 
 
+class LiveWindow:
+    """The view of a vehicle that flies now. Raises UsageProblemError without a display, ConfigError."""
+
+    def __init__(self, vehicle: str) -> None:
+        """Draw a vehicle, a name or the path of its file."""
+        require_display()
+        self.vehicle = load_vehicle(vehicle)
+        self._stage = Stage(self.vehicle)
+
+    def show(self, moments: Iterable[Moment | None], trail: Callable[[float, int], FloatArray]) -> None:
+        """Show moments and the trail behind them until the window is closed or they end."""
+        show(self._stage, moments, Marks(trail, NO_POINTS, self._stage.span_m, self._stage.ground_m))
+
+
 def show(
     stage: Stage, moments: Iterable[Moment | None], marks: Marks, press: Callable[[int], None] | None = None
 ) -> None:
     """Show moments in a window until it is closed or they end; None leaves the picture unchanged."""
-    from mujoco.viewer import launch_passive  # noqa: PLC0415  # needs a display
+    from mujoco.viewer import launch_passive
 
     others = set(threading.enumerate())
     with launch_passive(
@@ -124,7 +140,7 @@ def show(
 
 def _set_camera(camera: Any, stage: Stage) -> None:
     """Track the vehicle with the camera from behind."""
-    import mujoco  # noqa: PLC0415
+    import mujoco
 
     camera.type = mujoco.mjtCamera.mjCAMERA_TRACKING
     camera.trackbodyid = stage.body

@@ -20,7 +20,6 @@ from flightstack.flight_log.poses_file import write_poses
 from flightstack.params.vehicle import load_vehicle
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame
 from sim_bridge.errors import UsageProblemError
-from sim_bridge.render import render_command
 from sim_bridge.render.live_view import READY, SNAPSHOT, LiveView
 from sim_bridge.render.offscreen import choose_backend
 from sim_bridge.render.viewer import show
@@ -181,7 +180,7 @@ def test_error_messages_name_the_calling_command(
     said: str,
 ) -> None:
     write_poses(tmp_path / "poses.npz", sample_poses(1.0))
-    monkeypatch.setattr(render_command, "find_spec", lambda _name: None)
+    monkeypatch.setattr("sim_bridge.arguments.find_spec", lambda _name: None)
     done = sim_bridge_command("render", tmp_path / "poses.npz", "--png", tmp_path / "p.png", *arguments)
     assert (done.returncode, done.stderr) == (2, f"{said}: {INSTALL_MULTIBODY}\n")
 
