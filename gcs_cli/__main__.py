@@ -20,7 +20,7 @@ def main(argv: list[str] | None = None) -> int:
     if len(words) == 1 and words[0] in ("-h", "--help") and _columns() >= WIDTH and _prints(HELP):
         return 0
     try:
-        from gcs_cli.program import run  # noqa: PLC0415
+        from gcs_cli.program import run
 
         return run(words)
     except KeyboardInterrupt:  # during the imports: `run` reports those of the command

@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from importlib.util import find_spec
 from pathlib import Path
 
+from gcs_cli.parameter_names_generated import NAMES
+
 _DEFINITION = re.compile(rb"^MAVLINK_MSG_ID_(\w+) = ", re.MULTILINE)
 _LAYOUT = re.compile(rb'Layout\(\s*\d+,\s*"(\w+)"')
 _COPTER_MODE = re.compile(r"^COPTER_MODE_(\w+) = ", re.MULTILINE)
@@ -16,14 +18,12 @@ _PLACEHOLDERS = {b"BAD_DATA", b"UNKNOWN"}
 
 def parameter_names(incomplete: str) -> list[str]:
     """Return the flight stack's parameters, most of them PX4's, whose names begin with ``incomplete``."""
-    from gcs_cli.parameter_names_generated import NAMES  # noqa: PLC0415
-
     return _beginning(NAMES, incomplete)
 
 
 def mode_names(incomplete: str) -> list[str]:
     """Return the modes of PX4 and ArduCopter whose names begin with ``incomplete``."""
-    from gcs_cli.autopilots.px4 import PX4  # noqa: PLC0415
+    from gcs_cli.autopilots.px4 import PX4
 
     names = {name for number, name in PX4.mode_names(0).items() if PX4.selectable(0, number)}
     spec = find_spec("pymavlink")

@@ -1,6 +1,9 @@
-"""Exit codes of ``gcs``, and the error that carries one."""
+"""Exit codes of ``gcs``, the errors that carry one, and libraries that may be missing."""
 
 from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
 
 DONE = 0
 FAILED = 1
@@ -11,6 +14,8 @@ NO_ANSWER = 3
 """No vehicle, or no answer in time."""
 INTERRUPTED = 130
 """``gcs test`` after Ctrl-C: the exit code of a shell for a command that SIGINT ended."""
+
+_PACKAGES = {"rerun": "rerun-sdk"}
 
 
 class CliError(Exception):
@@ -31,3 +36,13 @@ class PortInUseError(CliError):
     def __init__(self, port: object, sentence: str) -> None:
         super().__init__(sentence, USAGE)
         self.port = port
+
+
+def library(module: str, user: str = "this format", extra: str = "export") -> Any:
+    """Return a module that ``user`` needs; raise CliError (usage) if it is not installed."""
+    try:
+        return import_module(module)
+    except ImportError:
+        name = module.partition(".")[0]
+        package = _PACKAGES.get(name, name)
+        raise CliError(f"{user} needs {package}: pip install 'flightstack[{extra}]'", USAGE) from None

@@ -14,15 +14,15 @@ _WIDE = 200
 
 def new_table(**settings: Any) -> Table:
     """Return a table without a frame, to which columns and rows are added."""
-    from rich import box  # noqa: PLC0415
-    from rich.table import Table  # noqa: PLC0415
+    from rich import box
+    from rich.table import Table
 
     return Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0), **settings)
 
 
 def table_console() -> Console:
     """Return the console of stdout, wide enough for a table if stdout is no terminal."""
-    from rich.console import Console  # noqa: PLC0415
+    from rich.console import Console
 
     console = Console()
     return console if console.is_terminal else Console(width=_WIDE)

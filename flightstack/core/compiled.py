@@ -41,7 +41,7 @@ class Kernel:
     @cached_property
     def dispatcher(self) -> Any:
         """Numba's dispatcher of the function."""
-        from flightstack.core.dispatcher import KernelDispatcher  # noqa: PLC0415  # imports Numba
+        from flightstack.core.dispatcher import KernelDispatcher
 
         return KernelDispatcher(self.py_func, self._modules)
 

@@ -76,7 +76,7 @@ def earth_field_ned_gauss(place: GeoPoint, year: float = FIELD_YEAR) -> Vector3:
     """Return the field [gauss] at a place, from 2010 to 2030; an earlier or later year counts as the nearest one."""
     year = min(max(year, _MODELS[-1][0]), _MODELS[0][0] + 5.0)
     name = next(model for begin, model in _MODELS if year >= begin)
-    from pygeomag import GeoMag  # noqa: PLC0415  # reads a table of coefficients
+    from pygeomag import GeoMag
 
     field = GeoMag(coefficients_file=f"wmm/{name}.COF").calculate(
         glat=place.latitude_deg, glon=place.longitude_deg, alt=place.altitude_m * 1e-3, time=year

@@ -66,7 +66,7 @@ class _Compiler(Compiler):  # type: ignore[misc]
         flags: Flags,
         locals: Any,
     ) -> None:
-        from flightstack.core.compiled_builtins import register  # noqa: PLC0415  # compiles only
+        from flightstack.core.compiled_builtins import register
 
         register(PartCompiler)
         super().__init__(typingctx, targetctx, library, args, return_type, _Flags(flags), locals)

@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 from flightstack.control.control_law import CStep
 from flightstack.control.controller import AnyController, controller_of
 from flightstack.core.errors import ConfigError
+from flightstack.firmware.generator.call_c import CFunction, Vectors, differences
+from flightstack.firmware.generator.unit import Program
 from flightstack.firmware.law_tree import firmware_for
 from flightstack.firmware.toolchain.build import BuildError, host_library
 
@@ -39,9 +41,6 @@ def law_parity(controller: AnyController, count: int = VECTORS) -> Parity:
 
 
 def _differing(library: ctypes.CDLL, step: Any, count: int) -> int:
-    from flightstack.firmware.generator.call_c import CFunction, Vectors, differences  # noqa: PLC0415
-    from flightstack.firmware.generator.unit import Program  # noqa: PLC0415
-
     function = Program().add(step)
     kinds = Vectors(1, edges=0.0), Vectors(2)
     samples = [kinds[number % 2].arguments(function) for number in range(count)]

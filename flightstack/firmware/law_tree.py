@@ -21,6 +21,7 @@ from flightstack.control.controller_loading import fields_of, load_controller
 from flightstack.control.loop_parameters import LawValues, loop_numbers, own_values
 from flightstack.core.errors import ConfigError
 from flightstack.firmware.c_loops import LoopsSetup
+from flightstack.firmware.generator.subset import OutsideSubsetError
 from flightstack.firmware.generator.text import snake_case
 from flightstack.firmware.sources import firmware_root, source_hash, using_firmware
 from flightstack.firmware.toolchain.build import COMPILE_LIMIT_S, EXACT, BuildError, cache_root, host_compiler
@@ -72,9 +73,8 @@ def generated_files(controller: AnyController) -> dict[str, str]:
 
     The estimator's files are among them if the laws use a function that was the estimator's alone.
     """
-    from flightstack.firmware.generator.core_files import core_files  # noqa: PLC0415  # a tenth of a second
-    from flightstack.firmware.generator.filter_files import filter_files  # noqa: PLC0415
-    from flightstack.firmware.generator.subset import OutsideSubsetError  # noqa: PLC0415
+    from flightstack.firmware.generator.core_files import core_files
+    from flightstack.firmware.generator.filter_files import filter_files
 
     laws, core = laws_with(controller), firmware_root() / "core"
     try:

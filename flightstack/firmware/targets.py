@@ -150,7 +150,7 @@ def check_tools(choice: LoopsChoice) -> None:
     if choice.kind != EMULATED:
         return
     try:
-        from flightstack.firmware.toolchain.cortex_m4 import cross_compiler  # noqa: PLC0415  # unicorn is optional
+        from flightstack.firmware.toolchain.cortex_m4 import cross_compiler
     except ImportError as error:
         raise BuildError(f"unicorn is not installed: {INSTALL_FIRMWARE}") from error
     cross_compiler()
@@ -158,14 +158,10 @@ def check_tools(choice: LoopsChoice) -> None:
 
 def _emulated() -> ByteLink:
     try:
-        from flightstack.firmware.emulator import EmulationError  # noqa: PLC0415
-        from flightstack.firmware.toolchain.cortex_m4 import emulated_target  # noqa: PLC0415  # unicorn is optional
+        from flightstack.firmware.toolchain.cortex_m4 import emulated_target
     except ImportError as error:
         raise BuildError(f"unicorn is not installed: {INSTALL_FIRMWARE}") from error
-    try:
-        return emulated_target()
-    except EmulationError as error:
-        raise BuildError(str(error)) from error
+    return emulated_target()
 
 
 def timing_of(choice: LoopsChoice) -> PilTiming:

@@ -34,7 +34,7 @@ def ardupilot_dialect() -> Any:
 
     The import takes 0.1 s: call this once an ArduPilot vehicle is heard.
     """
-    from pymavlink.dialects.v20 import ardupilotmega  # noqa: PLC0415
+    from pymavlink.dialects.v20 import ardupilotmega
 
     for number, kind in ardupilotmega.mavlink_map.items():
         mavlink.mavlink_map.setdefault(number, kind)

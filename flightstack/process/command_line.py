@@ -13,6 +13,8 @@ from typing import Annotated, Any, get_type_hints
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from flightstack import __version__
+
 UsageError: Any = typer.BadParameter.__mro__[1]
 """Base class of usage errors: typer has its own copy of click in some versions."""
 
@@ -161,8 +163,6 @@ def own_program(module: str, *arguments: str) -> list[str]:
 
 def _print_version(context: typer.Context, wanted: bool) -> None:
     if wanted:
-        from flightstack import __version__  # noqa: PLC0415
-
         print(f"{context.find_root().info_name} {__version__}")
         raise typer.Exit
 

@@ -1,14 +1,18 @@
-"""The options of the ``flightstack`` command, each with its type and its help, in the order that help shows."""
+"""The options of the ``flightstack`` command, each with its type and its help, in the order that help shows.
+
+A module of its own: the help of the programs imports no flight stack.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from flightstack.core.port_numbers import INSTANCES
-from flightstack.process.command_line import IN_LINKS, IN_LOOPS, IN_OUTPUT, IN_VEHICLE
+from flightstack.process.command_line import IN_LINKS, IN_LOOPS, IN_OUTPUT, IN_VEHICLE, Version
 
 Vehicle = Annotated[
     str, typer.Option(help="Built-in vehicle or a TOML file.", metavar="NAME|FILE", **IN_VEHICLE)
@@ -162,3 +166,44 @@ ExitOnGcsLoss = Annotated[
     float | None,
     typer.Option(help="Exit if no ground station is heard for this time.", metavar="SECONDS", **IN_LINKS),
 ]
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """The options of the command, as given."""
+
+    vehicle: Vehicle = "paper_quad"
+    controller: Controller = "pid"
+    gains: Gains = "tuned"
+    inner_hz: InnerHz = 500.0
+    outer_hz: OuterHz = None
+    clock: Clock = "lockstep"
+    loops: Loops = "python"
+    state: State = "estimated"
+    sim_host: SimHost = "127.0.0.1"
+    sim_port: SimPort = None
+    sim_timeout: SimTimeout = 30.0
+    instance: Instance = 0
+    gcs: GroundStations = None
+    gcs_port: GcsPort = None
+    api_port: ApiPort = None
+    tcp_port: TcpPort = None
+    listen: Listen = "127.0.0.1"
+    signing_key: SigningKey = None
+    allow_unsigned: AllowUnsigned = False
+    log: LogFile = None
+    overwrite: Overwrite = False
+    param: Assignments = None
+    params: ParamFile = None
+    state_dir: StateDir = None
+    home: Home = None
+    ideal_rotors: IdealRotors = False
+    wait_for_start: WaitForStart = False
+    check: Check = False
+    exit_on_gcs_loss: ExitOnGcsLoss = None
+    version: Version = False  # handled by its callback
+
+    @property
+    def named_params(self) -> Path | None:
+        """The parameter file given on the command line, if any."""
+        return None if self.params in (None, "none") else Path(str(self.params))

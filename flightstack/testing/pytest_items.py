@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from flightstack.core.errors import ConfigError
-
-if TYPE_CHECKING:
-    from flightstack.testing.artifacts import Evidence
+from flightstack.testing.artifacts import Evidence, description
+from flightstack.testing.scenario import is_scenario, load_scenario
+from flightstack.testing.scenario_run import run_scenario
 
 
 class ScenarioFailedError(AssertionError):
@@ -24,14 +24,10 @@ class ScenarioFile(pytest.File):
     @classmethod
     def of(cls, path: Path, parent: pytest.Collector) -> ScenarioFile | None:
         """Return the collector of ``path``, or None if it is no scenario file."""
-        from flightstack.testing.scenario import is_scenario  # noqa: PLC0415
-
         return cls.from_parent(parent, path=path) if is_scenario(path) else None
 
     def collect(self) -> Iterator[ScenarioItem]:
         """Yield a test for each seed; an error in the file is an error of collection."""
-        from flightstack.testing.scenario import load_scenario  # noqa: PLC0415
-
         try:
             scenario = load_scenario(self.path)
         except ConfigError as error:
@@ -52,9 +48,6 @@ class ScenarioItem(pytest.Item):
 
     def runtest(self) -> None:
         """Fly, and raise ScenarioFailedError with all expectations that do not hold."""
-        from flightstack.testing.artifacts import Evidence, description  # noqa: PLC0415
-        from flightstack.testing.scenario_run import run_scenario  # noqa: PLC0415
-
         verdict = run_scenario(self._scenario, self._seed)
         if not verdict.passed:
             flight = verdict.flight

@@ -37,7 +37,7 @@ def sitl(request: pytest.FixtureRequest) -> Sitl:
     ``sitl(vehicle="x_quad", wind=(5.0, 0.0), seed=3)`` returns a World, which is closed after the test or with the
     fixture that made it. ``sitl.fly("square.plan", ...)`` flies a plan in a world of its own and returns the Flight.
     """
-    from flightstack.testing.sitl import Sitl  # noqa: PLC0415
+    from flightstack.testing.sitl import Sitl
 
     config = request.config
     config.stash[_SITL] = Sitl(config.stash[_OWNERS], config.rootpath)
@@ -53,7 +53,7 @@ def sitl_server(
     ``sitl_server(vehicle="x_quad", speed=5.0)`` returns a Server with free ports, which is stopped after the test or
     with the fixture that started it.
     """
-    from flightstack.testing.sitl import SitlServer  # noqa: PLC0415
+    from flightstack.testing.sitl import SitlServer
 
     config = request.config
     servers = SitlServer(config.stash[_OWNERS], lambda: tmp_path_factory.mktemp("sitl-server"))
@@ -85,7 +85,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def _artifacts(config: pytest.Config) -> Artifacts:
     if _ARTIFACTS not in config.stash:
-        from flightstack.testing.artifacts import Artifacts  # noqa: PLC0415
+        from flightstack.testing.artifacts import Artifacts
 
         given = config.getoption("--sitl-artifacts", None)
         if given is not None:
@@ -170,7 +170,7 @@ def _evidence(item: pytest.Item) -> Evidence | None:
 
 
 def _command(item: pytest.Item) -> str:
-    from flightstack.testing.artifacts import repeat_command  # noqa: PLC0415
+    from flightstack.testing.artifacts import repeat_command
 
     return repeat_command(item.nodeid, item.config.rootpath, item.config.invocation_params.dir)
 
@@ -178,7 +178,7 @@ def _command(item: pytest.Item) -> str:
 def _attach(config: pytest.Config, report: pytest.TestReport, files: list[tuple[str, object]]) -> None:
     """Add links to the report of pytest-html, if it is installed."""
     if config.pluginmanager.hasplugin("html"):
-        from pytest_html import extras  # noqa: PLC0415
+        from pytest_html import extras
 
         links = [
             extras.url(Path(str(path)).as_uri(), name=name.removeprefix("flightstack_"))
@@ -194,7 +194,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> ScenarioFi
     """Collect scenario files: a test for each seed."""
     if file_path.suffix != ".toml" or not _may_be_scenario(file_path):
         return None
-    from flightstack.testing.pytest_items import ScenarioFile  # noqa: PLC0415
+    from flightstack.testing.pytest_items import ScenarioFile
 
     return ScenarioFile.of(file_path, parent)
 

@@ -77,10 +77,8 @@ class Sitl:
             worlds.clear()
             self._has_new_example = False
         worlds.append(flown)
-        if not self._owners.is_fixture and _is_example():
-            from hypothesis.control import cleanup  # noqa: PLC0415  # imported already
-
-            cleanup(lambda: self._end_example(flown))
+        if not self._owners.is_fixture and (hypothesis := _of_example()) is not None:
+            hypothesis.control.cleanup(lambda: self._end_example(flown))
 
     def _end_example(self, flown: Flown) -> None:
         """Close a world of an example of hypothesis; it is kept until the next example, as this one may fail."""
@@ -93,10 +91,10 @@ class Sitl:
         self._has_new_example = False
 
 
-def _is_example() -> bool:
-    """Return True in an example of hypothesis."""
+def _of_example() -> Any:
+    """Return hypothesis in an example of it, or None; it is imported by the tests that use it."""
     hypothesis = sys.modules.get("hypothesis")
-    return hypothesis is not None and hypothesis.currently_in_test_context()
+    return hypothesis if hypothesis is not None and hypothesis.currently_in_test_context() else None
 
 
 class SitlServer:

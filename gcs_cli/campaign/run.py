@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import time
+import webbrowser
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -30,8 +32,7 @@ from gcs_cli.campaign.rows import Row, row_of
 from gcs_cli.campaign.seek import run_search
 from gcs_cli.campaign.statistics import pass_probability
 from gcs_cli.campaign.table import write_tables
-from gcs_cli.errors import DONE, FAILED, INTERRUPTED, USAGE, CliError
-from gcs_cli.logs.export_tables import library
+from gcs_cli.errors import DONE, FAILED, INTERRUPTED, USAGE, CliError, library
 from gcs_cli.run_directory import LOG_NAME, REPORT_NAME, results_directory
 from gcs_cli.scenarios.pool import Finished, Notice
 from gcs_cli.scenarios.result import Wanted
@@ -75,6 +76,11 @@ def run_campaign(pool: FlightPool, options: CampaignOptions, console: Console) -
         write_text_atomically(options.folder / REPORT, render_campaign(campaign, rows, options))
     _print_summary(rows, options, console, time.monotonic() - began_s)
     return DONE if all(row["passed"] for row in rows) else FAILED
+
+
+def open_report(folder: Path) -> None:
+    """Show the report of a campaign in the browser."""
+    webbrowser.open((folder / REPORT).resolve().as_uri())
 
 
 def ordered(journal: Journal) -> list[Row]:

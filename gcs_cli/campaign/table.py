@@ -11,7 +11,7 @@ from typing import Any
 from flightstack.core.atomic_file import replacing, write_text_atomically
 from gcs_cli.campaign.journal import CSV, PARQUET
 from gcs_cli.campaign.rows import Row, columns
-from gcs_cli.logs.export_tables import library
+from gcs_cli.errors import library
 
 _WHOLE = ("flight", "seed")
 

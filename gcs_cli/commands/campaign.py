@@ -5,14 +5,13 @@ A module of its own, as each command: it is imported when it is used.
 
 from __future__ import annotations
 
-import webbrowser
 from typing import TYPE_CHECKING
 
 import typer
 
 from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.campaign.options import SEEKS, CampaignOptions
-from gcs_cli.errors import INTERRUPTED, USAGE, CliError
+from gcs_cli.errors import INTERRUPTED, USAGE, CliError, library
 from gcs_cli.settings import settings_of
 
 if TYPE_CHECKING:
@@ -34,16 +33,14 @@ def fly_campaign(context: typer.Context, options: CampaignOptions) -> None:
     _check(context, options)
     try:
         with _pool(options) as pool:  # its first worker imports while this process does
-            from gcs_cli.campaign.run import run_campaign
+            from gcs_cli.campaign.run import open_report, run_campaign
             from gcs_cli.fly.fly_display import FlyConsole
 
             code = run_campaign(pool, options, FlyConsole(stderr=options.as_json, highlight=False))
     except KeyboardInterrupt:  # not in flight
         raise CliError("interrupted", INTERRUPTED) from None
     if options.open_report and options.only is None:
-        from gcs_cli.campaign.journal import REPORT
-
-        webbrowser.open((options.folder / REPORT).resolve().as_uri())
+        open_report(options.folder)
     raise typer.Exit(code)
 
 
@@ -53,8 +50,6 @@ def _pool(options: CampaignOptions) -> Pool | ClusterPool:
         from gcs_cli.scenarios.pool import Pool, default_jobs
 
         return Pool(options.workers or default_jobs())
-    from gcs_cli.logs.export_tables import library
-
     library("distributed", "--scheduler", "cluster")
     from gcs_cli.campaign.cluster import ClusterPool
 

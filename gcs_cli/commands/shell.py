@@ -153,7 +153,7 @@ def _prompt(connection: Connection) -> str:
 def _line_editing(command: Any) -> Iterator[None]:
     """Edit lines with history and completion, where Python has readline."""
     try:
-        import readline  # noqa: PLC0415  # needs a terminal
+        import readline
     except ImportError:
         yield
         return

@@ -39,7 +39,7 @@ def open_line(endpoint: VehicleEndpoint) -> Line:
         if endpoint.kind == TCP_IN:
             return TcpInLine(endpoint.host, endpoint.port)
         if endpoint.kind == SERIAL:
-            from gcs_cli.link.serial_line import SerialLine  # noqa: PLC0415  # few links need pyserial
+            from gcs_cli.link.serial_line import SerialLine
 
             return SerialLine(endpoint.host, endpoint.port)
         peer = (_resolved(endpoint.host), endpoint.port)

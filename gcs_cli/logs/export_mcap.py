@@ -19,7 +19,7 @@ from flightstack.core.atomic_file import replacing
 from flightstack.core.contract import FloatArray
 from flightstack.core.enums import Severity
 from gcs_cli.charts.decimate import spaced
-from gcs_cli.logs.export_tables import library
+from gcs_cli.errors import library
 from gcs_cli.logs.motion import Motion, Samples, latest, motion_of
 from gcs_cli.logs.recording import AnyArray, Recording, Topic
 from gcs_cli.logs.scene import BODY, PATH_POINTS, WORLD, enu_positions, enu_quaternions

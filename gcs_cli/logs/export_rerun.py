@@ -11,7 +11,7 @@ import numpy as np
 from flightstack.core.atomic_file import replacing
 from flightstack.core.enums import Severity
 from gcs_cli.charts.decimate import spaced
-from gcs_cli.logs.export_tables import library
+from gcs_cli.errors import library
 from gcs_cli.logs.motion import latest, motion_of
 from gcs_cli.logs.recording import AnyArray, Recording
 from gcs_cli.logs.scene import PATH_POINTS, enu_positions, enu_quaternions

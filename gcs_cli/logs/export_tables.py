@@ -8,27 +8,13 @@ import secrets
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from flightstack.core.errors import ConfigError
-from gcs_cli.errors import USAGE, CliError
+from gcs_cli.errors import library
 from gcs_cli.logs.info import start_utc
 from gcs_cli.logs.recording import AnyArray, Recording, Topic
-
-_PACKAGES = {"rerun": "rerun-sdk"}
-
-
-def library(module: str, user: str = "this format", extra: str = "export") -> Any:
-    """Return a module that ``user`` needs; raise CliError (usage) if it is not installed."""
-    try:
-        return import_module(module)
-    except ImportError:
-        name = module.partition(".")[0]
-        package = _PACKAGES.get(name, name)
-        raise CliError(f"{user} needs {package}: pip install 'flightstack[{extra}]'", USAGE) from None
-
 
 TIME_COLUMN = "timestamp"
 """First column: time in µs, as in the log."""

@@ -18,8 +18,7 @@ import numpy as np
 from flightstack.core.atomic_file import write_bytes_atomically
 from flightstack.core.contract import MAX_ROTORS, FloatArray, LoopFlags
 from flightstack.core.errors import ConfigError
-from gcs_cli.errors import CliError
-from gcs_cli.logs.export_tables import library
+from gcs_cli.errors import CliError, library
 from gcs_cli.pil.flight_samples import FlightSamples, Samples, TimeArray
 from gcs_cli.pil.replay import INPUT_SIZE, OUTPUT_SIZE, OUTPUTS, Recording, as_flight
 
@@ -129,7 +128,7 @@ def _as_csv(about: str, columns: Mapping[str, Any]) -> bytes:
 
 
 def _as_mat(about: str, columns: Mapping[str, Any]) -> bytes:
-    from scipy.io import savemat  # noqa: PLC0415  # only for this format
+    from scipy.io import savemat
 
     content = io.BytesIO()
     table = {name: column[:, None] for name, column in columns.items()}
@@ -178,7 +177,7 @@ def _from_csv(content: bytes) -> tuple[str, dict[str, FloatArray]]:
 
 
 def _from_mat(content: bytes) -> tuple[str, dict[str, FloatArray]]:
-    from scipy.io import loadmat  # noqa: PLC0415  # only for this format
+    from scipy.io import loadmat
 
     file = loadmat(io.BytesIO(content), simplify_cells=True)
     table = {name: np.atleast_1d(np.asarray(column, np.float64)) for name, column in file[TABLE].items()}

@@ -57,8 +57,8 @@ def plan_problems(
     areas = plan.fence or tuple(fence or ())
     shape = None
     if areas or plan.rally:
-        from flightstack.plan.fence import check_fence, fence_shape  # noqa: PLC0415  # NumPy
-        from flightstack.plan.rally import check_rally  # noqa: PLC0415
+        from flightstack.plan.fence import check_fence, fence_shape
+        from flightstack.plan.rally import check_rally
 
         shape = fence_shape(areas, home)
     if plan.fence:

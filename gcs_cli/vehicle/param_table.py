@@ -56,7 +56,7 @@ def parameter_table(parameters: Sequence[Parameter], infos: Infos, compared: str
 
     ``compared`` is the heading of the defaults.
     """
-    from rich.text import Text  # noqa: PLC0415
+    from rich.text import Text
 
     table = new_table(header_style="bold")
     table.add_column("name", no_wrap=True)

@@ -32,8 +32,8 @@ from tests.support.warm_children import warm_children
 
 LARGEST_REQUEST = 1 << 18
 LATER = (
-    "flightstack.process.app",
-    "sim_bridge.server.server",
+    "flightstack.process.program",
+    "sim_bridge.program",
     "sim_bridge.server.session",
     "gcs_cli.link.connection",
     "gcs_cli.fly.fly_run",

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from flightstack.__main__ import RunOptions
 from flightstack.core.geodesy import LocalFrame
 from flightstack.params.config import DEFAULT_HOME
 from flightstack.process.console import complain
+from flightstack.process.options import RunOptions
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.output import Output
 from gcs_cli.sim import sim_run

@@ -190,7 +190,7 @@ class Program:
 
     def translated(self, target: Any, caller: Function | None, node: ast.AST | None) -> Function:
         """Return a translated function."""
-        from flightstack.firmware.generator.statements import translate  # noqa: PLC0415
+        from flightstack.firmware.generator.statements import translate
 
         python = python_function(target)
         assert python is not None

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from flightstack.core.errors import INSTALL_FIRMWARE
-from flightstack.firmware.emulator import EmulatedTarget
+from flightstack.firmware.emulator import EmulatedTarget, EmulationError
 from flightstack.firmware.sources import (
     PORTABLE,
     SENSING,
@@ -83,5 +83,8 @@ def instruction_counter() -> Path:
 
 
 def emulated_target(now_s: Callable[[], float] | None = None) -> EmulatedTarget:
-    """Start the firmware on an emulated Cortex-M4F, compiled if needed; raise BuildError, EmulationError."""
-    return EmulatedTarget(cortex_m4_image(), instruction_counter(), now_s)
+    """Start the firmware on an emulated Cortex-M4F, compiled if needed; raise BuildError."""
+    try:
+        return EmulatedTarget(cortex_m4_image(), instruction_counter(), now_s)
+    except EmulationError as error:
+        raise BuildError(str(error)) from error

@@ -37,7 +37,7 @@ def merged(starts: Any, sizes: Any) -> list[tuple[int, int]]:
 def line_coverage(image: Path, executed: Ranges) -> dict[str, FileCoverage] | None:
     """Return the coverage of each source file, named by folder and file; None without pyelftools or the image."""
     try:
-        from elftools.elf.elffile import ELFFile  # noqa: PLC0415  # an extra
+        from elftools.elf.elffile import ELFFile
 
         with image.open("rb") as file:
             elf = ELFFile(file)

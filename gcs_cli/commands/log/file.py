@@ -12,6 +12,7 @@ from flightstack.core.errors import ConfigError
 from flightstack.process.command_line import make_app
 from flightstack.process.console import complain
 from gcs_cli.errors import USAGE, CliError
+from gcs_cli.logs import export_mcap, export_rerun, export_tables
 from gcs_cli.logs.info import info_lines
 from gcs_cli.logs.reader import read_log
 from gcs_cli.logs.recording import Recording
@@ -78,7 +79,6 @@ def export(
     recording = read_log(log)
     warn_if_damaged(recording)
     out = output_of(context, as_json)
-    from gcs_cli.logs import export_mcap, export_rerun, export_tables  # noqa: PLC0415
 
     def say(form: str, path: Path, count: int, unit: str) -> None:
         out.say("exported", f"{count} {unit} written to {path}", format=form, path=str(path), count=count)

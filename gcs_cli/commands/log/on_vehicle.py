@@ -148,7 +148,7 @@ def _download(
     path: Path,
     overwrite: bool,
 ) -> None:
-    from gcs_cli.tui.widgets.transfer_bar import TransferBar  # noqa: PLC0415  # rich
+    from gcs_cli.tui.widgets.transfer_bar import TransferBar
 
     check_new(path, overwrite)
     began_s = connection.now_s

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.process.command_line import make_app
@@ -94,7 +93,7 @@ def _write_page(path: Path, recording: Recording, fields: list[Field], limits: t
 
 
 def _print_figure(path: Path, recording: Recording, fields: list[Field], limits: tuple[float, float]) -> None:
-    from gcs_cli.charts.print_figure import write_figure  # noqa: PLC0415  # matplotlib
+    from gcs_cli.charts.print_figure import write_figure
 
     write_figure(path, field_figure(recording, fields, *limits))
 
@@ -105,6 +104,8 @@ def _print(out: Output, recording: Recording, fields: list[Field], limits: tuple
             time_s, values = field_samples(recording, field, *limits)
             out.say("field", "", name=field.label, time_s=time_s, values=values)
         return
+    from rich.console import Console
+
     console = Console(highlight=False)
     for panel in field_figure(recording, fields, *limits).panels:
         console.print(terminal_panel(panel, console.width, _PANEL_ROWS), soft_wrap=True)

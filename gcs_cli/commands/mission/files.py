@@ -137,7 +137,7 @@ def show(
     if html is None:
         _print_plan(plan, home, output_of(context, link))
         return
-    from gcs_cli.plans.page import plan_page  # noqa: PLC0415  # Jinja2
+    from gcs_cli.plans.page import plan_page
 
     problems = [f"{problem.part}: {problem.reason}" for problem in plan_problems(plan, home)]
     page = plan_page(name, plan, itinerary(plan.items, home), home, problems)
@@ -168,6 +168,6 @@ def _print_plan(plan: Plan, home: GeoPoint, output: Output) -> None:
         console.print(f"\n{totals(flight)}\n", highlight=False)
     if plan.items or plan.fence or plan.rally:
         width = min(shutil.get_terminal_size((80, 24)).columns - 1, 100)
-        from gcs_cli.plans.drawing import draw, places_of  # noqa: PLC0415  # NumPy
+        from gcs_cli.plans.drawing import draw, places_of
 
         console.print(draw(places_of(plan, flight, home), width, _DRAWING_ROWS).text())

@@ -148,7 +148,7 @@ def _add_show(app: typer.Typer, kind: MissionType, text: str) -> None:
             output.say("plan", f"no {part.name}", part=part.name, items=len(part.items))
             return
         home = home_of_items(part.items, plan.home)
-        from gcs_cli.plans.drawing import draw, places_of  # noqa: PLC0415  # NumPy
+        from gcs_cli.plans.drawing import draw, places_of
 
         console = table_console()
         console.print(places_table(part.items))

@@ -21,7 +21,7 @@ _PARTS = {"home": "home", "rally point": "rally"}
 def render_gpx(plan: Plan) -> str:
     """Return a GPX file. Elevations are above sea level; without home, altitudes above home are lost."""
     library("gpxpy")
-    from gpxpy.gpx import GPX, GPXRoute, GPXRoutePoint, GPXWaypoint  # noqa: PLC0415
+    from gpxpy.gpx import GPX, GPXRoute, GPXRoutePoint, GPXWaypoint
 
     gpx = GPX()
     gpx.creator = "flightstack"
@@ -55,7 +55,7 @@ def _elevation_m(item: Any, home: GeoPoint | None) -> float | None:
 def read_gpx(text: str, file: object) -> list[Feature]:
     """Return the points of a GPX file; raise ConfigError."""
     library("gpxpy")
-    import gpxpy  # noqa: PLC0415
+    import gpxpy
 
     return parse_xml("GPX", lambda source: list(_features(gpxpy.parse(source))), text, file)  # type: ignore[no-any-return]
 

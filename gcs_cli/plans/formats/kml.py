@@ -14,7 +14,7 @@ from gcs_cli.plans.formats.libraries import library, parse_xml
 def render_kml(features: list[Feature]) -> str:
     """Return a KML document. Altitudes above home are ``relativeToGround``."""
     library("fastkml")
-    from fastkml import KML, Data, Document, ExtendedData, Placemark  # noqa: PLC0415
+    from fastkml import KML, Data, Document, ExtendedData, Placemark
 
     placemarks = []
     for feature in features:
@@ -35,12 +35,12 @@ def render_kml(features: list[Feature]) -> str:
 
 
 def _geometry(feature: Feature) -> Any:
-    from fastkml import LineString as KmlLine  # noqa: PLC0415
-    from fastkml import Point as KmlPoint  # noqa: PLC0415
-    from fastkml import Polygon as KmlPolygon  # noqa: PLC0415
-    from fastkml.enums import AltitudeMode  # noqa: PLC0415
-    from pygeoif import LineString, Polygon  # noqa: PLC0415
-    from pygeoif import Point as PlainPoint  # noqa: PLC0415
+    from fastkml import LineString as KmlLine
+    from fastkml import Point as KmlPoint
+    from fastkml import Polygon as KmlPolygon
+    from fastkml.enums import AltitudeMode
+    from pygeoif import LineString, Polygon
+    from pygeoif import Point as PlainPoint
 
     if feature.shape == "none":
         return None
@@ -66,7 +66,7 @@ def _geometry(feature: Feature) -> Any:
 def read_kml(text: str, file: object) -> list[Feature]:
     """Return the placemarks of a KML file; raise ConfigError."""
     library("fastkml")
-    from fastkml import KML  # noqa: PLC0415
+    from fastkml import KML
 
     return parse_xml("KML", lambda source: list(_features(KML.from_string(source))), text, file)  # type: ignore[no-any-return]
 

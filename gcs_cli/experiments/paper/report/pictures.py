@@ -111,7 +111,7 @@ def _render(poses: Path, file: Path, camera: str, at_s: float) -> None:
 def _data_uri(file: Path) -> str:
     """Return the picture for the page: as JPEG, a fifth of the size, where Pillow is there."""
     if find_spec("PIL") is not None:
-        from PIL import Image  # noqa: PLC0415
+        from PIL import Image  # noqa: PLC0415  # an extra; modules of sim_bridge that come late import it at their top
 
         smaller = file.with_suffix(".jpg")
         with Image.open(file) as image:
