@@ -10,8 +10,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from gcs_cli.charts.colours import DARK, LIGHT
-from gcs_cli.charts.figure import AnyFigure
+from gcs_cli.charts.figure import DARK, LIGHT, AnyFigure
 from gcs_cli.charts.plotly_json import chart_json
 from gcs_cli.errors import CliError
 

@@ -11,9 +11,8 @@ import numpy as np
 from matplotlib.figure import Figure as Canvas
 
 from flightstack.core.atomic_file import replacing
-from gcs_cli.charts.colours import LIGHT
 from gcs_cli.charts.decimate import decimated, finite_runs
-from gcs_cli.charts.figure import AnyFigure, Axis, Dash, Figure, Panel, Series, Shape, SpaceFigure
+from gcs_cli.charts.figure import LIGHT, AnyFigure, Axis, Dash, Figure, Panel, Series, Shape, SpaceFigure
 
 WIDTH_IN = 7.0
 """Of a text column of A4."""

@@ -17,8 +17,8 @@ from flightstack.process.command_line import (
     make_app,
 )
 from flightstack.process.options import Controller, Gains, InnerHz, OuterHz
-from gcs_cli.fly.fly_flags import PilOptions, RunOptions, complete_options
-from gcs_cli.pil.pil_flags import JudgeOptions
+from gcs_cli.fly.fly_flags import RunOptions, complete_options
+from gcs_cli.pil.pil_flags import JudgeOptions, PilOptions
 from gcs_cli.settings import JsonOption, OverwriteOption
 
 app = make_app(add_completion=False)

@@ -10,6 +10,8 @@ from flightstack.process.command_line import HELP_FLAGS, make_app
 from gcs_cli.commands.lazy_group import LazyCommand, LazyGroup
 from gcs_cli.output import can_draw
 
+_SIMULATION = "gcs_cli.commands.simulation"
+_SCENARIOS = "gcs_cli.commands.scenarios"
 _ACTIONS = "gcs_cli.commands.actions"
 _MISSION = "gcs_cli.commands.mission.on_vehicle"
 _PLANS = "gcs_cli.commands.mission.files"
@@ -24,17 +26,13 @@ class GcsGroup(LazyGroup):
     """``gcs``."""
 
     lazy = {  # noqa: RUF012  # ClassVar in the base
-        "fly": LazyCommand(
-            "gcs_cli.commands.fly", "Fly a mission in simulation and write log, summary and report."
-        ),
-        "sim": LazyCommand(
-            "gcs_cli.commands.sim", "Simulate one or several vehicles for any MAVLink client."
-        ),
+        "fly": LazyCommand(_SIMULATION, "Fly a mission in simulation and write log, summary and report."),
+        "sim": LazyCommand(_SIMULATION, "Simulate one or several vehicles for any MAVLink client."),
         "paper": LazyCommand(
             "gcs_cli.commands.paper", "Fly every experiment of the paper and report the results."
         ),
-        "test": LazyCommand("gcs_cli.commands.test", "Fly scenario files and check the flights."),
-        "campaign": LazyCommand("gcs_cli.commands.campaign", "Fly a scenario many times with varied inputs."),
+        "test": LazyCommand(_SCENARIOS, "Fly scenario files and check the flights."),
+        "campaign": LazyCommand(_SCENARIOS, "Fly a scenario many times with varied inputs."),
         "arm": LazyCommand(_ACTIONS, "Arm the vehicle."),
         "disarm": LazyCommand(_ACTIONS, "Disarm the vehicle."),
         "takeoff": LazyCommand(_ACTIONS, "Take off; arm first if disarmed."),

@@ -15,8 +15,7 @@ from flightstack.estimation.kalman import (
     GNSS_VELOCITY,
     MAG,
 )
-from gcs_cli.charts.colours import nth_colour
-from gcs_cli.charts.figure import Axis, Figure, Panel, Series
+from gcs_cli.charts.figure import Axis, Figure, Panel, Series, nth_colour
 from gcs_cli.estimate.run import Estimate
 from gcs_cli.estimate.track import Differences, Track
 

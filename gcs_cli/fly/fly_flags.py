@@ -116,13 +116,6 @@ class FlyOptions:
         return simulator_port(self.instance)
 
 
-@dataclass(frozen=True)
-class PilOptions(FlyOptions):
-    """The same of flights that compare loops: on the true state, which is no error of the loops."""
-
-    state: stack.State = "truth"
-
-
 TO_SIMULATOR = (
     "vehicle", "plant", "speed", "instance", "seed", "wind", "gust", "drag", "force", "torque", "torque_gust",
     "physics_hz", "slope", "boat", "battery_start", "battery_capacity", "battery_drain", "faults",

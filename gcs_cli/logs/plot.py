@@ -11,8 +11,7 @@ from rich.text import Text
 
 from flightstack.core.contract import FloatArray
 from gcs_cli.charts.canvas import Canvas
-from gcs_cli.charts.colours import nth_colour
-from gcs_cli.charts.figure import Axis, Figure, Panel, Series
+from gcs_cli.charts.figure import Axis, Figure, Panel, Series, nth_colour
 from gcs_cli.logs.fields import Field
 from gcs_cli.logs.recording import Recording
 

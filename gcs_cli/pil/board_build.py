@@ -1,4 +1,7 @@
-"""``gcs pil build``: the firmware for a board."""
+"""``gcs pil build``: the firmware for a board.
+
+A module of its own: its compilers need unicorn, which the other commands of ``gcs pil`` do without.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The options that ``gcs pil fly`` and ``gcs pil replay`` share.
-
-A module of its own: the help imports no report.
-"""
+"""The options of ``gcs pil``: those of its flights, and those of a comparison."""
 
 from __future__ import annotations
 
@@ -12,7 +9,15 @@ from typing import Annotated
 import typer
 
 from flightstack.process.command_line import IN_OUTPUT
-from gcs_cli.fly.fly_flags import ResultOptions
+from flightstack.process.options import State
+from gcs_cli.fly.fly_flags import FlyOptions, ResultOptions
+
+
+@dataclass(frozen=True)
+class PilOptions(FlyOptions):
+    """The options of ``gcs fly`` for flights that compare loops: on the true state, which is no error of the loops."""
+
+    state: State = "truth"
 
 
 @dataclass(frozen=True)

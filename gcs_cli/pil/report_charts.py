@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flightstack.core.contract import FloatArray
-from gcs_cli.charts.colours import nth_colour
-from gcs_cli.charts.figure import TIME, Axis, Bars, Figure, Panel, Series
+from gcs_cli.charts.figure import TIME, Axis, Bars, Figure, Panel, Series, nth_colour
 from gcs_cli.pil.compare import Deviation
 from gcs_cli.pil.profile import STAGE_TITLES, StageProfile
 from gcs_cli.pil.profile import STAGES as PROFILED

@@ -10,8 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from flightstack.plan import Plan
-from gcs_cli.charts.colours import nth_colour
-from gcs_cli.charts.figure import AnyFigure, Axis, Figure, Panel, SpaceFigure, SpacePath
+from gcs_cli.charts.figure import AnyFigure, Axis, Figure, Panel, SpaceFigure, SpacePath, nth_colour
 from gcs_cli.charts.figure import Series as Curve
 from gcs_cli.report.flight_charts import SETPOINT, mode_bands, shown_span, time_figures
 from gcs_cli.report.flight_data import Flight

@@ -10,9 +10,8 @@ import numpy as np
 
 from flightstack.core.contract import FloatArray
 from flightstack.core.enums import NAVIGATION_STATE
-from gcs_cli.charts.colours import nth_colour
 from gcs_cli.charts.decimate import BUCKETS, is_decimated
-from gcs_cli.charts.figure import Axis, Band, Figure, Level, Panel, Shape
+from gcs_cli.charts.figure import Axis, Band, Figure, Level, Panel, Shape, nth_colour
 from gcs_cli.charts.figure import Series as Curve
 from gcs_cli.report.estimate_error import SIGMAS, sigma_curve
 from gcs_cli.report.flight_data import Flight, LoopTiming, Series

@@ -1,22 +1,43 @@
-"""``gcs sim``: vehicle and simulator together, until Ctrl-C.
-
-A module of its own, as each command: it is imported when it is used.
-"""
+"""``gcs fly`` and ``gcs sim``: commands that start simulator and flight stack, for a plan or until Ctrl-C."""
 
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from flightstack.process.command_line import IN_OUTPUT, PanelCommand, expand_options, make_app
 from gcs_cli.errors import USAGE, CliError
-from gcs_cli.fly.fly_flags import RunOptions, complete_options
+from gcs_cli.fly.fly_flags import FlyOptions, RunOptions, complete_options
 from gcs_cli.settings import FlownInstanceOption, FlownTimeoutOption, JsonOption, output_of
 from gcs_cli.sim.sim_flags import PLAN_FIELDS, SimOptions
 
 app = make_app(add_completion=False)
+
+
+@app.command(cls=PanelCommand)
+@expand_options
+def fly(
+    context: typer.Context,
+    options: FlyOptions,
+    run: RunOptions,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="DIR",
+            help="Directory of the results.  [default: runs/<stamp>-<plan>]",
+            **IN_OUTPUT,
+        ),
+    ] = None,
+) -> None:
+    """Fly a mission in simulation and write log, summary and report."""
+    from gcs_cli.fly.fly_run import run_fly
+
+    run_fly(complete_options(context, "fly", options, run), run, out)
 
 
 @app.command(cls=PanelCommand)
