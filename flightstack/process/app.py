@@ -38,7 +38,7 @@ from flightstack.process.process_config import (
 from flightstack.process.process_files import ProcessFiles
 from flightstack.transports.cpu_affinity import AffinityFollower
 from flightstack.transports.tcp import LinkClosedError, TcpClient
-from flightstack.vehicle.lockstep import Lockstep
+from flightstack.vehicle.autopilot import Lockstep
 
 GROUND_POLL_NS = 500_000
 GROUND_IDLE_NS = 2_000_000

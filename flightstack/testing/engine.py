@@ -19,7 +19,7 @@ from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from flightstack.simulator_link.hot_frames import VALID_FLAG, ActuatorsFrame
 from flightstack.testing.quiet_ticks import QuietTicks
 from flightstack.testing.setup import Setup
-from flightstack.vehicle.lockstep import Lockstep
+from flightstack.vehicle.autopilot import Lockstep
 from sim_bridge.server.failure_command import inject_failure
 from sim_bridge.simulator import SIMULATOR_COMPONENT, Simulator
 

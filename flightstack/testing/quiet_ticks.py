@@ -28,7 +28,7 @@ from flightstack.process.assembly import Stack
 from flightstack.simulator_link.hot_frames import VALID_FLAG, ActuatorsFrame
 from flightstack.testing.quiet_outer import QuietOuter
 from flightstack.testing.quiet_slow import QuietSlow
-from flightstack.vehicle.lockstep import Lockstep
+from flightstack.vehicle.autopilot import Lockstep
 from flightstack.vehicle.quiet_kernel import QUIET_COUNTERS, QuietCalls, QuietCounters, fly_quiet_ticks
 from sim_bridge.plant.compiled_plant import CompiledPlant
 from sim_bridge.plant.layout import CONTACT
