@@ -10,7 +10,7 @@ import numpy as np
 from flightstack.commander.fault_detector import detect
 from flightstack.control.loops import PythonLoops
 from flightstack.core.arrays import store_outer_row
-from flightstack.core.contract import LoopFlags
+from flightstack.core.contract import LoopFlags, RecordArray
 from flightstack.core.enums import Mode
 from flightstack.core.kernel_calls import address_of
 from flightstack.flight_log.flight_log import DEFAULT_CAPACITY, FlightLog, Trace
@@ -19,7 +19,7 @@ from flightstack.guidance.fence import fence_step
 from flightstack.guidance.kernels import GoalArrays, goal_kernel
 from flightstack.guidance.mission import MissionProgress
 from flightstack.process.assembly import Stack
-from flightstack.vehicle.outer_kernel import OUTER_MARKS, PROGRESS, OuterCalls, OuterMarks
+from flightstack.vehicle.outer_kernel import OUTER_CALLS, OUTER_MARKS, PROGRESS, OuterCalls, OuterMarks
 
 _NEVER_M = -1.0
 """A distance to the takeoff altitude that is never reached."""
@@ -55,10 +55,10 @@ class QuietOuter:
         self.calls = self._addresses(loops)
         """Addresses of the kernels."""
 
-    def _addresses(self, loops: PythonLoops) -> OuterCalls:
+    def _addresses(self, loops: PythonLoops) -> RecordArray:
         now, faults, fence, goal = self._now, self._faults, self._fence, self._navigator.goal
         target, _last_target, memory, parameters, last, outer_dt_s = self._control
-        return OuterCalls(
+        calls = OuterCalls(
             fence=address_of(fence_step, *fence.areas, fence.limits, now.state, fence.breach),
             detect=address_of(
                 detect, now.state, now.setpoint, now.row, faults.rotors, faults.detectors, faults.limits, False, 1.0
@@ -74,6 +74,7 @@ class QuietOuter:
                 store_outer_row, self._no_log.rows[0], now.state, now.setpoint, target, _FLAGS
             ),
         )  # fmt: skip
+        return np.array([calls], OUTER_CALLS)
 
     def room(self, time_us: int) -> int:
         """Return for how many ticks from the outer tick at ``time_us`` the open log takes rows without other work."""

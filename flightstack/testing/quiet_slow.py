@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from flightstack.core.contract import FloatArray, Vector3
+from flightstack.core.contract import FloatArray, RecordArray, Vector3
 from flightstack.core.kernel_calls import address_of
 from flightstack.estimation.delayed_filter import push_kernel
 from flightstack.estimation.rings import MAG_RING
@@ -21,6 +21,7 @@ from flightstack.vehicle.estimation import Estimation
 from flightstack.vehicle.slow_kernel import (
     BARO,
     MAG,
+    SLOW_CALLS,
     SLOW_MARKS,
     SlowCalls,
 )
@@ -66,10 +67,10 @@ class QuietSlow:
         self.constant = self._constant(simulator, truth)
         """Argument ``slow`` of the kernel."""
 
-    def _addresses(self, simulator: Simulator) -> SlowCalls:
+    def _addresses(self, simulator: Simulator) -> RecordArray:
         sensors, estimation = self._sensors, self._estimation
         if sensors is None or estimation is None:
-            return SlowCalls()
+            return np.zeros(1, SLOW_CALLS)
         plant, frame = simulator.plant, simulator.frame
         assert isinstance(plant, CompiledPlant)
         mag_call = baro_call = 0
@@ -82,7 +83,8 @@ class QuietSlow:
                 measure_baro, baro.records, 0, frame.state, 0.0, speeds, baro.noise.block[0]
             )
         push = address_of(push_kernel, estimation.estimators[0].memory, MAG_RING, np.zeros(4))
-        return SlowCalls(mag_call, baro_call, address_of(airspeed, plant.memory), push)
+        calls = SlowCalls(mag_call, baro_call, address_of(airspeed, plant.memory), push)
+        return np.array([calls], SLOW_CALLS)
 
     def _constant(self, simulator: Simulator, truth: FloatArray) -> tuple[Any, ...]:
         sensors, estimation = self._sensors, self._estimation

@@ -16,7 +16,7 @@ import numpy as np
 from flightstack.commander.fault_detector import follow_rotors
 from flightstack.control.loops import PythonLoops
 from flightstack.core.compiled import IS_DISABLED, direct
-from flightstack.core.contract import STATE_SIZE, FloatArray, LoopRow
+from flightstack.core.contract import STATE_SIZE, FloatArray, LoopRow, RecordArray
 from flightstack.core.kernel_calls import address_of
 from flightstack.estimation.delayed_filter import imu_kernel
 from flightstack.estimation.estimator import Estimator
@@ -29,7 +29,13 @@ from flightstack.simulator_link.hot_frames import VALID_FLAG, ActuatorsFrame
 from flightstack.testing.quiet_outer import QuietOuter
 from flightstack.testing.quiet_slow import QuietSlow
 from flightstack.vehicle.autopilot import Lockstep
-from flightstack.vehicle.quiet_kernel import QUIET_COUNTERS, QuietCalls, QuietCounters, fly_quiet_ticks
+from flightstack.vehicle.quiet_kernel import (
+    QUIET_CALLS,
+    QUIET_COUNTERS,
+    QuietCalls,
+    QuietCounters,
+    fly_quiet_ticks,
+)
 from sim_bridge.plant.compiled_plant import CompiledPlant
 from sim_bridge.plant.layout import CONTACT
 from sim_bridge.sensors.imu import measure_imu
@@ -113,7 +119,7 @@ class QuietBlock:
         changing = self._changing(0, False, self._no_log, self._no_imu_log)
         self._fly = partial(direct(fly_quiet_ticks, *constant, *changing), *constant)
 
-    def _addresses(self, sensing: _Arguments) -> QuietCalls:
+    def _addresses(self, sensing: _Arguments) -> RecordArray:
         """Return the addresses of the kernels."""
         now, faults, commands = (
             self._stack.now,
@@ -125,6 +131,7 @@ class QuietBlock:
             address_of(plant.kernel, plant.memory, commands, 0, 1, plant.output),
             address_of(loops.kernel, now.state, 1.0, now.rotor_speed, loops.memory, row),
             address_of(follow_rotors, row, faults.rotors, faults.lags),
+            *(0, 0, 0),
         )
         if self._estimation is not None:
             track, record = self._estimation.feed.lanes[0].newest.imu_track, self._no_imu_log.rows[0]
@@ -133,7 +140,7 @@ class QuietBlock:
                 take=address_of(take_wire, track.memory, sensing[5][0], 0.0, 1, record),
                 estimate=address_of(imu_kernel, self._estimation.estimators[0].memory, track.ring[0]),
             )
-        return calls
+        return np.array([calls], QUIET_CALLS)
 
     def _constant(self, calls: Any, sensing: _Arguments) -> _Arguments:
         """Return the arguments of the kernel that stay."""
@@ -148,7 +155,7 @@ class QuietBlock:
             _bytes(faults.rotors), _bytes(faults.lags),
         )  # fmt: skip
         return (
-            calls, self.outer.calls, self._slow.calls, self._counters, self._interval_us, self._divisor, plant_part,
+            (calls, self.outer.calls, self._slow.calls), self._counters, self._interval_us, self._divisor, plant_part,
             sensing, self._slow.constant, control,
         )  # fmt: skip
 

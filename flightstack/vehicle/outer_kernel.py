@@ -50,7 +50,7 @@ class Progress(NamedTuple):
     reached: int
 
 
-OUTER_MARKS, PROGRESS = dtype_of(OuterMarks), dtype_of(Progress)
+OUTER_CALLS, OUTER_MARKS, PROGRESS = dtype_of(OuterCalls), dtype_of(OuterMarks), dtype_of(Progress)
 
 
 @compiled
@@ -87,7 +87,7 @@ def _leaves_fence(calls: Any, fence: Any, state: FloatArray) -> bool:
     is_active, areas, vertices, groups, limits, breach = fence
     if not is_active:
         return False
-    call_kernel(calls.fence, (areas, vertices, groups, limits, state, breach))
+    call_kernel(calls["fence"], (areas, vertices, groups, limits, state, breach))
     return bool(breach[0]["flags"] != 0)
 
 
@@ -102,11 +102,13 @@ def _is_nominal(calls: Any, outer: Any, state: FloatArray, row: FloatArray) -> b
         return False
     if abs(state[2] + altitude_m) <= acceptance_m or _leaves_fence(calls, fence, state):
         return False
-    found = call_kernel_int(calls.detect, (state, setpoint, row, rotors, detectors, limits, on_ground, dt_s))
+    found = call_kernel_int(
+        calls["detect"], (state, setpoint, row, rotors, detectors, limits, on_ground, dt_s)
+    )
     if found & ~MOVING != 0:
         return False
     call_kernel(
-        calls.guide,
+        calls["guide"],
         (
             number, state, trajectory, mission, plan, jumps_left, mode_target, land, control[0], rotors[0]["thrust"],
             params, dt_s, setpoint,
@@ -138,7 +140,7 @@ def guide(calls: Any, outer: Any, tick: int, time_us: int, state: FloatArray, ro
     marks[0]["last"] = tick
     target, last_target, memory, parameters, last, outer_dt_s = control
     copy_all(target, last_target)
-    call_kernel(calls.command, (state, guidance[9], memory, parameters, last, outer_dt_s, target))
+    call_kernel(calls["command"], (state, guidance[9], memory, parameters, last, outer_dt_s, target))
     return True
 
 
@@ -151,7 +153,7 @@ def note_outer(calls: Any, outer: Any, time_us: int, state: FloatArray) -> None:
     at = marks["at"] + marks["outers"]
     row = rows[at]
     times_us[at] = time_us
-    call_kernel(calls.store, (row, state, guidance[9], control[0], flags))
+    call_kernel(calls["store"], (row, state, guidance[9], control[0], flags))
     for i in range(len(estimate)):
         row[size + i] = estimate[i]
     marks["outers"] += 1

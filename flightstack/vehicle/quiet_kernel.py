@@ -27,9 +27,9 @@ class QuietCalls(NamedTuple):
     advance: int
     control: int
     follow: int
-    measure: int = 0
-    take: int = 0
-    estimate: int = 0
+    measure: int
+    take: int
+    estimate: int
 
 
 class QuietCounters(NamedTuple):
@@ -47,7 +47,7 @@ class QuietCounters(NamedTuple):
     """1 if a tick is begun that must be run in Python."""
 
 
-QUIET_COUNTERS = dtype_of(QuietCounters)
+QUIET_CALLS, QUIET_COUNTERS = dtype_of(QuietCalls), dtype_of(QuietCounters)
 
 
 @compiled
@@ -63,14 +63,14 @@ def _sense(
 ) -> None:
     """Measure with the inertial sensors, and give each filter its sample; ``record`` takes that of the selected one."""
     motion, imus, true_state, true_speeds, noise, wires, tracks, rings, filters, spare_record = sensing
-    call_kernel(calls.measure, (motion, imus, true_state, true_speeds, noise, wires))
+    call_kernel(calls["measure"], (motion, imus, true_state, true_speeds, noise, wires))
     time_s = time_us * 1e-6
     for k in range(len(tracks)):
         rows, taken = rings[k]
         sample = rows[taken[0] % len(rows)]
         kept = record if k == selected else spare_record
-        call_kernel(calls.take, (tracks[k], wires[k], time_s, interval_us, kept))
-        call_kernel(calls.estimate, (filters[k], sample))
+        call_kernel(calls["take"], (tracks[k], wires[k], time_s, interval_us, kept))
+        call_kernel(calls["estimate"], (filters[k], sample))
 
 
 @compiled
@@ -89,10 +89,10 @@ def _control(calls: Any, control: Any, flies: bool, row: FloatArray, commands: F
     state, speeds, loops, fraction, fraction_step, idle, rotors, lags = control
     if flies:
         fraction[0] += fraction_step
-        call_kernel(calls.control, (state, fraction[0], speeds, loops, row))
+        call_kernel(calls["control"], (state, fraction[0], speeds, loops, row))
     else:
         _rest(row, idle, state, speeds)
-    call_kernel(calls.follow, (row, rotors, lags))
+    call_kernel(calls["follow"], (row, rotors, lags))
     for i in range(len(commands)):
         commands[i] = row[_COMMAND + i]
 
@@ -106,7 +106,7 @@ def _advance(
     memory, commands, steps, output, largest_result, sent, taken = plant
     selected, known, is_known, resets = estimate
     records, record_times, record_at = imu_log
-    result = call_kernel_int(calls.advance, (memory, commands, flags, steps, output))
+    result = call_kernel_int(calls["advance"], (memory, commands, flags, steps, output))
     counters["flown"] += 1
     counters["result"] = result
     if result > largest_result:
@@ -131,7 +131,7 @@ def _advance(
 
 @compiled
 def fly_quiet_ticks(
-    calls: Any, outer_calls: Any, slow_calls: Any, counters_array: Any, interval_us: int, divisor: int, plant: Any,
+    calls_of: Any, counters_array: Any, interval_us: int, divisor: int, plant: Any,
     sensing: Any, slow: Any, control: Any, count: int, is_taken: bool, outer_in: int, time_us: int, flags: int,
     flies: bool, last_row: FloatArray, estimate: Any, following: Any, outer: Any, log: Any, imu_log: Any,
 ) -> None:  # fmt: skip
@@ -144,6 +144,7 @@ def fly_quiet_ticks(
     inertial sensor; on the true state there are no ``imus``. ``slow`` and ``following`` are those of ``slow_kernel``.
     """
     rows, row_times, row_at = log
+    calls, outer_calls, slow_calls = calls_of[0][0], calls_of[1][0], calls_of[2][0]
     state, row, counters, marks = control[0], last_row, counters_array[0], outer[0][0]
     counters["ticks"], counters["flown"], counters["result"], counters["sensed"] = 0, 0, 0, 0
     counters["waits"] = 0

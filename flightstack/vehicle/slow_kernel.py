@@ -23,10 +23,10 @@ MAG, BARO = 0, 1
 class SlowCalls(NamedTuple):
     """Addresses of the kernels, 0 without one."""
 
-    measure_mag: int = 0
-    measure_baro: int = 0
-    airspeed: int = 0
-    push: int = 0
+    measure_mag: int
+    measure_baro: int
+    airspeed: int
+    push: int
 
 
 class SlowMarks(NamedTuple):
@@ -46,7 +46,7 @@ class SlowMarks(NamedTuple):
     """Time from which the log of the truth takes a row."""
 
 
-SLOW_MARKS = dtype_of(SlowMarks)
+SLOW_CALLS, SLOW_MARKS = dtype_of(SlowCalls), dtype_of(SlowMarks)
 
 
 @compiled
@@ -70,15 +70,16 @@ def measure_slow(
     marks["is_mag_new"], marks["is_baro_new"] = 0, 0
     if take_due(due_us, period_us, MAG, time_us):
         mags, out, noise, cursor, current_a = mag
-        call_kernel(calls.measure_mag, (mags, state, current_a[0], _next_row(noise, cursor)))
+        call_kernel(calls["measure_mag"], (mags, state, current_a[0], _next_row(noise, cursor)))
         for i in range(3):
             parts[0]["mag_gauss"][i] = out[i]
         marks["is_mag_new"] = 1
     if take_due(due_us, period_us, BARO, time_us):
         baros, out, noise, cursor = baro
-        airspeed_m_s = call_kernel_float(calls.airspeed, (memory,))
+        airspeed_m_s = call_kernel_float(calls["airspeed"], (memory,))
         call_kernel(
-            calls.measure_baro, (baros, time_us, state, airspeed_m_s, rotor_speeds, _next_row(noise, cursor))
+            calls["measure_baro"],
+            (baros, time_us, state, airspeed_m_s, rotor_speeds, _next_row(noise, cursor)),
         )
         values = parts[0]
         values["pressure_hpa"], values["altitude_m"], values["temperature_c"] = out[0], out[1], out[2]
@@ -91,7 +92,7 @@ def _push(calls: Any, filters: Any, ring: int, values: FloatArray, row: FloatArr
     for k in range(len(filters)):
         for i in range(len(values)):
             row[i] = values[i]
-        call_kernel(calls.push, (filters[k], ring, row))
+        call_kernel(calls["push"], (filters[k], ring, row))
 
 
 @compiled
