@@ -1,4 +1,4 @@
-"""Fly seeded flights on sensors and judge the estimator's consistency: NEES of each state, NIS of each sensor.
+"""Fly seeded flights on sensors and examine the estimator's consistency: NEES of each state, NIS of each sensor.
 
 ``python -m tools.estimator_campaign --flights 200`` flies hover, square and lemniscate in wind by turns, with another
 seed each. The error of a state by its covariance is read once a flight, at its end, so that the flights are
@@ -50,7 +50,7 @@ FLIGHT_S, CLIMB_S = 30.0, 8.0
 _PARTS = ACCEL_BIAS + 3
 
 
-class Judgement(NamedTuple):
+class Consistency(NamedTuple):
     """Mean of normalised squares, 1 for a consistent filter, with the 95 % bounds for it."""
 
     mean: float
@@ -155,17 +155,17 @@ def fly(kind: str, seed: int) -> tuple[dict[str, float], dict[str, float]]:
     return nees, nis
 
 
-def judged(values: FloatArray, freedom: int) -> Judgement:
+def consistency_of(values: FloatArray, freedom: int) -> Consistency:
     """Return the mean of independent values, each the mean of ``freedom`` squares, and its 95 % bounds."""
     total = freedom * len(values)
     low, high = stats.chi2.ppf((0.025, 0.975), total) / total
-    return Judgement(float(np.mean(values)), float(low), float(high))
+    return Consistency(float(np.mean(values)), float(low), float(high))
 
 
 def campaign(
     flights: int, first_seed: int, workers: int | None = None
-) -> dict[str, dict[str, Judgement | float]]:
-    """Fly ``flights`` flights, of all kinds by turns; return the judgements by kind, and of all.
+) -> dict[str, dict[str, Consistency | float]]:
+    """Fly ``flights`` flights, of all kinds by turns; return the consistency by kind, and of all.
 
     They are flown by ``workers`` processes, with the same result for any number of these.
     """
@@ -175,11 +175,11 @@ def campaign(
         for kind, flight in zip(kinds, pool.map(fly, kinds, itertools.count(first_seed)), strict=True):
             found[kind].append(flight)
     found["all"] = [flight for kind in KINDS for flight in found[kind]]
-    result: dict[str, dict[str, Judgement | float]] = {}
+    result: dict[str, dict[str, Consistency | float]] = {}
     for kind, rows in found.items():
         if rows:
             states = {
-                name: judged(np.array([nees[name] for nees, _ in rows]), len(at))
+                name: consistency_of(np.array([nees[name] for nees, _ in rows]), len(at))
                 for name, at in STATES.items()
             }
             sensors = {name: float(np.mean([nis[name] for _, nis in rows])) for name in SENSORS}
@@ -202,9 +202,9 @@ def main() -> None:
     print(f"| NEES, NIS | {' | '.join(result)} | 95 % of all |\n|---|{'---|' * (len(result) + 1)}")
     for name in (*STATES, *SENSORS):
         values = [row[name] for row in result.values()]
-        cells = [f"{value.mean if isinstance(value, Judgement) else value:.2f}" for value in values]
+        cells = [f"{value.mean if isinstance(value, Consistency) else value:.2f}" for value in values]
         last = values[-1]
-        bounds = f"{last.low:.2f} to {last.high:.2f}" if isinstance(last, Judgement) else ""
+        bounds = f"{last.low:.2f} to {last.high:.2f}" if isinstance(last, Consistency) else ""
         print(f"| {name} | {' | '.join(cells)} | {bounds} |")
 
 

@@ -55,7 +55,7 @@ class _View:
 
 
 class Lanes:
-    """Judges the estimators of a feed, and selects the one that flies the vehicle."""
+    """Compares the estimators of a feed, and selects the one that flies the vehicle."""
 
     def __init__(self, feed: SensorFeed, estimators: Sequence[Estimator]) -> None:
         """``estimators`` are those of ``feed``, by the number of the inertial sensor."""
@@ -66,8 +66,8 @@ class Lanes:
         self._is_compared = False
         self.selection = Selection((LaneRecord(),) * len(estimators))
         self.facts: tuple[LaneFacts, ...] = ()
-        """Those of the newest judgement, by lane; empty before it."""
-        self._judged_us = 0
+        """Those of the newest comparison, by lane; empty before it."""
+        self._compared_us = 0
 
     @property
     def estimator(self) -> Estimator:
@@ -98,7 +98,7 @@ class Lanes:
         live = (not _is_late(lane, newest_us) and _repeats(lane) < REPEATS for lane in lanes)
         facts = [
             fact._replace(is_usable=fact.is_usable and is_live)
-            for fact, is_live in zip(self.facts, live, strict=False)  # none before the first judgement
+            for fact, is_live in zip(self.facts, live, strict=False)  # none before the first comparison
         ]
         best = best_usable(self.selection, facts)
         if best is None:
@@ -107,7 +107,7 @@ class Lanes:
         return True
 
     def update(self, has_origin: bool, limit_m: float, time_us: int) -> tuple[EstimateHealth, bool]:
-        """Judge all lanes at 20 Hz; return the health of the selected one, and True if another one was selected.
+        """Compare all lanes at 20 Hz; return the health of the selected one, and True if another one was selected.
 
         ``limit_m`` is that of the horizontal deviation, -1 for none.
         """
@@ -119,13 +119,13 @@ class Lanes:
         ]
         if self.is_alone:
             return healths[0], False
-        since_s = self._judged_us * 1e-6
+        since_s = self._compared_us * 1e-6
         self.facts = tuple(
             _facts_of(view, lane, health, since_s)
             for view, lane, health in zip(self._views, self._feed.lanes, healths, strict=True)
         )
-        dt_s = (time_us - self._judged_us) * 1e-6 if self._judged_us else 0.0
-        self._judged_us = time_us
+        dt_s = (time_us - self._compared_us) * 1e-6 if self._compared_us else 0.0
+        self._compared_us = time_us
         self._compare_states()
         before = self.selection
         selection = select(before, self.facts, time_us * 1e-6, dt_s)

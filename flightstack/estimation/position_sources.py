@@ -88,7 +88,7 @@ def _begin_gnss(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorPa
 
 @compiled
 def _end_gnss(m: MemoryRecord, f: Filter, row: FloatArray, first: int, params: EstimatorParams) -> None:
-    """Judge the measurement by its innovations, and reset what was refused too long."""
+    """Check the measurement by its innovations, and reset what was refused too long."""
     before, c = m["before_gnss"], m["checks"]
     elapsed_s = before["elapsed_s"]
     if m["flags"]["landed"] == 0:

@@ -196,13 +196,13 @@ def follow_height_drift(c: ChecksRecord, row: FloatArray, flies: bool, accuracy_
         change_m = 0.0 if c["had_altitude"] == 0.0 else c["altitude_then_m"] - altitude_m - moved_m
         change_m = min(max(change_m, -_LARGEST_CHANGE_M), _LARGEST_CHANGE_M)
         c["baro_drift_m"] = kept * c["baro_drift_m"] + change_m if has_altitude else 0.0
-        _judge_height(c, row[0], _NOISE_SHARE * accuracy_m_s * math.sqrt(0.5 * _DRIFT_S * dt_s))
+        _check_height(c, row[0], _NOISE_SHARE * accuracy_m_s * math.sqrt(0.5 * _DRIFT_S * dt_s))
     c["place_m"][2], c["velocity_m_s"][2], c["altitude_then_m"] = row[3], row[6], altitude_m
     c["had_altitude"] = 1.0 if has_altitude else 0.0
 
 
 @compiled
-def _judge_height(c: ChecksRecord, now_s: float, noise_m: float) -> None:
+def _check_height(c: ChecksRecord, now_s: float, noise_m: float) -> None:
     """Decide whether barometer or vertical GNSS velocity is wrong, beyond the noise of their drift."""
     apart_m, side = (
         abs(c["baro_drift_m"]),

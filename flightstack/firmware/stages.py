@@ -121,7 +121,7 @@ def _reset(m: Record, inputs: FloatArray) -> None:
 
 
 @compiled
-def _aim(m: Record, inputs: FloatArray, flags: int) -> None:
+def _update_target(m: Record, inputs: FloatArray, flags: int) -> None:
     """Update the attitude target as the flags require, but for the outer loop."""
     if flags & RESET:
         _reset(m, inputs)
@@ -261,7 +261,7 @@ def stages_kernel(
     m, mixer = memory[0], _mixer(memory[0])
     for step in range(len(flags)):
         given, out, wanted = inputs[step], outputs[step], expected[step]
-        _aim(m, given, flags[step])
+        _update_target(m, given, flags[step])
         if flags[step] & OUTER_DUE:
             outer_kernel(
                 given[:STATE_SIZE], given[SETPOINT_AT:TARGET_AT], m["outer"], m["outer_params"], m["last"],

@@ -1,4 +1,4 @@
-"""Judge a flight by the expectations of a scenario."""
+"""Evaluate a flight by the expectations of a scenario."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Check:
         return f"{self.name}: {self.found}"
 
 
-def judge(expect: Expect, flight: Flight, last: State, events: Sequence[Event]) -> tuple[Check, ...]:
+def evaluate(expect: Expect, flight: Flight, last: State, events: Sequence[Event]) -> tuple[Check, ...]:
     """Return a check for each expectation."""
     return tuple(_checks(expect, flight, last, events))
 

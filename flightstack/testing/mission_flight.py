@@ -1,4 +1,4 @@
-"""Fly a plan from its upload to the end, as ``gcs fly`` does, and judge it."""
+"""Fly a plan from its upload to the end, as ``gcs fly`` does, and evaluate it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.plan import Plan
 from flightstack.testing.client import RefusedError
 from gcs_cli.fly.flight_limit import flight_limit_s
-from gcs_cli.report.flight_outcome import Code, Outcome, ends_in_air, judged, too_late
+from gcs_cli.report.flight_outcome import Code, Outcome, ends_in_air, outcome_of, too_late
 from gcs_cli.vehicle.view_types import MISSION_COMPLETE, Mission, VehicleView
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def _flown(world: World, limit_s: float, step: Step) -> Outcome:
                 world.rtl()
         if step(end_s - world.time_s):
             break
-    return judged(_view(world), items)
+    return outcome_of(_view(world), items)
 
 
 def _view(world: World) -> VehicleView:

@@ -1,4 +1,4 @@
-"""Fly a scenario: start it, let its events happen, and judge the flight. Simulated time, one process."""
+"""Fly a scenario: start it, let its events happen, and evaluate the flight. Simulated time, one process."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from flightstack.core.errors import ConfigError
 from flightstack.testing.client import Client, RefusedError
-from flightstack.testing.expectations import Check, judge
+from flightstack.testing.expectations import Check, evaluate
 from flightstack.testing.expression import Expression
 from flightstack.testing.flight import Flight
 from flightstack.testing.mission_flight import fly_plan
@@ -71,7 +71,7 @@ def run_scenario(scenario: Scenario, seed: int | None = None) -> Verdict:
         run = _Run(world, scenario)
         flight = world.flight(run.fly())
         last = world.state
-        checks = judge(scenario.expect, flight, last, world.events)
+        checks = evaluate(scenario.expect, flight, last, world.events)
         missed = run.missed() if scenario.expect.refusal is None else ()
         return Verdict(scenario, seed, flight, last, (*checks, *missed))
 
@@ -131,7 +131,7 @@ class _Run:
         self._due = [entry for entry in self._due if entry[0] > now_s + 1e-9]
         for event in due:
             if event.fault is not None or event.link is not None:
-                _happen(world, event)
+                _carry_out(world, event)
             else:
                 self._requests.append(event)
 
@@ -140,7 +140,7 @@ class _Run:
         world = self._world
         self._fire()
         while self._requests:
-            _happen(world, self._requests.pop(0))
+            _carry_out(world, self._requests.pop(0))
         duration_s = self._scenario.duration_s
         if duration_s is None:
             world.run_on(most_s)
@@ -184,7 +184,7 @@ _EFFECTS: dict[str, Callable[[World, Event, Client], None]] = {
 """What the effect of an event does, by its key."""
 
 
-def _happen(world: World, event: Event) -> None:
+def _carry_out(world: World, event: Event) -> None:
     """Carry out the effect of an event, and record an answer that was not expected."""
     effect = next(name for name in _EFFECTS if getattr(event, name) is not None)
     try:

@@ -18,7 +18,7 @@ from flightstack.process.command_line import (
 )
 from flightstack.process.options import Controller, Gains, InnerHz, OuterHz
 from gcs_cli.fly.fly_flags import RunOptions, complete_options
-from gcs_cli.pil.pil_flags import JudgeOptions, PilOptions
+from gcs_cli.pil.pil_flags import PilOptions, VerdictOptions
 from gcs_cli.settings import JsonOption, OverwriteOption
 
 app = make_app(add_completion=False)
@@ -30,7 +30,7 @@ def fly(
     context: typer.Context,
     options: PilOptions,
     run: RunOptions,
-    judge: JudgeOptions,
+    verdict: VerdictOptions,
     target: Annotated[
         str, typer.Option(metavar="TARGET", help="emulated, host, or serial:DEVICE[:BAUD].", **IN_LOOPS)
     ] = "emulated",
@@ -41,7 +41,7 @@ def fly(
     """
     from gcs_cli.pil.pil_commands import run_flights
 
-    run_flights(complete_options(context, "pil", options, run), judge, target)
+    run_flights(complete_options(context, "pil", options, run), verdict, target)
 
 
 @app.command("free-run", cls=PanelCommand)
@@ -76,7 +76,7 @@ def replay(
         Path,
         typer.Argument(help="A flight log (ULog), or test vectors (.csv, .mat, .h5).", show_default=False),
     ],
-    judge: JudgeOptions,
+    verdict: VerdictOptions,
     target: Annotated[
         str, typer.Option(metavar="TARGET", help="emulated, host, c, or serial:DEVICE[:BAUD].")
     ] = "emulated",
@@ -90,7 +90,7 @@ def replay(
     """
     from gcs_cli.pil.pil_commands import run_replay
 
-    run_replay(log, judge, target, vehicle)
+    run_replay(log, verdict, target, vehicle)
 
 
 @app.command()

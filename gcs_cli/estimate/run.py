@@ -53,13 +53,13 @@ def run(log: Recording, given: Mapping[str, float]) -> Estimate:
     """
     estimator = None if given else _continued(log)
     estimator = estimator or _new(log, given)
-    keeper = _Keeper(estimator)
+    recorder = _Recorder(estimator)
     year = log.year or FIELD_YEAR
     for sample in samples_of(log):
-        keeper.count(sample)
+        recorder.count(sample)
         if isinstance(sample, ImuSample):
             estimator.imu(sample)
-            keeper.keep(sample.time_s)
+            recorder.record(sample.time_s)
         elif isinstance(sample, MagSample):
             estimator.mag(sample)
         elif isinstance(sample, BaroSample):
@@ -73,7 +73,7 @@ def run(log: Recording, given: Mapping[str, float]) -> Estimate:
             estimator.range(sample)
         elif isinstance(sample, Landed):
             estimator.set_landed(sample.is_landed)
-    return keeper.result(log)
+    return recorder.result(log)
 
 
 def _continued(log: Recording) -> Estimator | None:
@@ -89,7 +89,7 @@ def _new(log: Recording, given: Mapping[str, float]) -> Estimator:
     return estimator
 
 
-class _Keeper:
+class _Recorder:
     def __init__(self, estimator: Estimator) -> None:
         self._estimator = estimator
         self._record: Any = estimator.memory[0]
@@ -102,7 +102,7 @@ class _Keeper:
         name = type(sample).__name__.removesuffix("Sample").lower()
         self._samples[name] = self._samples.get(name, 0) + 1
 
-    def keep(self, time_s: float) -> None:
+    def record(self, time_s: float) -> None:
         if not self._estimator.aligned:
             return
         self._outputs.append(self._record["output"].copy())

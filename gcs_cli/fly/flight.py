@@ -18,7 +18,7 @@ from gcs_cli.link import calls
 from gcs_cli.link.calls import Answer, Call
 from gcs_cli.link.session import Session
 from gcs_cli.link.subscription import LOOP_TIMING
-from gcs_cli.report.flight_outcome import Code, Outcome, ends_in_air, judged, too_late
+from gcs_cli.report.flight_outcome import Code, Outcome, ends_in_air, outcome_of, too_late
 from gcs_cli.transfers.plan_parts import Uploads
 from gcs_cli.vehicle.view_types import VehicleView
 
@@ -207,7 +207,7 @@ class Flight:
         if self._requests:
             self._command(self._requests.pop(), now_s)
         else:
-            self._end(judged(self.view, self._items), now_s)
+            self._end(outcome_of(self.view, self._items), now_s)
 
     def _shut_down(self, now_s: float) -> None:
         answer = self._call.answer(now_s) if self._call else None

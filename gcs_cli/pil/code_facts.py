@@ -12,7 +12,7 @@ from flightstack.firmware.toolchain.coverage import FileCoverage, line_coverage
 from flightstack.firmware.toolchain.stack_usage import stack_usage
 from gcs_cli.pil.target_record import TargetRecord
 
-_JUDGED = ("core/",)
+_COUNTED = ("core/",)
 """Folders in the total: the loops. Application and protocol are listed, but a replay need not reach all of them."""
 
 
@@ -32,8 +32,8 @@ def _coverage(record: TargetRecord) -> dict[str, Any] | None:
 
 def coverage_json(files: Mapping[str, FileCoverage]) -> dict[str, Any]:
     """Return the object for ``pil.json``."""
-    judged = [found for name, found in files.items() if name.startswith(_JUDGED)]
-    lines, executed = sum(found.lines for found in judged), sum(found.executed for found in judged)
+    counted = [found for name, found in files.items() if name.startswith(_COUNTED)]
+    lines, executed = sum(found.lines for found in counted), sum(found.executed for found in counted)
     return {
         "lines": lines,
         "executed": executed,

@@ -25,7 +25,7 @@ from gcs_cli.pil import doctor, replay_run
 from gcs_cli.pil.excitation import excitation
 from gcs_cli.pil.junit import pil_junit
 from gcs_cli.pil.limits_file import read_limits
-from gcs_cli.pil.pil_flags import JudgeOptions
+from gcs_cli.pil.pil_flags import VerdictOptions
 from gcs_cli.pil.result import PASSED, Outcome
 from gcs_cli.pil.run import HTML_NAME, make_pil_directory, run, write_outcome
 from gcs_cli.pil.targets import checked_target, port_or_target
@@ -35,29 +35,29 @@ from gcs_cli.settings import check_output_file
 from gcs_cli.tui.widgets.transfer_bar import step_bar
 
 
-def run_flights(options: FlyOptions, judge: JudgeOptions, target: str) -> None:
+def run_flights(options: FlyOptions, verdict: VerdictOptions, target: str) -> None:
     """Fly the mission as MIL, SIL and PIL and print the comparison; raise CliError, ConfigError."""
     checked_target(target)
-    items, limits, began_s = checked_plan(options), _checked(judge), time.monotonic()
-    console = FlyConsole(stderr=judge.as_json, highlight=False)
+    items, limits, began_s = checked_plan(options), _checked(verdict), time.monotonic()
+    console = FlyConsole(stderr=verdict.as_json, highlight=False)
     of_flight = limits.sensed if options.state == ESTIMATED else limits.flight
-    finished = run(options, items, target, judge.out, console, judge.overwrite, of_flight)
-    _finish(finished.outcome, finished.folder, console, judge, "pil.fly", began_s)
+    finished = run(options, items, target, verdict.out, console, verdict.overwrite, of_flight)
+    _finish(finished.outcome, finished.folder, console, verdict, "pil.fly", began_s)
     if finished.problem is not None:
         raise finished.problem
-    _check_verdict(finished.outcome, judge.fail_over)
+    _check_verdict(finished.outcome, verdict.fail_over)
 
 
-def run_replay(log: Path, judge: JudgeOptions, target: str, vehicle: str | None) -> None:
+def run_replay(log: Path, verdict: VerdictOptions, target: str, vehicle: str | None) -> None:
     """Replay a flight log on a target and print the comparison; raise CliError, ConfigError."""
-    choice, limits, began_s = checked_target(target, more=("c",)), _checked(judge), time.monotonic()
+    choice, limits, began_s = checked_target(target, more=("c",)), _checked(verdict), time.monotonic()
     prepared = replay_run.prepared(log, vehicle)
-    folder = make_pil_directory(log.stem, judge.out, judge.overwrite)
-    console = FlyConsole(stderr=judge.as_json, highlight=False)
+    folder = make_pil_directory(log.stem, verdict.out, verdict.overwrite)
+    console = FlyConsole(stderr=verdict.as_json, highlight=False)
     outcome = replay_run.replay(log, choice, target, prepared, folder, console, limits)
     write_outcome(folder, outcome)
-    _finish(outcome, folder, console, judge, "pil.replay", began_s)
-    _check_verdict(outcome, judge.fail_over)
+    _finish(outcome, folder, console, verdict, "pil.replay", began_s)
+    _check_verdict(outcome, verdict.fail_over)
 
 
 def run_vectors(
@@ -90,10 +90,10 @@ def run_vectors(
     Output(as_json).say("vectors", f"{file}: {steps} steps, {what}", file=str(file), steps=steps)
 
 
-def _checked(judge: JudgeOptions) -> LimitSet:
-    """Return the limits; raise CliError or ConfigError for a file of ``judge`` that cannot be used."""
-    check_output_file("--junit", judge.junit, (".xml",))
-    return read_limits(judge.limits)
+def _checked(verdict: VerdictOptions) -> LimitSet:
+    """Return the limits; raise CliError or ConfigError for a file of ``verdict`` that cannot be used."""
+    check_output_file("--junit", verdict.junit, (".xml",))
+    return read_limits(verdict.limits)
 
 
 def run_generate(name: str, out: Path | None, as_json: bool) -> None:
@@ -144,20 +144,20 @@ def run_doctor(
 
 
 def _finish(
-    outcome: Outcome, folder: Path, console: Console, judge: JudgeOptions, command: str, began_s: float
+    outcome: Outcome, folder: Path, console: Console, verdict: VerdictOptions, command: str, began_s: float
 ) -> None:
     """Print the outcome, and write the file of ``--junit``; raise CliError."""
-    if judge.as_json:
+    if verdict.as_json:
         print(json.dumps({**outcome.result, "directory": str(folder)}), flush=True)
     else:
         print_outcome(console, outcome.result, folder)
-    if judge.junit is not None:
+    if verdict.junit is not None:
         try:
             content = pil_junit(outcome.result, command, time.monotonic() - began_s)
-            write_bytes_atomically(judge.junit, content)
+            write_bytes_atomically(verdict.junit, content)
         except OSError as error:
-            raise CliError(f"--junit {judge.junit}: cannot be written: {error.strerror}", USAGE) from None
-    if judge.open_report:
+            raise CliError(f"--junit {verdict.junit}: cannot be written: {error.strerror}", USAGE) from None
+    if verdict.open_report:
         webbrowser.open((folder / HTML_NAME).resolve().as_uri())
 
 

@@ -21,7 +21,7 @@ class PilOptions(FlyOptions):
 
 
 @dataclass(frozen=True)
-class JudgeOptions(ResultOptions):
+class VerdictOptions(ResultOptions):
     """The options of a comparison and its verdict."""
 
     out: Annotated[

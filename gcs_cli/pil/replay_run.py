@@ -196,7 +196,7 @@ def replay(
         "inner_hz": prepared_replay.setup.inner_hz,
         **code_facts(record, prepared_replay.setup.controller.name),
     }
-    return judged(prepared_replay, outputs, record, has_same_bits(choice), facts, limits)
+    return outcome_of(prepared_replay, outputs, record, has_same_bits(choice), facts, limits)
 
 
 def _conditions(log: Path, target: str, replay: Replay) -> dict[str, Any]:
@@ -210,7 +210,7 @@ def _charts(pair: str, first: FlightSamples, made: FlightSamples) -> list[Deviat
     return [chart for chart in charts if np.size(chart.pairs[pair].size)]
 
 
-def judged(
+def outcome_of(
     replay: Replay,
     outputs: FloatArray,
     record: TargetRecord | None,

@@ -63,7 +63,7 @@ def ends_in_air(items: Sequence[MissionItem]) -> bool:
     return bool(items) and items[last_flown(items)].command not in GROUND_ENDS
 
 
-def judged(view: VehicleView, items: Sequence[MissionItem]) -> Outcome:
+def outcome_of(view: VehicleView, items: Sequence[MissionItem]) -> Outcome:
     """Return the outcome for a vehicle that has disarmed: complete if it flew its mission.
 
     Any message may have been lost, so that each of three signs is enough.

@@ -88,7 +88,7 @@ class Renderer:
         stage, scene = self._stage, self._scene
         stage.put(moment)
         seen = self.view(moment, camera)
-        self._aim(seen)
+        self._set_camera(seen)
         mujoco.mjv_updateScene(
             stage.model,
             stage.data,
@@ -109,7 +109,7 @@ class Renderer:
         """Return the view of a moment by a camera of ``cameras.CAMERAS``."""
         return view(camera, moment, self._site)
 
-    def _aim(self, seen: View) -> None:
+    def _set_camera(self, seen: View) -> None:
         self._camera.lookat[:] = seen.look_at_m
         self._camera.distance = seen.distance_m
         self._camera.azimuth, self._camera.elevation = seen.azimuth_deg, seen.elevation_deg

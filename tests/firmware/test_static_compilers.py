@@ -46,13 +46,15 @@ def test_no_compiler_has_anything_to_say(name: str, tmp_path: Path) -> None:
     target = available(TARGETS[name])
     sources = [*portable_sources(), *(ESTIMATION if NIGHTLY or name in BY_DAY else [])]
 
-    def look() -> str:
+    def built() -> str:
         done = run([*command_of(target), *sources], cwd=tmp_path)
         assert (done.returncode, done.stderr) == (0, "")
         return f"nothing in {len(sources)} files"
 
     label = "".join(c for c in name if c.isalnum())
-    assert kept_text(f"{label}-{len(sources)}", target.command, tools_files(__file__), look).endswith("files")
+    assert kept_text(f"{label}-{len(sources)}", target.command, tools_files(__file__), built).endswith(
+        "files"
+    )
 
 
 def command_of(target: Target) -> list[str]:

@@ -15,9 +15,19 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from tests.mutation.judge import EQUAL, FIRMWARE, INVALID, KILLED, SURVIVED, TESTS, UNTRIED, Judge, with_tests
 from tests.mutation.mutants import Mutant, mutants
 from tests.mutation.results import Result, Results, path_for_present_tests
+from tests.mutation.trials import (
+    EQUAL,
+    FIRMWARE,
+    INVALID,
+    KILLED,
+    SURVIVED,
+    TESTS,
+    UNTRIED,
+    Trials,
+    with_tests,
+)
 
 ELSEWHERE = {"mavlink/fs_constants.h": "app"}
 """The application alone uses these values."""
@@ -57,14 +67,14 @@ def run(part: str, waiting: list[Mutant], results: Results, end_s: float) -> Non
     """Try mutants of a part until all are tried or the time is over."""
     known = [(mutant, results.of(mutant)) for mutant in all_mutants()[part]]
 
-    def try_all(judge: Judge) -> None:
+    def try_all(trials: Trials) -> None:
         for mutant, result in known:
             if result is not None and result.fate in TESTED:
-                judge.remember(mutant, result.test)
+                trials.remember(mutant, result.test)
         for number, mutant in enumerate(waiting, start=1):
             if time.monotonic() > end_s:
                 return
-            results.add(verdict := judge.judged(mutant))
+            results.add(verdict := trials.verdict_of(mutant))
             if verdict.fate in {SURVIVED, UNTRIED}:
                 print(f"[{number}/{len(waiting)}] {verdict.fate}  {mutant}", flush=True)
 

@@ -7,8 +7,8 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
-from tests.mutation.judge import Verdict
 from tests.mutation.mutants import Mutant
+from tests.mutation.trials import Verdict
 
 ROOT = Path(__file__).resolve().parents[2]
 _DEPENDS_ON = ("firmware", "tests/firmware", "tests/parity", "tests/support", "tests/mutation")

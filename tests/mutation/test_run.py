@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from tests.firmware.codec_support import compiler
-from tests.mutation.judge import KILLED, LOOPED, SURVIVED, UNTRIED, Verdict, _fate_of
 from tests.mutation.mutants import Mutant, mutants
 from tests.mutation.objects import CompileError, Objects, WarningError
 from tests.mutation.order import Order
 from tests.mutation.results import Results
+from tests.mutation.trials import KILLED, LOOPED, SURVIVED, UNTRIED, Verdict, _fate_of
 
 HEADER = "static inline int twice(int x) { return 2 * x; }\n"
 SOURCES = {

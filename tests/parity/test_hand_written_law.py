@@ -24,7 +24,7 @@ from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
 from flightstack.process.config_check import check
 from gcs_cli.pil import pil_commands
-from gcs_cli.pil.replay_run import fed, judged, prepared
+from gcs_cli.pil.replay_run import fed, outcome_of, prepared
 from tests.support.bare_target import without_estimator
 from tests.support.plugin_site import ROOT
 from tests.support.truth import World
@@ -130,9 +130,9 @@ def test_a_flight_of_a_law_in_c_is_replayed(
     replay = prepared(path, None)
     outputs, _ = fed(replay, "c", tmp_path, Console(quiet=True))
     facts: dict[str, Any] = {"title": "", "about": "", "meaning": "", "conditions": {}}
-    outcome = judged(replay, outputs, None, True, facts)
+    outcome = outcome_of(replay, outputs, None, True, facts)
     assert outcome.passed
     assert outcome.result["differences"]
     assert all(row["largest"] == 0.0 for row in outcome.result["differences"])
     assert outcome.result["meaning"].endswith("it has no stage in Python to compare with.")
-    assert not judged(replay, outputs * 1.01, None, True, facts).passed
+    assert not outcome_of(replay, outputs * 1.01, None, True, facts).passed

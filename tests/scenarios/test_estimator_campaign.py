@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from tests.support.tools import NIGHTLY
-from tools.estimator_campaign import KINDS, SENSORS, STATES, Judgement, campaign, judged
+from tools.estimator_campaign import KINDS, SENSORS, STATES, Consistency, campaign, consistency_of
 
 
 def test_judgement_has_the_bounds_of_the_chi_square_distribution() -> None:
     rng = np.random.default_rng(4)
     values = np.mean(np.square(rng.normal(size=(200, 2))), axis=1)
-    found = judged(values, 2)
+    found = consistency_of(values, 2)
     assert found.low < found.mean < found.high
     assert (found.low, found.high) == pytest.approx(
         (0.866, 1.143), abs=1e-3
@@ -31,9 +31,9 @@ def test_estimator_claims_what_it_knows() -> None:
     }  # 0.93, 0.75, 0.40; 201 flights: 0.76, 0.79, 0.33
     most = {"accelerometer bias": 1.6}  # 1.38, and 1.03 over 201 other flights
     for name in STATES:
-        judgement = found["all"][name]
-        assert isinstance(judgement, Judgement)
-        low, high = least.get(name, judgement.low), most.get(name, judgement.high)
-        assert low < judgement.mean < high, name
+        consistency = found["all"][name]
+        assert isinstance(consistency, Consistency)
+        low, high = least.get(name, consistency.low), most.get(name, consistency.high)
+        assert low < consistency.mean < high, name
     for name in SENSORS:  # measured 0.99 to 1.02 for GNSS, 1.12 for the barometer, 0.79 for the magnetometer
         assert (0.65 if name == "magnetometer" else 0.85) < found["all"][name] < 1.2, name  # type: ignore[operator]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from flightstack.testing import Verdict, load_scenario, run_scenario
-from flightstack.testing.expectations import Check, judge
+from flightstack.testing.expectations import Check, evaluate
 from flightstack.testing.scenario import Expect
 from gcs_cli.scenarios.flying import fly_case
 from gcs_cli.scenarios.result import Wanted
@@ -34,9 +34,9 @@ def square(tmp_path_factory: pytest.TempPathFactory) -> Verdict:
 
 
 def check_of(square: Verdict, **expected: object) -> Check:
-    """Judge the square by one expectation besides its outcome."""
+    """Evaluate the square by one expectation besides its outcome."""
     expect = replace(Expect(outcome="any"), **expected)  # type: ignore[arg-type]
-    checks = judge(expect, square.flight, square.last, square.flight.caused)
+    checks = evaluate(expect, square.flight, square.last, square.flight.caused)
     assert checks[0].passed or "outcome" in expected or "refusal" in expected
     return checks[-1]
 

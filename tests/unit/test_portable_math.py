@@ -172,6 +172,7 @@ def test_flight_uses_no_function_whose_bits_depend_on_the_processor() -> None:
 
 
 def test_compiled_code_contracts_and_calls_nothing() -> None:
+    compute(np.zeros(1), np.zeros(1), np.zeros((len(WORST_ULPS), 1)))  # compiles it, if it is the first here
     assembly = "".join(compute.inspect_asm().values())
     assert "vmulsd" in assembly or "mulsd" in assembly or "fmul" in assembly
     for word in (

@@ -137,7 +137,7 @@ static void count_refused(fs_estimator_memory *m, const fs_filter *f, int32_t fi
     }
 }
 
-/* Judge the measurement by its innovations, and reset what was refused too long. position_sources.py:90 */
+/* Check the measurement by its innovations, and reset what was refused too long. position_sources.py:90 */
 static void end_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t first,
                      const fs_estimator_params *params)
 {

@@ -89,7 +89,7 @@ void fs_take_pressure_innovation(fs_checks *c, const fs_filter *f, fs_real measu
 /*
  * Decide whether barometer or vertical GNSS velocity is wrong, beyond the noise of their drift. source_checks.py:205
  */
-static void judge_height(fs_checks *c, fs_real now_s, fs_real noise_m)
+static void check_height(fs_checks *c, fs_real now_s, fs_real noise_m)
 {
     const fs_real apart_m = fs_abs(c->baro_drift_m);
     const fs_real side = c->baro_drift_m > FS_LIT(0.0) ? c->height_drift_m : -c->height_drift_m;
@@ -125,7 +125,7 @@ void fs_follow_height_drift(fs_checks *c, const fs_real row[], bool flies, fs_re
         fs_real change_m = c->had_altitude == FS_LIT(0.0) ? FS_LIT(0.0) : c->altitude_then_m - altitude_m - moved_m;
         change_m = fs_min(fs_max(change_m, -FS_LARGEST_CHANGE_M), FS_LARGEST_CHANGE_M);
         c->baro_drift_m = has_altitude ? kept * c->baro_drift_m + change_m : FS_LIT(0.0);
-        judge_height(c, row[0], FS_NOISE_SHARE * accuracy_m_s * fs_sqrt(FS_LIT(0.5) * FS_DRIFT_S * dt_s));
+        check_height(c, row[0], FS_NOISE_SHARE * accuracy_m_s * fs_sqrt(FS_LIT(0.5) * FS_DRIFT_S * dt_s));
     }
     c->place_m[2] = row[3];
     c->velocity_m_s[2] = row[6];

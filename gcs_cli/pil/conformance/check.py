@@ -16,6 +16,6 @@ class Check(NamedTuple):
     advice: str = ""
 
 
-def judged(name: str, is_good: bool, found: str, advice: str) -> Check:
+def check_of(name: str, is_good: bool, found: str, advice: str) -> Check:
     """Return a check that passed or failed; the advice belongs to a failure."""
     return Check(name, PASSED, found) if is_good else Check(name, FAILED, found, advice)

@@ -10,7 +10,7 @@ from flightstack.firmware.pil.steps import REPORT_IDS, PilReport
 from flightstack.mavlink.dialect import LAYOUT_BY_NAME, mavlink
 from flightstack.mavlink.frames import pack_frame
 from flightstack.mavlink.link import Message
-from gcs_cli.pil.conformance.check import Check, judged
+from gcs_cli.pil.conformance.check import Check, check_of
 from gcs_cli.pil.conformance.line import Line, is_echo
 
 SEED = 1
@@ -34,7 +34,7 @@ def all_bytes(line: Line) -> Check:
         if not line.ping(int.from_bytes(pattern, "little"), 1 + first, attempts=2):
             lost.append(first)
     ranges = ", ".join(f"0x{first:02X} to 0x{first + 7:02X}" for first in lost)
-    return judged(
+    return check_of(
         "byte values",
         not lost,
         "all 256 byte values are echoed" if not lost else f"no echo of a PING with bytes {ranges}",
@@ -58,7 +58,7 @@ def sizes(line: Line) -> Check:
         if not line.ping(size, size, attempts=2):
             lost.append(f"PING after an unknown message of {size}")
     found = f"payloads of 1 to {layout.size} and {LONGEST_PAYLOAD} bytes arrive, reports of {_report_size()} return"
-    return judged(
+    return check_of(
         "message sizes",
         not lost,
         found if not lost else f"no answer to payloads in bytes: {', '.join(lost)}",
@@ -100,7 +100,7 @@ def burst(line: Line) -> Check:
         echoed |= {pair for pair in pairs if is_echo(*pair)(message)}
         if len(echoed) == BURST:
             break
-    return judged(
+    return check_of(
         "burst",
         len(echoed) == BURST,
         f"{len(echoed)} of {BURST} frames sent in one piece of {len(data)} bytes are answered",
@@ -122,7 +122,7 @@ def corrupted(line: Line) -> Check:
         heard = line.wait(CUT_FRAME_S)
         answered += sum(message.get_type() == "PING" for _, message in heard)
     is_alive = line.ping(5, 5, attempts=1)
-    return judged(
+    return check_of(
         "corrupted bytes",
         is_alive and not answered,
         f"{answered} of {len(good)} damaged frames were answered, a good one after them was"
@@ -140,7 +140,7 @@ def cut_frame(line: Line) -> Check:
         line.send(step[:size])
         line.wait(CUT_FRAME_S)
         missed += not line.ping(size, size, attempts=1)
-    return judged(
+    return check_of(
         "cut frames",
         not missed,
         f"{len(CUT_SIZES) - missed} of {len(CUT_SIZES)} frames are answered at once after a frame that was cut off and "

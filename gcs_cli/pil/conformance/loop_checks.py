@@ -15,7 +15,7 @@ from flightstack.firmware.pil.operations import TARGET_COMPONENT, TARGET_SYSTEM
 from flightstack.firmware.pil.steps import PilReport
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
-from gcs_cli.pil.conformance.check import FAILED, NOT_CHECKED, Check, judged
+from gcs_cli.pil.conformance.check import FAILED, NOT_CHECKED, Check, check_of
 from gcs_cli.pil.conformance.line import Line
 from gcs_cli.pil.conformance.link_checks import report_of
 from gcs_cli.pil.ulps import steps_apart
@@ -52,7 +52,7 @@ def parameters(line: Line, expected: Mapping[str, float]) -> Check:
         found += f"; missing: {', '.join(missing[:5])}{' …' if len(missing) > 5 else ''}"
     if wrong:
         found += f"; other defaults: {', '.join(wrong[:5])}{' …' if len(wrong) > 5 else ''}"
-    return judged(
+    return check_of(
         "parameter list",
         not missing and not wrong,
         found,
@@ -73,7 +73,7 @@ def read_back(line: Line) -> Check:
     is_refused = line.ask(line.pack(_param_set("NO_SUCH_NAME", 1.0)), _param_error) is not None
     if not is_refused or _read(line, name) != kept:
         wrong.append("a value or a name that must be refused")
-    return judged(
+    return check_of(
         "parameter read-back",
         not wrong,
         f"{len(PATTERNS)} values are read back with the same bits"
@@ -209,8 +209,8 @@ def _compared(
         found = f"{len(reports) - rows} of {len(reports)} steps have the bits of this machine's C"
         if rows:
             found += f", {most} ulp apart at most"
-        return judged(name, not rows and not status, found, advice)
+        return check_of(name, not rows and not status, found, advice)
     found = f"{most} ulp apart at most in {len(reports)} steps; this processor is compared within tolerances"
     if name == "loops":
-        return judged(name, most <= _ULPS_OF_OTHER_FPU and not status, found, advice)
+        return check_of(name, most <= _ULPS_OF_OTHER_FPU and not status, found, advice)
     return Check(name, NOT_CHECKED, found, "The C28x flushes subnormal numbers.")

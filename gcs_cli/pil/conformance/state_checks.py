@@ -10,7 +10,7 @@ from flightstack.core.contract import LoopFlags
 from flightstack.firmware.c_loops import TARGET_AT
 from flightstack.firmware.pil.steps import BAD_INPUT
 from flightstack.mavlink.dialect import mavlink
-from gcs_cli.pil.conformance.check import NOT_CHECKED, PASSED, Check, judged
+from gcs_cli.pil.conformance.check import NOT_CHECKED, PASSED, Check, check_of
 from gcs_cli.pil.conformance.line import Line
 from gcs_cli.pil.conformance.loop_checks import step
 
@@ -32,7 +32,7 @@ def safe_state(line: Line, number: int) -> Check:
         wrong.append("RESET does not end the safe state")
     if not _beats(line, mavlink.MAV_STATE_STANDBY, 3.5):
         wrong.append("no heartbeat with MAV_STATE_STANDBY 1 s after the last step")
-    return judged(
+    return check_of(
         "safe state",
         not wrong,
         "; ".join(wrong) or "bad input stops the rotors until RESET; silence ends in standby",
@@ -58,7 +58,7 @@ def stack(status: Mapping[str, int]) -> Check:
             "the target measures no stack",
             "Paint the stack at the start: see ports/gnu.",
         )
-    return judged(
+    return check_of(
         "stack",
         0 < used <= 0.75 * size,
         f"{used} of {size} used at most, in the target's smallest unit",
@@ -86,7 +86,7 @@ def losses(before: Mapping[str, int], after: Mapping[str, int], own_frames: int)
     words = [f"{name.replace('_', ' ')} {count}" for name, count in counted.items() if count]
     if own_frames:
         words.append(f"{own_frames} own frames came back")
-    return judged(
+    return check_of(
         "losses",
         not words,
         ", ".join(words) or "no overrun, no line error, no frame dropped, no echo",
@@ -106,7 +106,7 @@ def hello(identity: Any, expected_hash: bytes) -> Check:
         wrong.append("no name of the board")
     if identity.char_bits not in (8, 16):
         wrong.append(f"char of {identity.char_bits} bits")
-    return judged(
+    return check_of(
         "hello",
         not wrong,
         ", ".join(wrong) or f"{identity.board.strip()}, {identity.compiler.strip()}",

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from flightstack.firmware.pil.record import COST_UNITS
 from flightstack.firmware.pil.steps import PilReport
-from gcs_cli.pil.conformance.check import FAILED, NOT_CHECKED, Check, judged
+from gcs_cli.pil.conformance.check import FAILED, NOT_CHECKED, Check, check_of
 from gcs_cli.pil.conformance.line import Line, status_of
 
 WATCHED_S = 3.2
@@ -58,7 +58,9 @@ def _milliseconds(samples: list[Sample]) -> Check:
     if any(later < earlier for earlier, later in itertools.pairwise(times)):
         return Check(name, FAILED, f"the target's milliseconds run backwards: {times}", advice)
     is_right, found = _rate(samples, (times[-1] - times[0]) / 1e3)
-    return judged(name, is_right, found, f"{advice} Its rate must be right within {LARGEST_RATE_ERROR:.0%}.")
+    return check_of(
+        name, is_right, found, f"{advice} Its rate must be right within {LARGEST_RATE_ERROR:.0%}."
+    )
 
 
 def _rate(samples: list[Sample], passed_s: float) -> tuple[bool, str]:
@@ -94,7 +96,7 @@ def microseconds(samples: list[Sample]) -> Check:
     if is_right and apart_s > LARGEST_START_S + 2.0 * LARGEST_RATE_ERROR * uptime_s:
         found = f"they are {apart_s:.3f} s apart from the milliseconds, {uptime_s:.0f} s after the start"
         return Check(name, FAILED, found, advice)
-    return judged(name, is_right, found, advice)
+    return check_of(name, is_right, found, advice)
 
 
 def _signed(difference_us: int) -> int:
@@ -103,7 +105,7 @@ def _signed(difference_us: int) -> int:
 
 
 def _heartbeats(beats: int, duration_s: float) -> Check:
-    return judged(
+    return check_of(
         "heartbeats",
         abs(beats - duration_s) <= 1.5,
         f"{beats} heartbeats in {duration_s:.1f} s, one a second is due",
@@ -134,7 +136,7 @@ def cost_counter(identity: Any, reports: list[PilReport]) -> Check:
     if unit == "cycles" and not hz:
         return Check(name, FAILED, found, "Set fs_port.clock_hz, without which cycles are no time.")
     limit = hz * LARGEST_COST_S if hz else float(1 << 31)
-    return judged(
+    return check_of(
         name,
         max(whole) <= limit,
         found if not hz else f"{found}, {max(whole) / hz * 1e6:.1f} us at most",

@@ -77,12 +77,12 @@ def verdicts(results: Results) -> list[Verdict]:
     named: dict[str, list[Mapping[str, Any]]] = {}
     for claim in results["comparisons"]["claims"]:
         named.setdefault(claim["name"], []).append(claim)
-    judged = [_judged(results, found) for found in named.values()]
-    judged += [*_disturbed(results), *_models(results), *_target(results)]
-    return sorted(judged, key=lambda verdict: verdict.source == OURS)
+    verdicts = [_verdict_of(results, found) for found in named.values()]
+    verdicts += [*_disturbed(results), *_models(results), *_target(results)]
+    return sorted(verdicts, key=lambda verdict: verdict.source == OURS)
 
 
-def _judged(results: Results, found: list[Mapping[str, Any]]) -> Verdict:
+def _verdict_of(results: Results, found: list[Mapping[str, Any]]) -> Verdict:
     """Return one verdict from those on each plant."""
     name, text = found[0]["name"], found[0]["claim"]
     source = found[0]["source"].replace("implied by the paper, ", "implied in ").removeprefix("paper, ")

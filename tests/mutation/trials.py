@@ -72,9 +72,9 @@ class Verdict(NamedTuple):
 
 
 class Session:
-    """A plug-in of pytest that calls ``work`` with a judge of the collected tests instead of running the tests."""
+    """A plug-in of pytest that calls ``work`` with a trials of the collected tests instead of running the tests."""
 
-    def __init__(self, folder: Path, work: Callable[[Judge], None]) -> None:
+    def __init__(self, folder: Path, work: Callable[[Trials], None]) -> None:
         self.folder, self.work = folder, work
         self.has_run = False
 
@@ -90,12 +90,12 @@ class Session:
         """Prepare the tests and work with them."""
         if session.testsfailed:
             return True
-        self.work(Judge(session.items, self.folder))
+        self.work(Trials(session.items, self.folder))
         self.has_run = True
         return True
 
 
-def with_tests(part: str, work: Callable[[Judge], None]) -> None:
+def with_tests(part: str, work: Callable[[Trials], None]) -> None:
     """Call ``work`` inside a pytest session of the tests of a part; SystemExit if they cannot be run."""
     options = ["-q", "-s", "--no-header", "--no-summary", "--assert=plain", "--tb=native"]
     # the two last would blame a test for what the session before it has left to the garbage collector
@@ -110,7 +110,7 @@ def with_tests(part: str, work: Callable[[Judge], None]) -> None:
         sys.exit(f"cannot run pytest {' '.join(TESTS[part])}")
 
 
-class Judge:
+class Trials:
     """Tries mutants in a copy of the firmware's sources with the tests of one part."""
 
     def __init__(self, items: list[pytest.Item], folder: Path) -> None:
@@ -170,7 +170,7 @@ class Judge:
             all_ran = np.array(self._costs)
             self.order.learn(mutant, all_ran if found_by < 0 else np.full_like(all_ran, np.nan), found_by)
 
-    def judged(self, mutant: Mutant) -> Verdict:
+    def verdict_of(self, mutant: Mutant) -> Verdict:
         """Return what becomes of a mutant; the sources are as before afterwards."""
         start_s = _cpu_s()
         path = self.sources / mutant.file
