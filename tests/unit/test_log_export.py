@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -162,10 +163,8 @@ def test_existing_exports_are_kept_without_overwrite(tmp_path: Path) -> None:
 def test_a_missing_library_is_one_sentence(
     option: str, module: str, package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(name: str) -> Any:
-        raise ImportError(name)
-
-    monkeypatch.setattr("gcs_cli.logs.export_tables.import_module", refuse)
+    for name in (module, *(name for name in sys.modules if name.startswith(f"{module}."))):
+        monkeypatch.setitem(sys.modules, name, None)  # as one that cannot be found
     log = tmp_path / "a.tlog"
     log.write_bytes(small_tlog())
     ended = gcs("log", "export", log, option, tmp_path / "out")
