@@ -171,8 +171,9 @@ def _name(called: ast.expr) -> str:
 def index_constants(name: str) -> list[str]:
     """Return where a module takes an element of an array by a number of its own or of another module.
 
-    That is ``array[NUMBER]`` or ``array[NUMBER + i]``, not a key of a dictionary, a bound of a slice or a size in an
-    annotation. Names of ``ROWS`` do not count: a matrix has no fields.
+    That is ``array[NUMBER]``, ``array[NUMBER + i]`` or ``array[i + NUMBER]``, not a key of a dictionary, a bound of a
+    slice or a size in an annotation. Names of ``ROWS`` do not count, a matrix has no fields, and numbers that are
+    computed from a layout such as ``LoopRow`` do not.
     """
     numbers = _known_numbers(name)
     found = []
@@ -180,13 +181,16 @@ def index_constants(name: str) -> list[str]:
         if isinstance(node, ast.Subscript) and _name(node.value) != "Annotated":
             index = node.slice
             parts = index.elts if isinstance(index, ast.Tuple) else [index]
-            firsts = [
-                part.left if isinstance(part, ast.BinOp) and isinstance(part.op, ast.Add) else part
-                for part in parts
-            ]
-            if any(isinstance(part, ast.Name) and part.id in numbers for part in firsts):
+            terms = [term for part in parts for term in _terms(part)]
+            if any(isinstance(term, ast.Name) and term.id in numbers for term in terms):
                 found.append(f"{name}:{node.lineno}: {ast.unparse(node)}")
     return found
+
+
+def _terms(index: ast.expr) -> list[ast.expr]:
+    if isinstance(index, ast.BinOp) and isinstance(index.op, ast.Add):
+        return [*_terms(index.left), *_terms(index.right)]
+    return [index]
 
 
 @cache
@@ -194,8 +198,13 @@ def numbers_of(name: str) -> set[str]:
     """Return the constants that a module of the programs sets to whole numbers."""
     program = name.partition(".")[0]
     tree = sources(program).get(name) if program in PROGRAMS and name not in ROWS else None
-    assigned = (node for node in (tree.body if tree is not None else ()) if isinstance(node, ast.Assign))
-    return set[str]().union(*(_numbers(target, node.value) for node in assigned for target in node.targets))
+    found: set[str] = set()
+    for node in tree.body if tree is not None else ():
+        if isinstance(node, ast.Assign):
+            found = found.union(*(_numbers(target, node.value, found) for target in node.targets))
+        elif isinstance(node, ast.AnnAssign) and node.value is not None:
+            found |= _numbers(node.target, node.value, found)
+    return found
 
 
 def _known_numbers(name: str) -> set[str]:
@@ -208,16 +217,22 @@ def _known_numbers(name: str) -> set[str]:
     return found
 
 
-def _numbers(target: ast.expr, value: ast.expr) -> set[str]:
-    """Return the names of ``target`` that get whole numbers."""
+def _numbers(target: ast.expr, value: ast.expr, known: set[str]) -> set[str]:
+    """Return the names of ``target`` that get whole numbers: literals, and sums of them and of ``known`` names."""
     if isinstance(target, ast.Tuple):
         names = [part.id for part in target.elts if isinstance(part, ast.Name)]
         if isinstance(value, ast.Tuple):
             pairs = zip(target.elts, value.elts, strict=False)
-            return set[str]().union(*(_numbers(part, number) for part, number in pairs))
+            return set[str]().union(*(_numbers(part, number, known) for part, number in pairs))
         return set(names) if isinstance(value, ast.Call) and _name(value.func) == "range" else set()
-    is_number = isinstance(value, ast.Constant) and type(value.value) is int
-    return {target.id} if is_number and isinstance(target, ast.Name) else set()
+    return {target.id} if isinstance(target, ast.Name) and _is_number(value, known) else set()
+
+
+def _is_number(value: ast.expr, known: set[str]) -> bool:
+    if isinstance(value, ast.BinOp):
+        return _is_number(value.left, known) and _is_number(value.right, known)
+    is_name = isinstance(value, ast.Name) and value.id in known
+    return is_name or (isinstance(value, ast.Constant) and type(value.value) is int)
 
 
 def imported(module: Iterable[ast.AST]) -> set[str]:

@@ -125,15 +125,15 @@ def _present_action(failsafe: Failsafe, entry: Entry, situation: Situation, beha
 
 def goes_on(memory: Memory, situation: Situation, behaviour: Behaviour) -> bool:
     """Return True if ``memory`` stays the same in further steps with equal conditions: no action begins with time."""
-    if memory.decision.action > Action.WARN or situation.phase is Phase.GOTO:  # which ends on arrival
+    if (
+        memory.decision.action > Action.WARN or situation.phase is Phase.GOTO
+    ):  # which ends on arrival, without an event
         return False
-    for failsafe, entry in memory.entries.items():
-        action = action_of(failsafe, behaviour)
-        if not entry.overridden and _present_action(failsafe, entry, situation, behaviour) is not action:
-            return False
-        if action is Action.BLIND:
-            return False
-    return True
+    return all(
+        entry.overridden
+        or _present_action(failsafe, entry, situation, behaviour) is action_of(failsafe, behaviour)
+        for failsafe, entry in memory.entries.items()
+    )
 
 
 def _waits(failsafe: Failsafe, elapsed_s: float, phase: Phase, behaviour: Behaviour) -> bool:

@@ -39,7 +39,7 @@ class HilReport(NamedTuple):
     number: int
     fields: int
     wire: SingleArray
-    """Of its own, shape (13,)."""
+    """A copy, which later frames do not change, shape (13,)."""
     step_us: int
     """Time since the last inertial measurement of this sensor; 0 in the first one, and in a report without one.
 

@@ -41,6 +41,8 @@ class Network:
         self._seed = seed
         self.clients: dict[str, Client] = {}
         self._by_address: dict[PeerAddress, Client] = {}
+        self.has_settled = False
+        """True after ``settle``, which may have changed the vehicle between two ticks; the runner resets it."""
 
     def add(
         self,
@@ -100,6 +102,7 @@ class Network:
 
     def settle(self, hub: GroundHub, now_s: float) -> None:
         """Exchange messages until none is left at this instant."""
+        self.has_settled = True
         for _ in range(_SETTLES):
             if not self.exchange(hub, now_s):
                 return
@@ -161,7 +164,8 @@ class EngineRunner:
     def _idle_until_s(self) -> float:
         """Return the time from which messages are due, or a watch or a timer; −inf if it may be now."""
         engine = self._engine
-        if not engine.was_ready or any(each_tick() for _, each_tick in self._watches):
+        has_settled, self._network.has_settled = self._network.has_settled, False
+        if has_settled or not engine.was_ready or any(each_tick() for _, each_tick in self._watches):
             return -math.inf
         now_s = engine.time_s
         until_s = now_s + self._network.idle_s(engine.stack.ground, now_s)

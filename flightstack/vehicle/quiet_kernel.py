@@ -78,8 +78,7 @@ def _rest(row: FloatArray, idle: FloatArray, state: FloatArray, speeds: Any) -> 
     """Write the row of a vehicle that must not fly: ``idle`` with the present state."""
     copy_all(idle, row)
     copy_all(state, row)
-    for i in range(4):
-        row[_REFERENCE + i] = state[6 + i]
+    copy_all(state[6:10], row[_REFERENCE:])
     copy_all(speeds, row[_SPEED:])
 
 

@@ -114,7 +114,8 @@ class _Rows:
         unwanted: set[int] = set()
         for index in self._others.tolist():
             at, after = self._begins[index], self._ends[index]
-            kind, message = self._content[at + _KIND_AT], self._content[at + MESSAGE_HEADER.size : after]
+            _size, kind = MESSAGE_HEADER.unpack_from(self._content, at)
+            message = self._content[at + MESSAGE_HEADER.size : after]
             if kind == _SUBSCRIPTION_TYPE:
                 number = int.from_bytes(message[1:3], "little")
                 has_rows = number in self._of and self._of[number][0] < index

@@ -50,8 +50,8 @@ from sim_bridge.sensors.rangefinder import Rangefinder
 
 _DEGREE = math.pi / 180.0
 _IMU = ACCEL | GYRO
-MAG_SLOT, BARO_SLOT, SLOTS = 0, 1, 5
-"""Magnetometer and barometer, which quiet ticks measure as well, by their index in ``due_us``, and its length."""
+MAG_SLOT, BARO_SLOT, QUIET_SLOTS, SLOTS = 0, 1, 2, 5
+"""Sensors by their index in ``due_us``, first those that quiet ticks measure as well, and its length."""
 _UNKNOWN_VARIANCE = 255
 
 
@@ -217,7 +217,7 @@ class SensorSuite:
         self.imus.take_rows(count)
         self._fields[:] = self._all_imus
         self._fields[0] |= fields
-        self._next_us = min(*self._due_us[: BARO_SLOT + 1], self._next_other_us)
+        self._next_us = min(*self._due_us[:QUIET_SLOTS], self._next_other_us)
 
     @property
     def values(self) -> SingleArray:

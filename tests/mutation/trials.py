@@ -72,7 +72,7 @@ class Verdict(NamedTuple):
 
 
 class Session:
-    """A plug-in of pytest that calls ``work`` with a trials of the collected tests instead of running the tests."""
+    """A plug-in of pytest that calls ``work`` with trials of the collected tests instead of running the tests."""
 
     def __init__(self, folder: Path, work: Callable[[Trials], None]) -> None:
         self.folder, self.work = folder, work

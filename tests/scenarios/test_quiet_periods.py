@@ -94,7 +94,51 @@ def clock_jumps(world: World) -> None:
     world.run_for(3.0)
 
 
-FLIGHTS = (mission, fence, lost_link, bad_link, empty_battery, timer, power_cycle, clock_jumps)
+def levels_of_charge(world: World) -> None:
+    """Hold with a low battery, then with a critical one: the conditions of a failsafe that goes on change."""
+    world.param_set("COM_LOW_BAT_ACT", 2)
+    world.takeoff(3.0)
+    world.run_for(2.0)
+    world.fault("battery:level=0.14")
+    world.run_for(3.0)
+    world.goto(5.0, 3.0)
+    world.run_for(4.0)
+    world.set_mode("HOLD")
+    world.run_for(2.0)
+    world.fault("battery:level=0.06")
+    world.run_for(8.0)
+    assert "failsafe_BATTERY_CRITICAL" in [event.name for event in world.events]
+
+
+def overridden(world: World) -> None:
+    """Override the failsafe of a lost link, change its parameters, and find the link again."""
+    world.param_set("NAV_DLL_ACT", 2)
+    second = world.add_client("second", is_companion=True)
+    world.takeoff(6.0)
+    world.run_for(4.0)
+    world.link.cut()
+    world.run_for(16.0)
+    world.set_mode("HOLD", second)
+    world.run_for(3.0)
+    world.link.restore()
+    world.run_for(3.0)
+    assert world.state.mode == "HOLD"
+
+
+def long_silence(world: World) -> None:
+    """Hover without a link until the ground station is forgotten, and find it again."""
+    world.takeoff(2.0)
+    world.run_for(3.0)
+    world.link.cut()
+    world.run_for(45.0)
+    world.link.restore()
+    world.run_for(3.0)
+
+
+FLIGHTS = (
+    mission, fence, lost_link, bad_link, empty_battery, timer, power_cycle, clock_jumps, levels_of_charge,
+    overridden, long_silence,
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -131,18 +175,20 @@ def test_one_call_flies_many_periods(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(calls) <= 500 / 20  # the battery reports ten times a second: 50 ticks at most
 
 
+@pytest.mark.parametrize("lost_s", [16.0, 45.0])
 def test_one_call_flies_many_periods_once_the_failsafe_of_a_lost_ground_station_has_acted(
-    monkeypatch: pytest.MonkeyPatch,
+    lost_s: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """It is forgotten after 30 s."""
     with World(state="truth") as world:
         world.param_set("NAV_DLL_ACT", 2)
+        world.param_set("MPC_XY_CRUISE", 3.0)
         world.takeoff(2.0)
         world.run_for(4.0)
-        world.goto(60.0, 0.0)
-        world.run_for(10.0)
+        world.goto(150.0, 0.0)
+        world.run_for(60.0)
         world.link.cut()
-        world.engine.stack.ground.drop_peer(world.gcs.address)
-        world.run_for(16.0)
+        world.run_for(lost_s)
         assert (world.state.mode, world.state.failsafes) == ("RETURN", ("GCS_LOST",))
         calls = _calls_of_a_second(world, monkeypatch)
     assert sum(calls) >= 0.99 * 500

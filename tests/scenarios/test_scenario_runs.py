@@ -212,3 +212,32 @@ def test_the_scenarios_of_the_project_pass(path: Path) -> None:
     for case in select([path]):
         result = fly_case(case, Wanted())
         assert result.passed, result.failures
+
+
+ASKED_IN_EACH_TICK = "{when = 'altitude_m > 1000', fault = 'battery:level=0.5'}"
+"""An event that never happens, and for which all events are asked after every outer tick."""
+CHAINS = {
+    "a mode of a command": "{at_s = 10, command = 'land'}, {when = \"mode == 'LAND'\", fault = 'rotor:1:weak=0.9'}",
+    "an item of a command": "{at_s = 7, command = 'mav_cmd 224 3'}, {at_item = 3, fault = 'rotor:1:weak=0.9'}",
+    "modes one after another": (
+        "{at_s = 10, command = 'mode HOLD'}, {when = \"mode == 'HOLD'\", delay_s = 0.3, command = 'rtl'}, "
+        "{when = \"mode == 'RETURN'\", delay_s = 0.05, fault = 'rotor:1:weak=0.9'}"
+    ),
+    "the end of another": (
+        "{at_s = 8.003, delay_s = 0.5, link = 'cut', for_s = 1}, {after = 'link_cut', fault = 'rotor:1:weak=0.9'}, "
+        "{after = 'link_cut_end', delay_s = 0.1, fault = 'rotor:2:weak=0.9'}"
+    ),
+    "an item": "{at_item = 2, link = 'cut', for_s = 1}, {after = 'link_cut', fault = 'rotor:1:weak=0.9'}",
+}
+
+
+@pytest.mark.parametrize("chain", CHAINS.values(), ids=CHAINS.keys())
+def test_events_happen_at_the_times_of_events_that_are_asked_in_each_tick(chain: str, tmp_path: Path) -> None:
+    start = SQUARE + "[expect]\noutcome = 'any'\n"
+    few, many = (
+        flown(tmp_path, start.replace("[expect]", f"event = [{events}]\n[expect]"))
+        for events in (chain, f"{chain}, {ASKED_IN_EACH_TICK}")
+    )
+    assert few.flight.caused
+    assert few.flight.events == many.flight.events
+    assert few.flight.caused == many.flight.caused

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 from flightstack.commander.failsafe import Action, Failsafe, Phase
 from flightstack.commander.failsafe_step import (
     IDLE,
@@ -10,6 +12,7 @@ from flightstack.commander.failsafe_step import (
     Situation,
     active_failsafes,
     failsafe_step,
+    goes_on,
     override,
 )
 from flightstack.core.enums import Severity
@@ -149,3 +152,32 @@ def test_parameters_count_at_once() -> None:
     flight.run(1.0, Failsafe.GCS_LOST)
     flight.behaviour = flight.behaviour.updated("NAV_DLL_ACT", 3)
     assert flight.run(0.1, Failsafe.GCS_LOST) is Action.LAND
+
+
+def test_a_memory_that_goes_on_stays_equal_at_any_later_time_and_has_no_action() -> None:
+    """Outer ticks stay in compiled code meanwhile: no failsafe may begin to act with time alone."""
+    behaviours = (
+        ("NAV_DLL_ACT=2", "COM_LOW_BAT_ACT=2", "COM_FAIL_ACT_T=9"),
+        ("NAV_DLL_ACT=3", "COM_LOW_BAT_ACT=3", "FS_BLIND_T=3"),
+        ("NAV_DLL_ACT=0", "COM_LOW_BAT_ACT=0", "FS_BLIND_T=-1"),
+    )
+    phases = [phase for phase in Phase if phase is not Phase.DISARMED]
+    went_on = 0
+    for assignments, phase, pair in itertools.product(
+        behaviours, phases, itertools.combinations(Failsafe, 2)
+    ):
+        behaviour = with_assignments(Behaviour(), list(assignments))
+        for conditions, overridden in ((pair, ()), (pair[:1], ()), (pair, pair[:1])):
+            memory: Memory = IDLE
+            for time_us in (0, 1_000_000, 6_000_000, 20_000_000):
+                situation = Situation(time_us, phase, sticks_are_live=True)
+                before = override(memory, overridden) if time_us == 1_000_000 else memory
+                memory, _ = failsafe_step(before, frozenset(conditions), situation, behaviour)
+                if memory != before or not goes_on(memory, situation, behaviour):
+                    continue
+                went_on += 1
+                assert memory.decision.action <= Action.WARN
+                for later_us in (time_us + 10_000, time_us + 4_000_000, time_us + 3_600_000_000):
+                    later = situation._replace(time_us=later_us)
+                    assert failsafe_step(memory, frozenset(conditions), later, behaviour) == (memory, ())
+    assert went_on > 4000

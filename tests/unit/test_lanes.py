@@ -57,7 +57,7 @@ def test_sensor_is_stuck_if_it_alone_repeats_ten_samples(both: bool, is_stuck: b
     assert pair.lanes.replace_lost(22_000) is is_stuck
 
 
-def test_change_before_the_first_judgement_is_left_out() -> None:
+def test_change_before_the_first_comparison_is_left_out() -> None:
     pair = Pair()
     pair.lanes.facts = ()
     pair.step(100_000, 1)

@@ -241,9 +241,12 @@ class GroundHub:
         vehicle_s = self._now.time_us * 1e-6
         idle_s = min(self._schedule.idle_s(now_s), self._forget_due_s - now_s)
         for peer in self._peers.values():
-            if peer.outbox:
+            is_served = peer.is_served(now_s)
+            if peer.outbox and (is_served or peer.outbox != _kept_texts(peer)):
                 return 0.0
-            idle_s = min(idle_s, peer.heartbeat_due_s - now_s, peer.streams.idle_s(vehicle_s))
+            idle_s = min(idle_s, peer.heartbeat_due_s - now_s)
+            if is_served:
+                idle_s = min(idle_s, peer.streams.idle_s(vehicle_s))
         return idle_s
 
     def _forwarded(self, now_s: float) -> Iterator[tuple[PeerAddress, bytes]]:
@@ -268,8 +271,7 @@ class GroundHub:
             peer.heartbeat_due_s = now_s + HEARTBEAT_S
             due += self._telemetry.messages(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
         if not peer.is_served(now_s):
-            texts = [message for message in peer.outbox if message.get_type() == "STATUSTEXT"]
-            peer.outbox[:] = texts[-KEPT_TEXTS:]
+            peer.outbox[:] = _kept_texts(peer)
             return due
         due += peer.outbox
         peer.outbox.clear()
@@ -342,3 +344,8 @@ class GroundHub:
             for message in [*peer.outbox, self._telemetry.farewell()]:
                 yield address, peer.link.encode(message)
             peer.outbox.clear()
+
+
+def _kept_texts(peer: Peer) -> list[Message]:
+    """Return what is kept for a peer that is not served, until it is heard again."""
+    return [message for message in peer.outbox if message.get_type() == "STATUSTEXT"][-KEPT_TEXTS:]
