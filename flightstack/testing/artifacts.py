@@ -151,6 +151,7 @@ def run_info(flight: Flight, name: str, reason: str, log: Path) -> RunInfo:
         battery_capacity=setup.battery_capacity_mah,
         battery_drain=setup.battery_drain,
         ideal_rotors=setup.ideal_rotors,
+        faults=tuple(f"at {event.time_s:.2f} s" for event in flight.caused if event.name == "fault"),
         param=tuple(f"{key}={value:g}" for key, value in setup.params.items()),
         inner_hz=setup.inner_hz,
         log_path=log,

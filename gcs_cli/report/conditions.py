@@ -46,9 +46,11 @@ def conditions(summary: Mapping[str, Any]) -> list[str]:
         parts.append("rotors without lag and limits")
     parts.append(_named("parameters of", summary.get("params")))
     parts += summary.get("param") or ()
-    told = [part for part in parts if part] or ["no wind, no faults"]
-    if summary.get("seed") is not None:
-        told.append(f"seed {summary['seed']}")
+    told = [part for part in parts if part]
+    if (
+        summary.get("seed") is not None
+    ):  # else the simulator is unknown, as in a report that is made of a log alone
+        told = [*(told or ["no wind, no faults"]), f"seed {summary['seed']}"]
     state = summary.get("state")
     return [*told, *([FLOWN_ON[state]] if state in FLOWN_ON else [])]
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from flightstack.testing import Verdict, load_scenario, run_scenario
+from flightstack.testing.artifacts import run_info
 from flightstack.testing.expectations import Check, evaluate
 from flightstack.testing.scenario import Expect
 from gcs_cli.scenarios.flying import fly_case
@@ -241,3 +242,9 @@ def test_events_happen_at_the_times_of_events_that_are_asked_in_each_tick(chain:
     assert few.flight.caused
     assert few.flight.events == many.flight.events
     assert few.flight.caused == many.flight.caused
+
+
+def test_the_report_of_a_scenario_says_when_it_had_a_fault(tmp_path: Path) -> None:
+    flight = flown(tmp_path, HOP + "event = [{at_s = 2.0, fault = 'battery:level=0.5'}]\n").flight
+    (fault,) = flight.caused
+    assert run_info(flight, "a", "", tmp_path / "a.ulg").faults == (f"at {fault.time_s:.2f} s",)

@@ -26,7 +26,7 @@ from flightstack.params.vehicle import Vehicle
 from gcs_cli.errors import CliError
 from gcs_cli.pil.flight_samples import FlightSamples, read_samples
 from gcs_cli.pil.replay import UnfitLogError, recording
-from gcs_cli.pil.replay_run import Replay, fed, judged, prepared
+from gcs_cli.pil.replay_run import Replay, fed, outcome_of, prepared
 from gcs_cli.pil.result import Outcome
 from tests.support.plugin_site import example_module
 from tests.support.synthetic_flight import synthetic_flight_bytes
@@ -69,7 +69,7 @@ def log(tmp_path: Path) -> Any:
 
 def replayed(replay: Replay, tmp_path: Path) -> tuple[FloatArray, Outcome]:
     outputs, _ = fed(replay, "c", tmp_path, Console(quiet=True))
-    return outputs, judged(replay, outputs, None, True, FACTS)
+    return outputs, outcome_of(replay, outputs, None, True, FACTS)
 
 
 def differing(outcome: Outcome) -> set[str]:
@@ -156,7 +156,7 @@ def test_two_fields_that_changed_places_are_found(log: Any, tmp_path: Path) -> N
     outputs, _ = fed(replay, "c", tmp_path, Console(quiet=True))
     swapped = outputs.copy()
     swapped[:, [16, 17]] = outputs[:, [17, 16]]  # roll and pitch torque
-    assert differing(judged(replay, swapped, None, True, FACTS)) == {"torque"}
+    assert differing(outcome_of(replay, swapped, None, True, FACTS)) == {"torque"}
 
 
 def test_an_older_log_gives_its_targets_to_the_inner_loop(log: Any, tmp_path: Path) -> None:
@@ -177,20 +177,20 @@ def test_the_verdict_of_a_board_is_not_asked_for_the_same_bits(log: Any, tmp_pat
     replay = prepared(log(flown("c")), None)
     outputs, _ = fed(replay, "c", tmp_path, Console(quiet=True))
     shaken = np.where(outputs == np.rint(outputs), outputs, outputs * (1.0 + 2.0**-23))
-    assert not judged(replay, shaken, None, True, FACTS).passed
-    assert judged(replay, shaken, None, False, FACTS).passed
-    assert not judged(replay, outputs * 1.01, None, False, FACTS).passed
+    assert not outcome_of(replay, shaken, None, True, FACTS).passed
+    assert outcome_of(replay, shaken, None, False, FACTS).passed
+    assert not outcome_of(replay, outputs * 1.01, None, False, FACTS).passed
 
 
 def test_a_replay_that_compares_nothing_passes_nothing(log: Any, tmp_path: Path) -> None:
     replay = prepared(log(flown("c")), None)
     outputs, _ = fed(replay, "c", tmp_path, Console(quiet=True))
     deaf = replay._replace(flight=without(replay.flight, "rotor_command"))
-    (failed,) = [c for c in judged(deaf, outputs, None, True, FACTS).result["checks"] if not c["passed"]]
+    (failed,) = [c for c in outcome_of(deaf, outputs, None, True, FACTS).result["checks"] if not c["passed"]]
     assert failed["name"] == "log–target actuators"
     assert failed["about"] == "rotor speed commands: no samples to compare"
     shifted = replay.record._replace(time_us=replay.record.time_us + 1)
-    checks = of_log(judged(replay._replace(record=shifted), outputs, None, True, FACTS))
+    checks = of_log(outcome_of(replay._replace(record=shifted), outputs, None, True, FACTS))
     assert not any(check["passed"] for check in checks)
 
 

@@ -17,7 +17,7 @@ from flightstack.core.errors import ConfigError
 from gcs_cli.errors import CliError
 from gcs_cli.pil.excitation import excitation
 from gcs_cli.pil.replay import Recording
-from gcs_cli.pil.replay_run import configured, fed, judged, prepared, read_flight
+from gcs_cli.pil.replay_run import configured, fed, outcome_of, prepared, read_flight
 from gcs_cli.pil.vectors import Vectors, read_vectors, vectors_of, write_vectors
 from tests.support.truth import World
 
@@ -70,7 +70,7 @@ def test_vectors_of_a_flight_replay_without_a_difference(log: Path, tmp_path: Pa
     write_vectors(file, vectors_of(*read_flight(log)))
     replay = prepared(file, None)
     outputs, _ = fed(replay, "c", tmp_path, Console(quiet=True))
-    outcome = judged(replay, outputs, None, True, FACTS)
+    outcome = outcome_of(replay, outputs, None, True, FACTS)
     assert outcome.passed
     of_log = [row for row in outcome.result["differences"] if row["pair"] == "log–target"]
     assert len(of_log) == 10
@@ -83,10 +83,10 @@ def test_excitation_is_replayed_without_a_flight(excited: Vectors, tmp_path: Pat
     replay = prepared(file, None)
     assert_same(replay.record, excited.record)
     outputs, _ = fed(replay, "c", tmp_path, Console(quiet=True))
-    outcome = judged(replay, outputs, None, True, FACTS)
+    outcome = outcome_of(replay, outputs, None, True, FACTS)
     assert outcome.passed
     assert {row["pair"] for row in outcome.result["differences"]} == {"stages–target"}
-    wrong = judged(replay, outputs * np.where(np.arange(32) == 16, 1.001, 1.0), None, True, FACTS)
+    wrong = outcome_of(replay, outputs * np.where(np.arange(32) == 16, 1.001, 1.0), None, True, FACTS)
     failed = [check["name"] for check in wrong.result["checks"] if not check["passed"]]
     assert "stages–target wrench slope" in failed
 

@@ -138,6 +138,11 @@ def test_the_head_says_under_what_it_flew(flight: Flight) -> None:
     assert "no wind, no faults · seed 1" in report(flight)
 
 
+def test_a_report_of_a_log_alone_does_not_say_that_there_was_no_wind(flight: Flight) -> None:
+    summary = summarise(flight, square_plan(), RunInfo("completed", "square", seed=None))
+    assert "no wind" not in render_report(flight, square_plan(), summary, [])
+
+
 def test_the_setpoint_is_not_drawn_while_the_vehicle_stands_landed(flight: Flight) -> None:
     """It sinks into the ground then, to hold the vehicle there."""
     time_s, touchdown = flight.position_setpoint.time_s, 34.0
