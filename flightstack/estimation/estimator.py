@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -28,6 +28,42 @@ from flightstack.estimation.sensor_samples import (
 _pack_imu = struct.Struct(f"={IMU_SIZE}d").pack_into
 _pack_mag, _pack_pair = struct.Struct("=4d").pack_into, struct.Struct("=2d").pack_into
 """A third of the time of an assignment to an array."""
+
+
+class StateEstimator(Protocol):
+    """An estimator: samples in, the state of the vehicle out."""
+
+    frame: LocalFrame | None
+    """The local frame of its position; None before the first fix."""
+
+    @property
+    def aligned(self) -> bool:
+        """True if the attitude is known."""
+        ...
+
+    def imu_row(self, row: FloatArray) -> None:
+        """Take a sample of an inertial sensor in its array form, shape (8,)."""
+        ...
+
+    def mag(self, sample: MagSample) -> None:
+        """Take a sample of the magnetometer."""
+        ...
+
+    def baro(self, sample: BaroSample) -> None:
+        """Take a sample of the barometer."""
+        ...
+
+    def gnss(self, sample: GnssSample) -> None:
+        """Take a sample of the GNSS receiver."""
+        ...
+
+    def range(self, sample: RangeSample) -> None:
+        """Take a sample of the rangefinder."""
+        ...
+
+    def write_state(self, out: FloatArray) -> None:
+        """Write the state at the time of the newest sample of the inertial sensor, as ``VehicleState``, shape (13,)."""
+        ...
 
 
 class Estimator:

@@ -11,6 +11,7 @@ import numpy as np
 
 from flightstack.core.contract import FloatArray, SingleArray, Vector3
 from flightstack.core.geodesy import LocalFrame
+from flightstack.estimation.estimator import StateEstimator
 from flightstack.estimation.imu_track import RECORD_SIZE, ImuTrack
 from flightstack.estimation.sensor_samples import (
     BaroSample,
@@ -25,42 +26,6 @@ from flightstack.simulator_link.sensor_inbox import FlowReport, HilReport, Range
 
 Sample = MagSample | BaroSample | GnssSample | RangeSample | FlowSample
 _IMU = ACCEL | GYRO
-
-
-class StateEstimator(Protocol):
-    """An estimator: samples in, the state of the vehicle out."""
-
-    frame: LocalFrame | None
-    """The local frame of its position; None before the first fix."""
-
-    @property
-    def aligned(self) -> bool:
-        """True if the attitude is known."""
-        ...
-
-    def imu_row(self, row: FloatArray) -> None:
-        """Take a sample of an inertial sensor in its array form, shape (8,)."""
-        ...
-
-    def mag(self, sample: MagSample) -> None:
-        """Take a sample of the magnetometer."""
-        ...
-
-    def baro(self, sample: BaroSample) -> None:
-        """Take a sample of the barometer."""
-        ...
-
-    def gnss(self, sample: GnssSample) -> None:
-        """Take a sample of the GNSS receiver."""
-        ...
-
-    def range(self, sample: RangeSample) -> None:
-        """Take a sample of the rangefinder."""
-        ...
-
-    def write_state(self, out: FloatArray) -> None:
-        """Write the state at the time of the newest sample of the inertial sensor, as ``VehicleState``, shape (13,)."""
-        ...
 
 
 class SampleRecorder(Protocol):
