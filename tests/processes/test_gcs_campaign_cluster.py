@@ -90,6 +90,7 @@ def test_flights_of_a_killed_worker_fly_on_an_added_one_to_the_same_table(
 ) -> None:
     monkeypatch.chdir(flown)
     first = cluster.add_worker()
+    first.wait_for("Registered to")  # else the notice of a cluster without workers may come before
     run = campaign(cluster, "--out", "cluster", "--csv", "--json")
     run.wait_for('"event": "flight"')
     first.kill()
