@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from flightstack.core.array_items import store
 from flightstack.core.compiled import compiled
@@ -27,6 +28,13 @@ def all_finite(values: FloatArray | tuple[float, ...]) -> bool:
         if not math.isfinite(value):
             return False
     return True
+
+
+@compiled
+def copy_all(source: Any, target: Any) -> None:
+    """Copy an array of one dimension to the start of another."""
+    for i in range(len(source)):
+        target[i] = source[i]
 
 
 @compiled

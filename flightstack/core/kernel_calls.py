@@ -1,4 +1,4 @@
-"""Calls of compiled kernels by compiled code at their address.
+"""Calls of compiled kernels, and of functions of the C library, by compiled code at their address.
 
 A kernel that calls others so includes no machine code of them: it compiles in a second, once for all of them, whichever
 they are. Arguments are passed as they are: their types must be those of the called kernel, but a kernel that reads only
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
@@ -55,3 +56,23 @@ call_kernel_int = intrinsic(_call(types.int64))
 """Call the kernel at an address, which returns a whole number, with a tuple of arguments."""
 call_kernel_float = intrinsic(_call(types.float64))
 """Call the kernel at an address, which returns a float, with a tuple of arguments."""
+
+
+def _c_call(_context: Any, _address: Any, arguments: Any) -> Any:
+    """Return what Numba asks of an intrinsic, for functions of the C library."""
+
+    def generate(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        word, count = ir.IntType(64), len(signature.args[1])
+        function = ir.FunctionType(word, [word] * count).as_pointer()
+        return builder.call(
+            builder.inttoptr(values[0], function), cgutils.unpack_tuple(builder, values[1], count)
+        )
+
+    return types.int64(types.int64, arguments), generate
+
+
+call_c = intrinsic(_c_call)
+"""Call the C function at an address with a tuple of int64, for integers and pointers; return its result as int64.
+
+Of a result that is shorter in C, only those bits are valid.
+"""

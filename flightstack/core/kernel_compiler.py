@@ -13,7 +13,7 @@ from types import FunctionType, SimpleNamespace
 from typing import Any
 
 import numba
-from llvmlite.binding import parse_assembly, parse_bitcode  # type: ignore[import-untyped]
+from llvmlite.binding import parse_assembly, parse_bitcode
 from numba.core import types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
 from numba.core.codegen import JITCodeLibrary

@@ -19,12 +19,12 @@ from flightstack.process.assembly import Stack, reboot_config, transfer_state
 from flightstack.process.clock import DeadlineScheduler, minimise_timer_slack
 from flightstack.process.connections import (
     GroundConnection,
-    SimulatorPace,
     check_deadline,
     connect_simulator,
     serve_while_idle,
     wait_for_state,
 )
+from flightstack.process.lockstep_loop import LockstepLoop
 from flightstack.process.process_config import (
     EXIT_LOST,
     EXIT_OK,
@@ -36,9 +36,9 @@ from flightstack.process.process_config import (
     complain,
 )
 from flightstack.process.process_files import ProcessFiles
+from flightstack.process.quiet_exchange import compile_kernels
 from flightstack.transports.cpu_affinity import AffinityFollower
 from flightstack.transports.tcp import LinkClosedError, TcpClient
-from flightstack.vehicle.autopilot import Lockstep
 
 GROUND_POLL_NS = 500_000
 GROUND_IDLE_NS = 2_000_000
@@ -65,6 +65,8 @@ class App:
         self._files = ProcessFiles(process)
         self.stack = self._files.build(config)
         self._files.adopt(self.stack, config)
+        if config.lockstep:
+            compile_kernels(self.stack)
         self.stack.ground.vehicle.prepare_reboot = self._prepare_reboot
         self._next: tuple[Stack, StackConfig] | None = None
         self._ground = GroundConnection(process.ports, self.stack.ground)
@@ -238,29 +240,26 @@ class App:
 
     def _run_lockstep(self, simulator: TcpClient, until: Callable[[], bool] | None) -> None:
         """Answer each state with actuator commands; the simulator drives the time."""
-        link, autopilot, timing = self.stack.simulator, self.stack.autopilot, self.stack.timing
-        lockstep = Lockstep(link, autopilot, self.stack.rates.interval_us)
-        receive, clock_ns = simulator.receive, time.monotonic_ns
+        link, loop = self.stack.simulator, LockstepLoop(self.stack, simulator)
         self._follower = AffinityFollower(simulator.socket)
-        divisor, tick = self.stack.rates.divisor, 0
-        pace, is_over, fresh = SimulatorPace(), False, True  # fresh: the state received before the start
+        is_over, fresh = False, True  # fresh: the state received before the start
         while True:
+            data = None
             if fresh:
                 is_over = is_over or (until is not None and until())
-                if is_over and tick % divisor == 0:
+                if is_over and loop.ends_period:
                     return
-                began_ns = clock_ns()
-                pace.note_tick(began_ns)
-                commands = lockstep.tick(began_ns)
-                simulator.send(link.answer(commands, autopilot.now.status.armed))
-                timing.tick(began_ns, clock_ns())
-                tick += 1
-                if tick % divisor == 0:
-                    self._between_ticks(simulator)
-            # a command between the end and the next outer tick would act at a time that depends on the machine
-            if self._serves_pauses and not is_over and pace.pauses(simulator):
-                serve_while_idle(simulator, self._poller, self.stack, self._process, self._serve_while_idle)
-            data = receive()
+                data = loop.run(self._next_ground_ns, self._next_log_us, until is None)
+                if loop.serves_ground:
+                    self._between_ticks(simulator, loop.ends_period)
+            if data is None:
+                loop.pace.begin_wait(time.monotonic_ns())
+                # a command between the end and the next outer tick would act at a time that depends on the machine
+                if self._serves_pauses and not is_over and loop.pace.pauses(simulator):
+                    serve_while_idle(
+                        simulator, self._poller, self.stack, self._process, self._serve_while_idle
+                    )
+                data = simulator.receive()
             fresh = self._wait_for_simulator(simulator, not is_over) if data is None else link.receive(data)
 
     def _serve_while_idle(self) -> None:
@@ -302,16 +301,17 @@ class App:
             simulator.send(link.answer(commands, autopilot.now.status.armed))
             timing.tick(began_ns, time.monotonic_ns())
             tick += 1
-            if tick % self.stack.rates.divisor == 0 or self._serves_pauses:
-                self._between_ticks(simulator)
+            ends_period = tick % self.stack.rates.divisor == 0
+            if ends_period or self._serves_pauses:
+                self._between_ticks(simulator, ends_period)
                 check_deadline(heard_s + self._process.simulator_timeout_s, self.stack, self._process)
             elif self._ground.is_sending:
                 self._ground.send()
 
-    def _between_ticks(self, simulator: TcpClient) -> None:
-        """Serve the ground links, log the timing and check for a stop."""
+    def _between_ticks(self, simulator: TcpClient, ends_period: bool) -> None:
+        """Serve the ground links, log the timing at the end of an outer period, and check for a stop."""
         time_us = self.stack.now.time_us
-        if time_us >= self._next_log_us:
+        if ends_period and time_us >= self._next_log_us:
             self._next_log_us = time_us + 1_000_000
             fields = self.stack.report.log_fields(time_us // self.stack.rates.interval_us)
             self.stack.recorder.timing(time_us, **fields)

@@ -91,6 +91,13 @@ class Durations:
         self._values[self._count % WINDOW] = nanoseconds
         self._count += 1
 
+    def add_all(self, nanoseconds: np.ndarray[Any, np.dtype[np.int64]]) -> None:
+        """Record durations, the oldest first."""
+        for part in np.split(nanoseconds, [WINDOW - self._count % WINDOW]):
+            at = self._count % WINDOW
+            self._values[at : at + len(part)] = part
+            self._count += len(part)
+
     def figures(self) -> Distribution:
         """Return the statistics of the stored durations."""
         count = min(self._count, WINDOW)
@@ -118,6 +125,12 @@ class LoopTiming:
         self.ticks += 1
         if took > self.period_ns:
             self.overruns += 1
+
+    def ticks_took(self, took_ns: np.ndarray[Any, np.dtype[np.int64]]) -> None:
+        """Record the durations of ticks, the oldest first."""
+        self.execution.add_all(took_ns)
+        self.ticks += len(took_ns)
+        self.overruns += int((took_ns > self.period_ns).sum())
 
 
 class DeadlineScheduler:

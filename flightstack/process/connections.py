@@ -22,10 +22,12 @@ IDLE_MS = 20
 TRANSFER_MS = 1
 """The same while files are sent."""
 PAUSE_NS = 500_000
-"""Time between the starts of two ticks above which the simulator counts as waiting; at full speed it is a twentieth to
-a third of it."""
-PACED_NS = 50_000_000
-"""Time after a pause in which the next one is expected: several periods of a simulator that sends in bursts."""
+"""Wait for a state above which the simulator counts as waiting; at full speed it is a twentieth of it."""
+PACED_SHARE = 0.2
+"""Share of its pauses in the time of a simulator that waits for a clock; at full speed long steps are a twentieth."""
+FEW_NS, MOST_NS = 1_500_000, 10_000_000
+"""Pauses above that share, in sum, from which the next one is expected, and the most that are counted: for 43 ms after
+the last pause, which is several periods of a simulator that sends in bursts."""
 SIMULATOR_WARNING_S = 10.0
 """Timeout before the user is warned; waiting continues, because the simulator may be compiling."""
 
@@ -110,17 +112,31 @@ class SimulatorPace:
     """Recognises the pauses of a simulator that waits after each state or after a burst of states."""
 
     def __init__(self) -> None:
-        self._began_ns = self._paused_ns = -PACED_NS
+        self._began_ns = self._waits_ns = self._noted_ns = 0
+        self._paused_ns = 0  # sum of the pauses above their share at ``_noted_ns``
 
     def note_tick(self, began_ns: int) -> None:
-        """Note the time of the machine's clock at which a tick begins."""
-        if began_ns - self._began_ns > PAUSE_NS:
-            self._paused_ns = began_ns
+        """Note the time of the machine's clock at which a tick begins, after a wait."""
         self._began_ns = began_ns
+        if self._waits_ns:
+            self.note_wait(began_ns, began_ns - self._waits_ns)
+
+    def note_wait(self, ended_ns: int, waited_ns: int) -> None:
+        """Note the end of a wait for a state, or of several, the longest of which took ``waited_ns``."""
+        if waited_ns > PAUSE_NS:
+            self._paused_ns = min(MOST_NS, self._left_ns(ended_ns) + waited_ns)
+            self._noted_ns = ended_ns
+
+    def begin_wait(self, now_ns: int) -> None:
+        """Note that a wait for a state begins: what was done since the last one was not the simulator's."""
+        self._waits_ns = now_ns
+
+    def _left_ns(self, now_ns: int) -> int:
+        return max(0, self._paused_ns - round((now_ns - self._noted_ns) * PACED_SHARE))
 
     def may_pause(self) -> bool:
-        """Return True if there was a pause in the last ``PACED_NS`` before this tick."""
-        return self._began_ns - self._paused_ns < PACED_NS
+        """Return True if the next pause is expected."""
+        return self._left_ns(self._began_ns) > FEW_NS
 
     def pauses(self, simulator: TcpClient) -> bool:
         """Return True if the simulator sends nothing until ``PAUSE_NS`` after the start of this tick.

@@ -78,9 +78,11 @@ class SimulatorEndpoint:
         uses_sensors: bool = False,
     ) -> None:
         self._link = Link(system_id, mavlink.MAV_COMP_ID_AUTOPILOT1)
-        self._plant = PlantStateFrame()
-        self._actuators = ActuatorsFrame(system_id)
-        self._actuators.set_rotor_count(len(vehicle.rotors))
+        self.plant = PlantStateFrame()
+        """The newest FS_PLANT_STATE."""
+        self.actuators = ActuatorsFrame(system_id)
+        """The newest answer, and the commands of the next one."""
+        self.actuators.set_rotor_count(len(vehicle.rotors))
         self._system_type = system_type(len(vehicle.rotors))
         self._frame = LocalFrame(home)
         self._max_speed_rad_s = np.array([min(r.max_speed_rad_s, 1e6) for r in vehicle.rotors])
@@ -89,11 +91,11 @@ class SimulatorEndpoint:
         """Messages of the sensors, of a vehicle that flies on them."""
         self._uses_hil = uses_sensors  # until the simulator sends FS_PLANT_STATE
         self._has_hil_state = False  # a HIL_STATE_QUATERNION arrived
-        self.truth: FloatArray = self._plant.state
+        self.truth: FloatArray = self.plant.state
         """True state, shape (13,)."""
         self.truth[6] = 1.0
         self.state: FloatArray = self.truth.copy() if uses_sensors else self.truth
-        self.rotor_speed_rad_s = self._plant.rotor_speed_rad_s
+        self.rotor_speed_rad_s = self.plant.rotor_speed_rad_s
         self.time_us = 0
         self.time_jumps = 0
         self.steps = StateSteps(interval_us)
@@ -155,8 +157,8 @@ class SimulatorEndpoint:
         """
         if self.sensors is not None:
             return self._receive_sensors(data, self.sensors)
-        if self._plant.open(data):
-            self._take_time(self._plant.time_us)
+        if self.plant.open(data):
+            self._take_time(self.plant.time_us)
             self._uses_hil = False
             return True
         return self._receive_with_battery(data) or self._receive_any(data)
@@ -173,7 +175,7 @@ class SimulatorEndpoint:
 
     def take(self, time_us: int, frame: PlantStateFrame, sensors: Sequence[HilMeasurement]) -> None:
         """Take what ``receive`` would decode of the bytes of a simulator in this process; ``frame`` is not sealed."""
-        self._plant.frame[:] = frame.frame
+        self.plant.frame[:] = frame.frame
         if self.sensors is None:
             self._take_time(time_us)
         elif sensors:
@@ -191,25 +193,20 @@ class SimulatorEndpoint:
         self.has_arrived, self.seen = False, seen
         self._arrived_us = self._changed_us = time_us
 
-    @property
-    def frame(self) -> memoryview:
-        """The frame of the newest state."""
-        return self._plant.frame
-
     def flags(self, armed: bool) -> int:
         """Return the flags of an answer with FS_ACTUATORS."""
         return self._lockstep | (ARMED_FLAG if armed else 0)
 
     def _receive_with_battery(self, data: memoryview) -> bool:
         """Process a battery report directly followed by a state; return False and do nothing for anything else."""
-        split = len(data) - self._plant.size
+        split = len(data) - self.plant.size
         if (
             split <= 0
             or (report := decode_battery(data[:split])) is None
-            or not self._plant.open(data[split:])
+            or not self.plant.open(data[split:])
         ):
             return False
-        self._take_time(self._plant.time_us)
+        self._take_time(self.plant.time_us)
         self._uses_hil = False
         self._take_battery(report)
         return True
@@ -220,7 +217,7 @@ class SimulatorEndpoint:
         while not self.finder.partial_size and end - at > HEADER_V2 and data[at] == MAGIC_V2:
             size = HEADER_V2 + data[at + 1] + CHECKSUM_SIZE
             frame = data[at : at + size]
-            if self._plant.open(frame):
+            if self.plant.open(frame):
                 self._uses_hil = False
             elif (is_clock := sensors.open(frame)) is None:
                 if (report := decode_battery(frame)) is None:
@@ -244,10 +241,10 @@ class SimulatorEndpoint:
         fresh = False
         battery: BatteryReport | None = None
         for frame in self.finder.find(data):
-            if self._plant.open(frame):
+            if self.plant.open(frame):
                 self._uses_hil = False
                 if self.sensors is None:
-                    self._take_time(self._plant.time_us)
+                    self._take_time(self.plant.time_us)
                     fresh = True
                 continue
             for message in self._link.decode(frame):
@@ -375,8 +372,8 @@ class SimulatorEndpoint:
         """Return the answer to the newest state with commanded rotor speeds (8,)."""
         if self._uses_hil:
             return self._hil_answer(rotor_speed_rad_s, armed)
-        self._actuators.rotor_speed_rad_s[:] = rotor_speed_rad_s
-        return self._actuators.seal(self.stamp_us, self.flags(armed))
+        self.actuators.rotor_speed_rad_s[:] = rotor_speed_rad_s
+        return self.actuators.seal(self.stamp_us, self.flags(armed))
 
     def _hil_answer(self, rotor_speed_rad_s: FloatArray, armed: bool) -> bytes:
         count = self._max_speed_rad_s.size

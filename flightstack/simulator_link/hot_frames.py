@@ -15,6 +15,7 @@ from fastcrc import crc16
 from flightstack.core.contract import MAX_ROTORS, STATE_SIZE, FloatArray
 from flightstack.mavlink.dialect import LAYOUT_BY_NAME
 from flightstack.mavlink.frames import CHECKSUM_SIZE, HEADER, HEADER_V2, MAGIC_V2
+from flightstack.simulator_link.frame_kernels import Shape
 
 if sys.byteorder != "little":  # the payload is used in place
     raise ImportError("flightstack requires a little-endian machine")
@@ -40,6 +41,8 @@ class _HotFrame:
         self.payload_size = struct.calcsize(layout.format)
         self.size = HEADER_V2 + self.payload_size + CHECKSUM_SIZE
         self._extra = layout.crc_extra
+        self.shape = Shape(self.payload_size, layout.crc_extra, *layout.message_id.to_bytes(3, "little"))
+        """For compiled code."""
         self._extra_byte = bytes([layout.crc_extra])
         self._buffer = bytearray(_ALIGNMENT + self.size)
         self.frame = memoryview(self._buffer)[_ALIGNMENT:]
@@ -50,7 +53,7 @@ class _HotFrame:
         # constant part of the header, time, flags, checksum
         self._unpack = struct.Struct(f"<3s4x3sQ{self.payload_size - 9}xBH").unpack_from
         self._magic, self._message = bytes(self.frame[:3]), bytes(self.frame[7:HEADER_V2])
-        self._seq = 0
+        self.frame[4] = 255  # the sequence number before the first one
         self.time_us = 0
         """Time of the current message."""
         self.flags = VALID_FLAG
@@ -67,8 +70,7 @@ class _HotFrame:
         """Complete the frame around the payload in place; return its bytes, valid until the next call."""
         frame = self.frame
         self.time_us, self.flags = time_us, flags | VALID_FLAG
-        frame[4] = self._seq
-        self._seq = (self._seq + 1) & 255
+        frame[4] = (frame[4] + 1) & 255
         _TIME.pack_into(frame, HEADER_V2, time_us)
         frame[self._flags_at] = self.flags
         frame[self._crc_at] = self._extra  # the checksum covers one more byte, which is not sent

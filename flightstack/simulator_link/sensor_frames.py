@@ -20,6 +20,7 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.fields import int16, int32, whole
 from flightstack.mavlink.frames import CHECKSUM_SIZE, HEADER, HEADER_V2, MAGIC_V2, checksum, pack_frame
 from flightstack.mavlink.link import Message
+from flightstack.simulator_link.frame_kernels import Shape
 
 HIL_SENSOR_ID: int = mavlink.MAVLINK_MSG_ID_HIL_SENSOR
 HIL_GPS_ID: int = mavlink.MAVLINK_MSG_ID_HIL_GPS
@@ -55,6 +56,8 @@ _FIELDS_AT = _PAYLOAD.size - _FIELDS.size
 _CRC = struct.Struct("<H")
 _HEAD = struct.Struct("<BBB4x3s")  # magic, size, incompatible flags, message
 _SENSOR_EXTRA: int = mavlink.MAVLink_hil_sensor_message.crc_extra
+SENSOR_SHAPE = Shape(_PAYLOAD.size, _SENSOR_EXTRA, *HIL_SENSOR_ID.to_bytes(3, "little"))
+"""HIL_SENSOR for compiled code."""
 _SENSOR_EXTRA_BYTE = bytes([_SENSOR_EXTRA])
 _crc16 = crc16.mcrf4xx
 
@@ -104,12 +107,13 @@ class HilSensorFrame:
 
     def __init__(self, system_id: int = 1, component_id: int = 1) -> None:
         self._buffer = bytearray(_ALIGNMENT + HEADER_V2 + _PAYLOAD.size + CHECKSUM_SIZE)
-        self._frame = memoryview(self._buffer)[_ALIGNMENT:]
+        self.frame = memoryview(self._buffer)[_ALIGNMENT:]
+        """All bytes, those of a payload that is not truncated."""
         HEADER.pack_into(
-            self._frame, 0, MAGIC_V2, _PAYLOAD.size, 0, 0, 0, system_id, component_id, HIL_SENSOR_ID, 0
+            self.frame, 0, MAGIC_V2, _PAYLOAD.size, 0, 0, 0, system_id, component_id, HIL_SENSOR_ID, 0
         )
-        self._message = bytes(self._frame[7:HEADER_V2])
-        self._payload = self._frame[HEADER_V2 : HEADER_V2 + _PAYLOAD.size]
+        self._message = bytes(self.frame[7:HEADER_V2])
+        self._payload = self.frame[HEADER_V2 : HEADER_V2 + _PAYLOAD.size]
         self.values = np.frombuffer(self._buffer, "<f4", VALUES, _ALIGNMENT + HEADER_V2 + 8)
         """Measurements, float32, shape (13,)."""
         self.parts = self.values.view(HIL_VALUES)
@@ -119,20 +123,19 @@ class HilSensorFrame:
         """Bits of ``fields_updated``."""
         self.number = 0
         """Number of the sensor, from 0."""
-        self._seq = 0
+        self.frame[4] = 255  # the sequence number before the first one
         self._parts: dict[int, tuple[memoryview, memoryview]] = {}  # checked part and frame, by their end
 
     def seal(self, time_us: int, fields: int, number: int) -> memoryview:
         """Complete the frame around the values; return its bytes without trailing zeros, valid until the next call."""
-        frame = self._frame
+        frame = self.frame
         self.time_us, self.fields, self.number = time_us, fields, number
-        frame[4] = self._seq
-        self._seq = (self._seq + 1) & 255
+        frame[4] = (frame[4] + 1) & 255
         _TIME.pack_into(frame, HEADER_V2, time_us)
         _FIELDS.pack_into(frame, HEADER_V2 + _FIELDS_AT, fields, number)
         if not fields | number:  # the last values may be zero, and must not be overwritten by the checksum
             payload = bytes(frame[HEADER_V2 : HEADER_V2 + _FIELDS_AT]).rstrip(b"\x00") or b"\x00"
-            return memoryview(pack_frame(HIL_SENSOR_ID, payload, _SENSOR_EXTRA, frame[4], frame[5], frame[6]))
+            return memoryview(pack_frame(HIL_SENSOR_ID, payload, _SENSOR_EXTRA, *frame[4:7]))
         size = _PAYLOAD.size if number else _FIELDS_AT + ((fields.bit_length() + 7) >> 3)
         end = HEADER_V2 + size
         frame[1] = size

@@ -82,16 +82,23 @@ class SensorInbox:
     """Collects sensor messages until they are taken."""
 
     def __init__(self) -> None:
-        self._frame = HilSensorFrame()
+        self.frame = HilSensorFrame()
+        """The newest HIL_SENSOR."""
         self._waiting: list[Content] = []
         self._reports: list[Report] = []
         self._time_us, self._stamp_us = 0, -1  # of the last clock
         self._measured_us: dict[int, int] = {}  # last inertial measurement of each sensor
 
     @property
+    def imu_count(self) -> int:
+        """Number of inertial sensors that have measured; 0 if their numbers do not follow each other from 0."""
+        count = len(self._measured_us)
+        return count if self._measured_us.keys() == set(range(count)) else 0
+
+    @property
     def clock_us(self) -> int:
         """Time stamp of the newest HIL_SENSOR."""
-        return self._frame.time_us
+        return self.frame.time_us
 
     def open(self, frame: bytes | memoryview) -> bool | None:
         """Take a frame of a sensor message; return True for the clock, None if it is another message.
@@ -99,7 +106,7 @@ class SensorInbox:
         After True call ``stamp``.
         """
         message_id = frame[7] | frame[8] << 8 | frame[9] << 16 if len(frame) > 9 else -1
-        if message_id == HIL_SENSOR_ID and self._frame.open(frame):
+        if message_id == HIL_SENSOR_ID and self.frame.open(frame):
             return self._take_sensor()
         if message_id == HIL_GPS_ID and (gps := decode_gps(frame)) is not None:
             self._wait(gps)
@@ -111,13 +118,13 @@ class SensorInbox:
         for number in range(len(measurements) - 1, 0, -1):
             values, fields = measurements[number]
             self._wait(HilReport(number, fields, values.copy(), 0))
-        self._frame.set(time_us, measurements[0])
+        self.frame.set(time_us, measurements[0])
 
     def take_message(self, message: Message) -> bool:
         """Take a message of the general decoder; return True for the clock. After True call ``stamp``."""
         kind = message.get_msgId()
         if kind == HIL_SENSOR_ID:
-            self._frame.take(message)
+            self.frame.take(message)
             return self._take_sensor()
         if kind == HIL_GPS_ID:
             self._wait(gps_of(message))
@@ -147,7 +154,7 @@ class SensorInbox:
         self._measured_us = dict.fromkeys(self._measured_us, time_us)
 
     def _take_sensor(self) -> bool:
-        frame = self._frame
+        frame = self.frame
         if frame.number == 0:
             return True
         if frame.time_us == self._stamp_us:
@@ -163,7 +170,7 @@ class SensorInbox:
 
     def stamp(self, time_us: int) -> None:
         """Give the messages since the last clock, and the clock's own measurements, their vehicle time."""
-        frame = self._frame
+        frame = self.frame
         if self._waiting:
             for content in self._waiting:
                 if isinstance(content, HilReport):

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from flightstack.commander.fault_detector import MOVING
 from flightstack.commander.ground_monitor import FALL_M_S
+from flightstack.core.arrays import copy_all
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
 from flightstack.core.kernel_calls import call_kernel, call_kernel_int
@@ -51,13 +52,6 @@ class Progress(NamedTuple):
 
 
 OUTER_CALLS, OUTER_MARKS, PROGRESS = dtype_of(OuterCalls), dtype_of(OuterMarks), dtype_of(Progress)
-
-
-@compiled
-def copy_all(source: Any, target: Any) -> None:
-    """Copy an array of one dimension."""
-    for i in range(len(source)):
-        target[i] = source[i]
 
 
 @compiled

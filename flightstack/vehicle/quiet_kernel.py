@@ -1,20 +1,22 @@
-"""Quiet ticks as one compiled call: plant, sensors, filter, inner loop, rotor monitor, nominal outer ticks.
+"""Quiet ticks as one compiled call: simulator, filter, inner loop, rotor monitor, nominal outer ticks.
 
 It calls the kernels that each part runs in any other tick, at their addresses, on the same arrays and in the same
-order. Records are passed as bytes, so that this kernel is compiled once for all of them. A module of its own, with few
-imports: the key of a kernel in the cache depends on all of them.
+order. That of the simulator computes its step, or exchanges commands and state with another process. Records are passed
+as bytes, so that this kernel is compiled once for all of them. A module of its own, with few imports: the key of a
+kernel in the cache depends on all of them.
 """
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from flightstack.core.arrays import copy_all
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, LoopRow
 from flightstack.core.kernel_calls import call_kernel, call_kernel_int
 from flightstack.core.record_types import dtype_of
-from flightstack.vehicle.outer_kernel import copy_all, guide, note_outer
-from flightstack.vehicle.slow_kernel import log_truth, measure_slow, take_slow
+from flightstack.vehicle.outer_kernel import guide, note_outer
+from flightstack.vehicle.slow_kernel import log_truth, take_slow
 
 _REFERENCE, _COMMAND, _SPEED = (
     columns.start for columns in (LoopRow.REFERENCE_ATTITUDE, LoopRow.ROTOR_COMMAND, LoopRow.ROTOR_SPEED)
@@ -24,12 +26,13 @@ _REFERENCE, _COMMAND, _SPEED = (
 class QuietCalls(NamedTuple):
     """Addresses of the kernels; those of the sensors are 0 on the true state."""
 
-    advance: int
+    step: int
+    """Takes ``world``, the simulator's time and the flags of the commands; returns a result, below 0 without a step."""
     control: int
     follow: int
-    measure: int
     take: int
     estimate: int
+    push: int
 
 
 class QuietCounters(NamedTuple):
@@ -38,15 +41,17 @@ class QuietCounters(NamedTuple):
     ticks: int
     """Of the vehicle."""
     flown: int
-    """Advances of the plant."""
+    """Steps of the simulator."""
     result: int
-    """Of the last advance."""
+    """Of the last step."""
     sensed: int
     """Samples of the inertial sensors."""
     waits: int
     """1 if a tick is begun that must be run in Python."""
 
 
+LARGEST_RESULT = 1
+"""Of a step that ticks follow: a plant that touches the ground. Above it the plant has diverged."""
 QUIET_CALLS, QUIET_COUNTERS = dtype_of(QuietCalls), dtype_of(QuietCounters)
 
 
@@ -61,9 +66,8 @@ def _total(numbers: Any) -> float:
 def _sense(
     calls: Any, sensing: Any, time_us: int, interval_us: int, selected: int, record: FloatArray
 ) -> None:
-    """Measure with the inertial sensors, and give each filter its sample; ``record`` takes that of the selected one."""
-    motion, imus, true_state, true_speeds, noise, wires, tracks, rings, filters, spare_record = sensing
-    call_kernel(calls["measure"], (motion, imus, true_state, true_speeds, noise, wires))
+    """Give each filter the sample of its inertial sensor; ``record`` takes that of the selected one."""
+    wires, tracks, rings, filters, spare_record = sensing
     time_s = time_us * 1e-6
     for k in range(len(tracks)):
         rows, taken = rings[k]
@@ -98,26 +102,25 @@ def _control(calls: Any, control: Any, flies: bool, row: FloatArray, commands: F
 
 @compiled
 def _advance(
-    calls: Any, slow_calls: Any, counters: Any, interval_us: int, plant: Any, sensing: Any, slow: Any,
-    state: FloatArray, time_us: int, flags: int, estimate: Any, following: Any, imu_log: Any,
+    calls: Any, counters: Any, interval_us: int, world: Any, sensing: Any, slow: Any,
+    state: FloatArray, time_us: int, boot_us: int, flags: int, estimate: Any, following: Any, imu_log: Any,
 ) -> bool:  # fmt: skip
-    """Advance plant, sensors and estimate to ``time_us``; return False if no tick is to follow."""
-    memory, commands, steps, output, largest_result, sent, taken = plant
+    """Advance simulator and estimate to ``time_us``; return False if no tick is to follow."""
     selected, known, is_known, resets = estimate
     records, record_times, record_at = imu_log
-    result = call_kernel_int(calls["advance"], (memory, commands, flags, steps, output))
+    result = call_kernel_int(calls["step"], (world, time_us + boot_us, flags))
+    if result < 0:
+        return False
     counters["flown"] += 1
     counters["result"] = result
-    if result > largest_result:
+    if result > LARGEST_RESULT:
         return False
-    copy_all(sent, taken)
-    if len(sensing[1]) > 0:
+    if len(sensing[0]) > 0:
         resets_before = _total(resets)
         at = record_at + counters["sensed"]
         record_times[at] = time_us
-        measure_slow(slow_calls, slow, time_us + following[4], memory, sensing[2], sensing[3])
         _sense(calls, sensing, time_us, interval_us, selected, records[at])
-        take_slow(slow_calls, slow, time_us, sensing[8], following)
+        take_slow(calls["push"], slow, time_us, sensing[3], following)
         counters["sensed"] += 1
         if is_known[0] != 0:
             copy_all(known, state)
@@ -130,20 +133,20 @@ def _advance(
 
 @compiled
 def fly_quiet_ticks(
-    calls_of: Any, counters_array: Any, interval_us: int, divisor: int, plant: Any,
-    sensing: Any, slow: Any, control: Any, count: int, is_taken: bool, outer_in: int, time_us: int, flags: int,
-    flies: bool, last_row: FloatArray, estimate: Any, following: Any, outer: Any, log: Any, imu_log: Any,
+    calls_of: Any, counters_array: Any, interval_us: int, divisor: int, world: Any, commands: FloatArray,
+    sensing: Any, slow: Any, control: Any, count: int, is_taken: bool, outer_in: int, time_us: int, boot_us: int,
+    flags: int, flies: bool, last_row: FloatArray, estimate: Any, following: Any, outer: Any, log: Any, imu_log: Any,
 ) -> None:  # fmt: skip
     """Run ``count`` ticks, or fewer: what was done is in ``counters_array``, ``marks`` and ``slow``.
 
-    The state of the first tick ``is_taken``, or the plant advances to it. The first outer tick is that after
-    ``outer_in`` ticks. It stops when the result of the plant is larger than ``largest_result``, after a reset of the
-    estimate, which it counts in ``resets``, and at an outer tick that is not nominal: their tick waits.
-    Records and frames are bytes. ``tracks``, ``rings`` and ``filters`` of ``sensing`` have an element for each
-    inertial sensor; on the true state there are no ``imus``. ``slow`` and ``following`` are those of ``slow_kernel``.
+    The state of the first tick ``is_taken``, or the simulator advances to it with ``commands``; its time is that of
+    the vehicle and ``boot_us``. The first outer tick is that after ``outer_in`` ticks. It stops without a step of the
+    simulator, when its result is larger than ``LARGEST_RESULT``, after a reset of the estimate, and at an outer tick
+    that is not nominal: then the tick waits. Records are bytes. ``sensing`` has an element for each inertial sensor,
+    none on the true state. ``slow`` and ``following`` are those of ``slow_kernel``.
     """
     rows, row_times, row_at = log
-    calls, outer_calls, slow_calls = calls_of[0][0], calls_of[1][0], calls_of[2][0]
+    calls, outer_calls = calls_of[0][0], calls_of[1][0]
     state, row, counters, marks = control[0], last_row, counters_array[0], outer[0][0]
     counters["ticks"], counters["flown"], counters["result"], counters["sensed"] = 0, 0, 0, 0
     counters["waits"] = 0
@@ -151,8 +154,8 @@ def fly_quiet_ticks(
     for i in range(count):
         time_us += interval_us
         if (i > 0 or not is_taken) and not _advance(
-            calls, slow_calls, counters, interval_us, plant, sensing, slow, state, time_us, flags, estimate,
-            following, imu_log,
+            calls, counters, interval_us, world, sensing, slow, state, time_us, boot_us, flags, estimate, following,
+            imu_log,
         ):  # fmt: skip
             return
         outer_due = (i - outer_in) % divisor == 0
@@ -163,7 +166,7 @@ def fly_quiet_ticks(
             control[3][0] = 0.0
         row = rows[row_at + i]
         row_times[row_at + i] = time_us
-        _control(calls, control, flies, row, plant[1])
+        _control(calls, control, flies, row, commands)
         if outer_due:
             note_outer(outer_calls, outer, time_us, state)
         counters["ticks"] = i + 1

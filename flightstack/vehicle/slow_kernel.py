@@ -1,6 +1,6 @@
-"""Magnetometer, barometer and the log of the truth in quiet ticks, each at a rate of its own, as compiled code.
+"""New samples of magnetometer and barometer, and the log of the truth, in quiet ticks, as compiled code.
 
-It calls the kernels that simulator and estimator run in any other tick, on the same arrays and in the same order.
+It calls the kernel that the estimator runs in any other tick, on the same arrays and in the same order.
 """
 
 from __future__ import annotations
@@ -10,23 +10,10 @@ from typing import Any, NamedTuple
 
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
-from flightstack.core.kernel_calls import call_kernel, call_kernel_float
-from flightstack.core.periods import take_due
+from flightstack.core.kernel_calls import call_kernel
 from flightstack.core.record_types import dtype_of
 from flightstack.estimation.rings import BARO_RING, MAG_RING
 from flightstack.flight_log.sensor_rows import store_baro, store_mag, store_truth
-
-MAG, BARO = 0, 1
-"""Sensors by the index of their times."""
-
-
-class SlowCalls(NamedTuple):
-    """Addresses of the kernels, 0 without one."""
-
-    measure_mag: int
-    measure_baro: int
-    airspeed: int
-    push: int
 
 
 class SlowMarks(NamedTuple):
@@ -35,9 +22,6 @@ class SlowMarks(NamedTuple):
     mag_us: int
     """Time of the newest sample, or 0; the next one too."""
     baro_us: int
-    is_mag_new: int
-    """1 if the last tick measured; the next one too."""
-    is_baro_new: int
     mag_rows: int
     """New rows of the log; the next two too."""
     baro_rows: int
@@ -46,82 +30,44 @@ class SlowMarks(NamedTuple):
     """Time from which the log of the truth takes a row."""
 
 
-SLOW_CALLS, SLOW_MARKS = dtype_of(SlowCalls), dtype_of(SlowMarks)
+SLOW_MARKS = dtype_of(SlowMarks)
 
 
 @compiled
-def _next_row(noise: FloatArray, cursor: Any) -> Any:
-    """Return the next row of a stream of deviates."""
-    at = cursor[0]
-    cursor[0] = at + 1
-    return noise[at]
-
-
-@compiled
-def measure_slow(
-    calls: Any, slow: Any, time_us: int, memory: Any, state: FloatArray, rotor_speeds: Any
-) -> None:
-    """Measure with magnetometer and barometer if they are due at ``time_us``, the simulator's time.
-
-    ``memory`` has the bytes of the plant.
-    """
-    due_us, period_us, marks_array, parts, mag, baro, _row, _truth = slow
-    marks = marks_array[0]
-    marks["is_mag_new"], marks["is_baro_new"] = 0, 0
-    if take_due(due_us, period_us, MAG, time_us):
-        mags, out, noise, cursor, current_a = mag
-        call_kernel(calls["measure_mag"], (mags, state, current_a[0], _next_row(noise, cursor)))
-        for i in range(3):
-            parts[0]["mag_gauss"][i] = out[i]
-        marks["is_mag_new"] = 1
-    if take_due(due_us, period_us, BARO, time_us):
-        baros, out, noise, cursor = baro
-        airspeed_m_s = call_kernel_float(calls["airspeed"], (memory,))
-        call_kernel(
-            calls["measure_baro"],
-            (baros, time_us, state, airspeed_m_s, rotor_speeds, _next_row(noise, cursor)),
-        )
-        values = parts[0]
-        values["pressure_hpa"], values["altitude_m"], values["temperature_c"] = out[0], out[1], out[2]
-        marks["is_baro_new"] = 1
-
-
-@compiled
-def _push(calls: Any, filters: Any, ring: int, values: FloatArray, row: FloatArray) -> None:
+def _push(push: int, filters: Any, ring: int, values: FloatArray, row: FloatArray) -> None:
     """Give each filter the measurement ``values``; a filter may change its copy ``row``."""
     for k in range(len(filters)):
         for i in range(len(values)):
             row[i] = values[i]
-        call_kernel(calls["push"], (filters[k], ring, row))
+        call_kernel(push, (filters[k], ring, row))
 
 
 @compiled
-def take_slow(calls: Any, slow: Any, time_us: int, filters: Any, following: Any) -> None:
+def take_slow(push: int, slow: Any, time_us: int, filters: Any, following: Any) -> None:
     """Give new measurements at ``time_us``, the vehicle's time, to the filters and the log.
 
-    Those that are not finite are none. ``following`` has delays and logs, and the simulator's time at the start
-    of the vehicle's.
+    Those that are not finite are none. ``push`` is the address of the kernel. ``following`` has delays and logs.
     """
-    _due_us, _period_us, marks_array, parts, _mag, _baro, rows, _truth = slow
-    marks, values = marks_array[0], parts[0]
-    delays_s, mag_log, baro_log, _truth_log, _boot_us = following
+    marks_array, news_array, parts, rows, _truth = slow
+    marks, news, values = marks_array[0], news_array[0], parts[0]
+    delays_s, mag_log, baro_log, _truth_log = following
     mag_sample, mag_copy, baro_sample, baro_copy = rows
     mag_delay_s, baro_delay_s = delays_s
-    if marks["is_mag_new"] != 0:
+    if news["has_mag"] != 0:
         field = values["mag_gauss"]
         x, y, z = float(field[0]), float(field[1]), float(field[2])
         if math.isfinite(x + y + z):
             mag_sample[0] = time_us * 1e-6 - mag_delay_s
             mag_sample[1], mag_sample[2], mag_sample[3] = x, y, z
-            _push(calls, filters, MAG_RING, mag_sample, mag_copy)
+            _push(push, filters, MAG_RING, mag_sample, mag_copy)
             store_mag(_log_row(mag_log, marks["mag_rows"], time_us), time_us, x, y, z)
             marks["mag_rows"] += 1
             marks["mag_us"] = time_us
-    if marks["is_baro_new"] != 0:
+    if news["has_baro"] != 0:
         altitude_m = float(values["altitude_m"])
         if math.isfinite(altitude_m):
             baro_sample[0], baro_sample[1] = time_us * 1e-6 - baro_delay_s, altitude_m
-            _push(calls, filters, BARO_RING, baro_sample, baro_copy)
+            _push(push, filters, BARO_RING, baro_sample, baro_copy)
             row = _log_row(baro_log, marks["baro_rows"], time_us)
             marks["baro_rows"] += 1
             pressure_hpa, temperature_c = float(values["pressure_hpa"]), float(values["temperature_c"])
@@ -141,10 +87,10 @@ def _log_row(log: Any, count: int, time_us: int) -> Any:
 @compiled
 def log_truth(slow: Any, time_us: int, following: Any) -> None:
     """Record the true state if it is due."""
-    marks = slow[2][0]
+    marks = slow[0][0]
     if time_us < marks["truth_us"]:
         return
-    state, offset_m, interval_us = slow[7]
+    state, offset_m, interval_us = slow[4]
     marks["truth_us"] = (time_us // interval_us + 1) * interval_us
     store_truth(_log_row(following[3], marks["truth_rows"], time_us), state, offset_m)
     marks["truth_rows"] += 1

@@ -220,6 +220,11 @@ class SensorSuite:
         self._next_us = min(*self._due_us[:QUIET_SLOTS], self._next_other_us)
 
     @property
+    def raw_frames(self) -> list[memoryview]:
+        """The frame of HIL_SENSOR of each inertial sensor, with a payload that is not truncated."""
+        return [frame.frame for frame in self._frames]
+
+    @property
     def values(self) -> SingleArray:
         """Newest values of HIL_SENSOR of the first inertial sensor, in the order of the message."""
         return self._frames[0].values

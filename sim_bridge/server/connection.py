@@ -87,7 +87,8 @@ class Connection:
     def __init__(self, sock: socket.socket, stop: StopSignal, timeout_s: float) -> None:
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         wait_in_kernel(sock)
-        self._socket = sock
+        self.socket = sock
+        """The connected socket."""
         self._receive_into = sock.recv_into
         self._send = sock.send
         self._stop = stop
@@ -109,7 +110,7 @@ class Connection:
     def receive_within(self, timeout_s: float) -> memoryview | None:
         """Wait for bytes; return None at the timeout; raise PeerClosedError, StoppedError, or PeerSilentError."""
         try:
-            self._stop.waiter(self._socket, select.POLLIN).wait(timeout_s)
+            self._stop.waiter(self.socket, select.POLLIN).wait(timeout_s)
         except PeerSilentError:
             self.check_alive(False)
             return None
@@ -148,10 +149,10 @@ class Connection:
         except OSError:
             return
         if sent != len(data):
-            self._stop.waiter(self._socket, select.POLLOUT).wait(self._timeout_s)
+            self._stop.waiter(self.socket, select.POLLOUT).wait(self._timeout_s)
             self.send(memoryview(data)[sent:])
 
     def send_last(self, data: bytes) -> None:
         """Send ``data`` if possible without waiting, else drop it."""
         with contextlib.suppress(OSError):
-            self._socket.send(data, socket.MSG_DONTWAIT)
+            self.socket.send(data, socket.MSG_DONTWAIT)

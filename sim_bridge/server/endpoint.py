@@ -74,6 +74,15 @@ class FlightStackEndpoint:
         """Number of frames without a valid message and of byte sequences without a frame."""
         return self._link.bad + self.finder.junk
 
+    @property
+    def is_quiet(self) -> bool:
+        """True if nothing is expected but actuators for the present state, which are FS_ACTUATORS."""
+        is_plain = self._requested == FS_PLANT_STATE_ID and self._faults_checked and self.error is None
+        has_sensors = self.simulator.sensors is not None
+        waits = self.is_sent and not (self.answered or self.free_running or self.freewheels)
+        nothing_pends = not (self._replies or self.finder.partial_size)
+        return is_plain and waits and nothing_pends and has_sensors is self._sends_sensors
+
     def receive(self, data: memoryview) -> None:
         """Handle received bytes, split anywhere.
 

@@ -7,7 +7,7 @@ import errno
 import math
 import select
 import socket
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from flightstack.core.geodesy import GeoPoint
 from flightstack.params.vehicle import Vehicle
@@ -31,6 +31,9 @@ from sim_bridge.server.connection import (
 from sim_bridge.server.endpoint import FlightStackEndpoint
 from sim_bridge.server.session import Session
 from sim_bridge.simulator import Simulator
+
+if TYPE_CHECKING:
+    from sim_bridge.server.quiet_exchanges import QuietExchanges
 
 DONE, FAILED, USAGE, NO_PEER = 0, 1, 2, 3
 DEFAULT_TIMEOUT_S = 30.0
@@ -69,6 +72,7 @@ def serve(options: ServerOptions) -> int:
         _print_start(options, listener.getsockname()[1])
         announce_compilation("sim-bridge", kernels_of(options.plant))
         simulator = _make_simulator(options)  # may compile kernels; a client may connect meanwhile
+        _compile_exchanges(options)
         try:
             client = _await_client(listener, stop, options.timeout_s)
         except StoppedError:
@@ -84,7 +88,8 @@ def serve(options: ServerOptions) -> int:
     view = contextlib.nullcontext() if options.view is None else options.view.watching(simulator)
     with client, view:
         connection = Connection(client, stop, timeout_s)
-        return _run(Session(link, connection, options.speed, stop), connection, timeout_s)
+        quiet = None if math.isfinite(options.speed) else _quiet_exchanges(link, client.fileno())
+        return _run(Session(link, connection, options.speed, stop, quiet), connection, timeout_s)
 
 
 def _print_start(options: ServerOptions, port: int) -> None:
@@ -119,6 +124,23 @@ def _make_simulator(options: ServerOptions) -> Simulator:
         say(description)
     simulator.inject(*options.faults)
     return simulator
+
+
+def _compile_exchanges(options: ServerOptions) -> None:
+    """Compile what exchanges at full speed need, or load it from the cache, with a simulator that is not used."""
+    if not math.isinf(options.speed):
+        return
+    simulator = Simulator(
+        options.vehicle, options.plant, options.plant_options, physics_hz=options.physics_hz
+    )
+    simulator.start_sensors(options.home)
+    _quiet_exchanges(FlightStackEndpoint(simulator, options.vehicle, options.home), -1).prepare()
+
+
+def _quiet_exchanges(link: FlightStackEndpoint, descriptor: int) -> QuietExchanges:
+    from sim_bridge.server.quiet_exchanges import QuietExchanges
+
+    return QuietExchanges(link, descriptor)
 
 
 def _run(session: Session, connection: Connection, timeout_s: float) -> int:

@@ -8,10 +8,14 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from flightstack.transports.cpu_affinity import AffinityLeader
-from sim_bridge.server.connection import Connection, StoppedError, StopSignal
+from sim_bridge.server.connection import Connection, PeerClosedError, StoppedError, StopSignal
 from sim_bridge.server.endpoint import FlightStackEndpoint
+
+if TYPE_CHECKING:
+    from sim_bridge.server.quiet_exchanges import QuietExchanges
 
 _BINS = 100_000  # of 1 µs; the last one also counts longer delays
 _SLIP_NS = 500_000_000
@@ -95,8 +99,14 @@ class Session:
     """The session of one client."""
 
     def __init__(
-        self, link: FlightStackEndpoint, connection: Connection, speed: float, stop: StopSignal
+        self,
+        link: FlightStackEndpoint,
+        connection: Connection,
+        speed: float,
+        stop: StopSignal,
+        quiet: QuietExchanges | None = None,
     ) -> None:
+        """``quiet`` runs exchanges at full speed; at a limited one the process sleeps between two exchanges."""
         self.link = link
         self.exchanges = 0
         self.wall_s = 0.0
@@ -107,6 +117,7 @@ class Session:
         self._move_at = 1
         self._connection = connection
         self._stop = stop
+        self._quiet = quiet
 
     def run(self) -> None:
         """Exchange until an error of the link; raise an exception if the client ends, is lost, or the user stops."""
@@ -138,6 +149,10 @@ class Session:
             link.step()  # PX4 takes its clock from the sensors, and zero is no time
         if not link.is_sent:
             connection.send(link.state())
+        if self._quiet is not None and self.exchanges and (count := self._quiet.room()) > 0:
+            self._run_quietly(self._quiet, count)
+            if link.free_running or link.error is not None:
+                return
         while not link.answered:
             data = connection.receive_within(FREEWHEEL_S) if link.freewheels else connection.receive()
             if data is None:
@@ -147,10 +162,20 @@ class Session:
                 return
         link.step()
         self.exchanges += 1
-        if self.exchanges == self._move_at and self._leader is not None:
-            self._move_at += self._leader.update()
+        if self.exchanges >= self._move_at and self._leader is not None:
+            self._move_at = self.exchanges + self._leader.update()
         if self.pacer is not None:
             self.pacer.wait_until(link.simulator.time_us, LEAD_NS)
+
+    def _run_quietly(self, quiet: QuietExchanges, count: int) -> None:
+        """Run exchanges without Python, and take what was received besides."""
+        self.exchanges += quiet.run(count)
+        if quiet.unsent:
+            self._connection.send(quiet.unsent)
+        if (data := quiet.received) is not None:
+            if not data:
+                raise PeerClosedError
+            self._receive(data)
 
     def _tick_on_wall_clock(self) -> None:
         link, connection = self.link, self._connection

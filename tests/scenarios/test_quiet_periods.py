@@ -7,8 +7,8 @@ import pytest
 
 from flightstack.core.contract import FloatArray
 from flightstack.params import vehicle
+from flightstack.process.quiet_block import QuietBlock
 from flightstack.testing import ConditionTimeoutError, World
-from flightstack.testing.quiet_ticks import QuietBlock
 from flightstack.testing.state import State
 from sim_bridge.sensors.magnetometer import Magnetometer
 from tests.support.bytes_engine import BytesEngine

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from flightstack.core.contract import FloatArray
+from flightstack.process.quiet_block import QuietBlock
 from flightstack.testing import World
 from flightstack.testing.engine import Engine
-from flightstack.testing.quiet_ticks import QuietBlock
 from flightstack.vehicle.autopilot import Autopilot
 from sim_bridge.errors import PlantDivergedError
 from tests.support.bytes_engine import BytesEngine

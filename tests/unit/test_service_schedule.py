@@ -13,7 +13,7 @@ import pytest
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.ftp_messages import Opcode, Packet, ftp_message
 from flightstack.mavlink.link import SILENT_AFTER_S, Address
-from flightstack.process.connections import PAUSE_NS, SimulatorPace, serve_while_idle
+from flightstack.process.connections import MOST_NS, PAUSE_NS, SimulatorPace, serve_while_idle
 from flightstack.process.process_config import Ended, ProcessConfig
 from flightstack.services.routing.router import Schedule
 from flightstack.transports.tcp import TcpClient
@@ -103,6 +103,7 @@ def paces(intervals_us: list[int]) -> list[bool]:
     pace, time_ns, expected = SimulatorPace(), 10**12, []
     pace.note_tick(time_ns)
     for interval_us in intervals_us:
+        pace.begin_wait(time_ns)
         time_ns += 1000 * interval_us
         pace.note_tick(time_ns)
         expected.append(pace.may_pause())
@@ -117,8 +118,19 @@ def test_pause_is_expected_after_each_state_and_after_bursts() -> None:
 
 def test_no_pause_is_expected_at_full_speed() -> None:
     at_full_speed = paces([3000] + [50] * 1100)  # a slow tick: the processor was taken
-    assert at_full_speed.index(False) == 1000  # 50 ms later
-    assert not any(at_full_speed[1000:])
+    assert at_full_speed.index(False) == 150  # 7.5 ms later
+    assert not any(at_full_speed[150:])
+    assert not any(paces(([1000] + [50] * 400) * 10))  # the simulator draws random numbers
+
+
+def test_own_work_between_two_states_is_no_pause() -> None:
+    pace, time_ns = SimulatorPace(), 10**12
+    pace.note_tick(time_ns)
+    for _ in range(20):
+        time_ns += 5_000_000
+        pace.begin_wait(time_ns)
+        pace.note_tick(time_ns + 20_000)
+        assert not pace.may_pause()
 
 
 def test_pause_is_silence_from_the_start_of_a_tick() -> None:
@@ -128,6 +140,7 @@ def test_pause_is_silence_from_the_start_of_a_tick() -> None:
         with world:
             pace = SimulatorPace()
             began_ns = time.monotonic_ns()
+            pace.begin_wait(began_ns - MOST_NS)
             pace.note_tick(began_ns)
             assert pace.pauses(simulator)
             assert time.monotonic_ns() - began_ns >= PAUSE_NS  # a state of a burst would have come first
@@ -148,7 +161,9 @@ def test_tick_longer_than_a_pause_has_no_wait(monkeypatch: pytest.MonkeyPatch) -
         simulator = TcpClient.connect(*server.getsockname(), 10.0, lambda: None)
         monkeypatch.setattr(select, "select", silent)
         pace = SimulatorPace()
-        pace.note_tick(time.monotonic_ns() - 2 * PAUSE_NS)
+        began_ns = time.monotonic_ns() - 2 * PAUSE_NS
+        pace.begin_wait(began_ns - MOST_NS)
+        pace.note_tick(began_ns)
         assert pace.pauses(simulator)
         assert waits_s == [0.0]
         simulator.close()

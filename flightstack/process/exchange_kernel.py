@@ -1,0 +1,128 @@
+"""An exchange with the simulator in another process as compiled code: commands out, state and sensors in.
+
+It takes the place of the simulator's kernel in quiet ticks. It takes bytes that are exactly the frames of a quiet step;
+all else waits in the inbox, as it came, for Python. A module of its own, with few imports: the key of a kernel in the
+cache depends on all of them.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from flightstack.core.compiled import compiled
+from flightstack.core.record_types import dtype_of
+from flightstack.simulator_link.frame_kernels import (
+    CHECKSUM,
+    HEADER,
+    frame_size,
+    read_bytes,
+    seal,
+    write_bytes,
+)
+from flightstack.transports.compiled_socket import forget, now_ns, receive_into, send_from
+
+VALUES_AT, FIELDS_AT, NUMBER_AT = 8, 60, 64
+"""Places in the payload of HIL_SENSOR: measurements, bits of the new ones, and number of the sensor."""
+_FRAME = HEADER + CHECKSUM
+
+
+class Exchange(NamedTuple):
+    """What the kernel needs besides socket and frames, and what it notes."""
+
+    answer_at: int
+    """Address of the frame of the answer; then the size of its payload and the last byte of its checksum."""
+    answer_size: int
+    answer_extra: int
+    interval_us: int
+    imu_fields: int
+    """Bits of HIL_SENSOR; the next two too."""
+    mag_fields: int
+    baro_fields: int
+    deadline_ns: int
+    """Time of the monotonic clock from which no exchange begins."""
+    ended_ns: int
+    """Time at which the newest state was there."""
+    waited_ns: int
+    """Longest wait for a state."""
+    began: int
+    """Number of exchanges that began."""
+
+
+EXCHANGE = dtype_of(Exchange)
+
+
+@compiled
+def _news(inbox: Any, at: int, size: int, number: int, bits: Any) -> int:
+    """Return the bits of HIL_SENSOR besides those of the inertial sensor; −1 if it is not that of ``number``.
+
+    ``size`` is that of the frame. Groups of measurements are new as a whole.
+    """
+    payload, length = at + HEADER, size - _FRAME
+    if length <= FIELDS_AT:
+        return -1
+    found = read_bytes(inbox, payload + NUMBER_AT, 1) if length > NUMBER_AT else 0
+    fields = read_bytes(inbox, payload + FIELDS_AT, min(4, length - FIELDS_AT))
+    mag, baro, imu = bits["mag_fields"], bits["baro_fields"], bits["imu_fields"]
+    others = fields & ~imu
+    if found != number or fields & imu != imu or others & ~(mag | baro) != 0 or (number > 0 and others != 0):
+        return -1
+    if others & mag not in (0, mag) or others & baro not in (0, baro):
+        return -1
+    return int(others)
+
+
+@compiled
+def _take(inbox: Any, end: int, time_us: int, bits: Any, taking: Any) -> bool:
+    """Take the frames of a quiet step at ``time_us``, ``end`` bytes; return False, and take nothing, for any other."""
+    shapes, state, wires, values, news_array, places = taking
+    at = frame_size(inbox, 0, end, shapes[0])
+    if at != len(state) or read_bytes(inbox, HEADER, 8) != time_us:
+        return False
+    others = 0
+    for k in range(len(wires) - 1, -1, -1):
+        size = frame_size(inbox, at, end, shapes[1])
+        others = -1 if size == 0 else _news(inbox, at, size, k, bits)
+        if others < 0 or read_bytes(inbox, at + HEADER, 8) != time_us:
+            return False
+        places[k] = at + HEADER + VALUES_AT
+        at += size
+    if at != end:
+        return False
+    for i in range(len(state)):
+        state[i] = inbox[i]
+    for k in range(len(wires)):
+        for i in range(len(wires[k])):
+            wires[k][i] = inbox[places[k] + i]
+    if len(wires) > 0:
+        for i in range(len(values)):
+            values[i] = inbox[places[0] + i]
+    news = news_array[0]
+    news["has_mag"] = 1 if others & bits["mag_fields"] != 0 else 0
+    news["has_baro"] = 1 if others & bits["baro_fields"] != 0 else 0
+    return True
+
+
+@compiled
+def exchange(world: Any, time_us: int, flags: int) -> int:
+    """Send the commands in ``answer`` with ``flags``, and take the state at ``time_us``, the simulator's time.
+
+    Return 0, or −1 if the deadline has come, or if Python is to go on with what was sent and received.
+    """
+    line, record, answer, took_ns, taking = world
+    e = record[0]
+    began_ns = now_ns(line)
+    if began_ns >= e["deadline_ns"] or e["began"] == len(took_ns):
+        return -1
+    took_ns[e["began"]] = began_ns - e["ended_ns"]
+    e["began"] += 1
+    write_bytes(answer, HEADER + e["answer_size"] - 1, 1, flags)
+    size = seal(answer, time_us - e["interval_us"], e["answer_size"], e["answer_extra"])
+    if not send_from(line, e["answer_at"], size):
+        return -1
+    count = receive_into(line)
+    e["ended_ns"] = now_ns(line)
+    e["waited_ns"] = max(e["waited_ns"], e["ended_ns"] - began_ns)
+    if not _take(line[2], count, time_us, e, taking):
+        return -1
+    forget(line)
+    return 0

@@ -1,0 +1,345 @@
+"""A block of ticks in which nothing is due, as one compiled call on the arrays of the flight stack's parts.
+
+Between two outer ticks, and in outer ticks without an event, there remain simulator, filter and loops. Each part states
+beforehand for how long it has nothing else to do. The parts that then remain are those of any other tick, and write the
+same log. The simulator is in this process, or exchanges its messages with it.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any, Protocol, TypeAlias
+
+import numpy as np
+
+from flightstack.commander.fault_detector import follow_rotors
+from flightstack.control.loops import PythonLoops
+from flightstack.core.compiled import IS_DISABLED, direct
+from flightstack.core.contract import STATE_SIZE, FloatArray, LoopRow, RecordArray, SingleArray, Vector3
+from flightstack.core.kernel_calls import address_of
+from flightstack.estimation.delayed_filter import imu_kernel, push_kernel
+from flightstack.estimation.estimator import Estimator
+from flightstack.estimation.filter_core import PythonCore
+from flightstack.estimation.imu_track import RECORD_SIZE, take_wire
+from flightstack.estimation.rings import MAG_RING
+from flightstack.estimation.sensor_samples import BaroSample, MagSample
+from flightstack.flight_log.flight_log import DEFAULT_CAPACITY, Trace
+from flightstack.flight_log.sensor_recorder import NEVER_US, TRUTH_INTERVAL_US
+from flightstack.flight_log.sensor_topics import BARO_GROUP, IMU_GROUP, MAG_GROUP, TRUTH_GROUP
+from flightstack.process.assembly import Stack
+from flightstack.process.quiet_outer import QuietOuter
+from flightstack.simulator_link.hot_frames import VALID_FLAG
+from flightstack.simulator_link.sensor_frames import HIL_VALUES, HilValues
+from flightstack.vehicle.quiet_kernel import (
+    QUIET_CALLS,
+    QUIET_COUNTERS,
+    QuietCalls,
+    QuietCounters,
+    fly_quiet_ticks,
+)
+from flightstack.vehicle.slow_kernel import SLOW_MARKS
+
+_Arguments: TypeAlias = tuple[Any, ...]
+"""Arguments of the kernel for one part."""
+
+
+_GROUPS = (MAG_GROUP, BARO_GROUP, TRUTH_GROUP)
+"""In the order of the kernel's counters of new rows."""
+
+
+class QuietSimulator(Protocol):
+    """The simulator of quiet ticks: its kernel makes a step with ``commands``, and writes what the vehicle takes."""
+
+    step: int
+    """Address of the kernel; see ``QuietCalls``."""
+    world: _Arguments
+    """The first argument of the kernel."""
+    commands: FloatArray
+    """Rotor speeds [rad/s], shape (8,)."""
+    wires: SingleArray
+    """Measurements of the inertial sensors as in HIL_SENSOR, shape (sensors, 6)."""
+    values: SingleArray
+    """Measurements in HIL_SENSOR of the first one, shape (13,)."""
+    news: RecordArray
+    """Its new measurements besides those of the inertial sensor, ``SENSOR_NEWS``, shape (1,)."""
+
+    def room(self) -> int:
+        """Return for how many steps the kernel can be called."""
+        ...
+
+    def pass_by(self, count: int, result: int) -> None:
+        """Count steps that the kernel made, with the result of the last one; may raise."""
+        ...
+
+
+def estimators_of(stack: Stack) -> tuple[Estimator, ...]:
+    """Return the estimators of a vehicle that flies on its sensors."""
+    return () if stack.estimation is None else stack.estimation.estimators
+
+
+def compiles(stack: Stack) -> bool:
+    """Return True if loops and filters are compiled Python in this process."""
+    parts = [(stack.loops, PythonLoops), *((each.core, PythonCore) for each in estimators_of(stack))]
+    return not IS_DISABLED and all(type(part) is kind for part, kind in parts)
+
+
+def as_bytes(record: Any) -> Any:
+    """Return the bytes of records or of a frame."""
+    return np.frombuffer(record, np.uint8)
+
+
+def _sensing(stack: Stack, simulator: QuietSimulator) -> _Arguments:
+    spare = np.zeros(RECORD_SIZE)
+    if stack.estimation is None:  # nothing happens on the true state
+        no_bytes = np.zeros(0, np.uint8)
+        rings = ((np.zeros((0, 0)), np.zeros(0, np.int64)),)
+        return np.zeros((0, 0), np.float32), (no_bytes,), rings, (no_bytes,), spare
+    tracks = [lane.newest.imu_track for lane in stack.estimation.feed.lanes]
+    return (
+        simulator.wires,
+        tuple(as_bytes(track.memory) for track in tracks),
+        tuple((track.ring, track.taken) for track in tracks),
+        tuple(as_bytes(estimator.memory) for estimator in stack.estimation.estimators),
+        spare,
+    )
+
+
+def _estimates(stack: Stack) -> list[_Arguments]:
+    """Return what the filter of each inertial sensor writes."""
+    found: list[_Arguments] = []
+    for number, estimator in enumerate(estimators_of(stack)):
+        memory = estimator.memory
+        resets = tuple(memory["resets"][kind]["number"] for kind in ("position", "velocity", "yaw"))
+        found.append((number, memory["state"][0], memory["flags"]["aligned"], resets))
+    no_resets = np.zeros(1), np.zeros(1), np.zeros(1)
+    return found or [(0, np.zeros(STATE_SIZE), np.zeros(1, np.int64), no_resets)]
+
+
+class QuietSensors:
+    """The sensors that are not inertial, and the log of the truth, of a vehicle that flies on its sensors.
+
+    Of one that flies on the true state: nothing is due.
+    """
+
+    def __init__(self, stack: Stack, values: SingleArray, news: RecordArray) -> None:
+        """``values`` and ``news`` are those of ``QuietSimulator``."""
+        estimation = self._estimation = stack.estimation
+        self._values = values
+        self._no_traces = [Trace(DEFAULT_CAPACITY, group.columns, lambda: None) for group in _GROUPS]
+        self._marks = np.zeros(1, SLOW_MARKS)
+        self._marks["truth_us"] = NEVER_US
+        self.push = 0
+        """Address of the kernel that gives a filter a measurement."""
+        offset_m = np.zeros(3)
+        if estimation is not None:
+            self.push = address_of(push_kernel, estimation.estimators[0].memory, MAG_RING, np.zeros(4))
+            offset_m = estimation.recorder.offset_m
+        scratch = np.zeros(4), np.zeros(4), np.zeros(2), np.zeros(2)
+        truth = stack.simulator.truth, offset_m, TRUTH_INTERVAL_US
+        self.constant: tuple[Any, ...] = (self._marks, news, values.view(HIL_VALUES), scratch, truth)
+        """Argument ``slow`` of the kernel."""
+
+    def room(self) -> int:
+        """Return for how many ticks the logs suffice."""
+        return min(trace.capacity - trace.n for trace in self._open_traces())
+
+    def following(self) -> tuple[Any, ...]:
+        """Return the argument ``following`` of the kernel; call once before each of its calls."""
+        marks, estimation, delays_s = self._marks, self._estimation, (0.0, 0.0)
+        truth_us = marks["truth_us"][0]
+        marks[0] = 0
+        marks["truth_us"] = truth_us
+        if estimation is not None:
+            params = estimation.estimators[0].params
+            delays_s = float(params.mag_delay_s), float(params.baro_delay_s)
+            marks["truth_us"] = estimation.recorder.truth_due_us
+        logs = ((trace.rows, trace.times_us, trace.n) for trace in self._open_traces())
+        return (delays_s, *logs)
+
+    def _open_traces(self) -> list[Trace]:
+        """Return the traces of the open log; without one, traces that are not recorded."""
+        if self._estimation is None:
+            return self._no_traces
+        trace = self._estimation.recorder.trace
+        return [trace(group) or none for group, none in zip(_GROUPS, self._no_traces, strict=True)]
+
+    def pass_by(self) -> tuple[MagSample | None, BaroSample | None]:
+        """Count the new rows; return the newest samples."""
+        estimation = self._estimation
+        if estimation is None:
+            return None, None
+        mag_us, baro_us, *rows, truth_us = self._marks[0].item()
+        if truth_us != NEVER_US:
+            estimation.recorder.pass_by(truth_us)
+            for trace, new in zip(self._open_traces(), rows, strict=True):
+                trace.n += new
+        values = HilValues(*self._values.tolist())
+        mag = MagSample(mag_us * 1e-6, Vector3(*values.mag_gauss)) if mag_us else None
+        baro = (
+            BaroSample(baro_us * 1e-6, values.pressure_hpa, values.altitude_m, values.temperature_c)
+            if baro_us
+            else None
+        )
+        return mag, baro
+
+
+class QuietBlock:
+    """Runs quiet ticks of a vehicle for which ``compiles`` is True, and of a simulator of its time step."""
+
+    def __init__(self, stack: Stack, simulator: QuietSimulator) -> None:
+        loops = stack.loops
+        assert isinstance(loops, PythonLoops)
+        self._stack, self._simulator, self._loops = stack, simulator, loops
+        self._estimation, self._autopilot = stack.estimation, stack.parts.autopilot
+        self._estimates = _estimates(stack)
+        self._outer = QuietOuter(stack, loops)
+        self._sensors = QuietSensors(stack, simulator.values, simulator.news)
+        self._interval_us, self._divisor = stack.rates.interval_us, stack.rates.divisor
+        self.waited = False
+        """True if the last tick of ``run`` waited for Python."""
+        self._counters = np.zeros(1, QUIET_COUNTERS)
+        self._fraction, self._idle = np.zeros(1), np.zeros(LoopRow.SIZE)
+        self._no_log = Trace(DEFAULT_CAPACITY, LoopRow.SIZE, lambda: None)
+        self._no_imu_log = Trace(DEFAULT_CAPACITY, RECORD_SIZE, lambda: None)
+        sensing = _sensing(stack, simulator)
+        constant = self._constant(sensing)
+        changing = self._changing(0, False, self._no_log, self._no_imu_log)
+        self._fly = partial(direct(fly_quiet_ticks, *constant, *changing), *constant)
+
+    def _addresses(self, sensing: _Arguments) -> RecordArray:
+        """Return the addresses of the kernels."""
+        now, faults = self._stack.now, self._stack.parts.failsafes.faults
+        row, loops = self._no_log.rows[0], self._loops
+        calls = QuietCalls(
+            self._simulator.step,
+            address_of(loops.kernel, now.state, 1.0, now.rotor_speed, loops.memory, row),
+            address_of(follow_rotors, row, faults.rotors, faults.lags),
+            *(0, 0, 0),
+        )
+        if self._estimation is not None:
+            track, record = self._estimation.feed.lanes[0].newest.imu_track, self._no_imu_log.rows[0]
+            calls = calls._replace(
+                take=address_of(take_wire, track.memory, sensing[0][0], 0.0, 1, record),
+                estimate=address_of(imu_kernel, self._estimation.estimators[0].memory, track.ring[0]),
+                push=self._sensors.push,
+            )
+        return np.array([calls], QUIET_CALLS)
+
+    def _constant(self, sensing: _Arguments) -> _Arguments:
+        """Return the arguments of the kernel that stay."""
+        loops, simulator, faults = self._loops, self._simulator, self._stack.parts.failsafes.faults
+        now = self._stack.now
+        control = (
+            now.state, now.rotor_speed, as_bytes(loops.memory), self._fraction, loops.fraction_step, self._idle,
+            as_bytes(faults.rotors), as_bytes(faults.lags),
+        )  # fmt: skip
+        return (
+            (self._addresses(sensing), self._outer.calls), self._counters, self._interval_us, self._divisor,
+            simulator.world, simulator.commands, sensing, self._sensors.constant, control,
+        )  # fmt: skip
+
+    def _changing(self, count: int, is_taken: bool, log: Trace, imu_log: Trace) -> _Arguments:
+        """Return the other arguments of the kernel."""
+        now, estimation, link = self._stack.now, self._estimation, self._stack.simulator
+        estimate = self._estimates[0 if estimation is None else estimation.feed.selected]
+        return (
+            count, is_taken, self._autopilot.next_outer, now.time_us, link.stamp_us - link.time_us,
+            link.flags(now.status.armed) | VALID_FLAG, self._flies, now.row, estimate, self._sensors.following(),
+            self._outer.arguments(), (log.rows, log.times_us, log.n), (imu_log.rows, imu_log.times_us, imu_log.n),
+        )  # fmt: skip
+
+    @property
+    def _flies(self) -> bool:
+        return self._stack.now.flying and not self._stack.now.rests
+
+    def _logs(self) -> tuple[Trace, Trace]:
+        """Return the traces of the inner loop and of the inertial sensor; without a log, some that are not recorded."""
+        log, estimation = self._stack.recorder.log, self._estimation
+        imu_log = None if estimation is None else estimation.recorder.trace(IMU_GROUP)
+        return self._no_log if log is None else log.inner, imu_log or self._no_imu_log
+
+    def _room(self, is_taken: bool) -> int:
+        """Return how many ticks ``run`` can run: 0 if a log is full or a fault acts between steps."""
+        log, imu_log = self._logs()
+        steps = min(self._simulator.room(), imu_log.capacity - imu_log.n, self._sensors.room())
+        return min(steps + is_taken, log.capacity - log.n)
+
+    def _quiet_intervals(self, time_us: int) -> int:
+        """Return after how many of the next intervals there is nothing but the loops to run; ``time_us`` is now."""
+        if self._estimation is None:
+            return DEFAULT_CAPACITY
+        return (self._estimation.quiet_until_us(measures=True) - 1 - time_us) // self._interval_us
+
+    def count(self, *, runs_on: bool = False) -> int:
+        """Return how many of the next ticks ``run`` can run, the last one of which is over.
+
+        They end before the next outer tick, unless ``runs_on`` and the next outer ticks are nominal.
+        """
+        autopilot, time_us = self._autopilot, self._stack.now.time_us
+        most = autopilot.quiet_ticks
+        if runs_on and autopilot.is_nominal():
+            inner = autopilot.next_outer
+            most = inner + self._outer.room(time_us + (inner + 1) * self._interval_us)
+        return max(0, min(most, self._quiet_intervals(time_us), self._room(is_taken=False)))
+
+    def run_periods(self, most: int) -> int:
+        """Run the outer tick on the newest state and the ticks that follow it while nothing happens, ``most`` at most.
+
+        Return their number; 0 if nothing but the outer tick was run, in Python.
+        """
+        time_us, done = self._stack.now.time_us + self._interval_us, 0
+        if self._estimation is not None:
+            self._estimation.update(time_us)
+        if self._autopilot.is_nominal():
+            intervals = max(0, self._quiet_intervals(time_us))
+            most = min(most, 1 + intervals, self._outer.room(time_us), self._room(is_taken=True))
+            done = self.run(most, is_taken=True) if most > 0 else 0
+        if not done:
+            self._simulator.commands[:] = self._autopilot.tick(time_us)
+        return done
+
+    def run(self, count: int, is_taken: bool = False) -> int:
+        """Run ``count`` ticks, or fewer.
+
+        With ``is_taken``, vehicle and estimator have the state of the first one, which is run in any case. Return their
+        number. Raise what the simulator raises.
+        """
+        stack, recorded = self._stack, self._stack.recorder.log
+        log, imu_log = self._logs()
+        now, flies = stack.now, self._flies
+        self._fraction[0] = self._loops.fraction
+        if not flies:
+            self._loops.idle(now.state, now.rotor_speed, now.status.armed, self._idle)
+        self._fly(*self._changing(count, is_taken, log, imu_log))
+        done = QuietCounters(*self._counters[0].item())
+        self._loops.fraction = float(self._fraction[0])
+        rows = log.rows[log.n :]
+        if recorded is not None:
+            log.n += done.ticks
+        if imu_log is not self._no_imu_log:
+            imu_log.n += done.sensed
+        return self._count(rows, done)
+
+    def _count(self, rows: FloatArray, done: QuietCounters) -> int:
+        """Bring all parts to the time of the kernel, and run a tick that waits; return the number of ticks.
+
+        ``rows`` are those of the ticks. A tick waits after a reset of the estimate, or for an event of the outer loop.
+        """
+        stack, interval_us, began_us = self._stack, self._interval_us, self._stack.now.time_us
+        ticks, flown, result, sensed, waits = done
+        self.waited = waits > 0
+        if flown:
+            stack.simulator.pass_by(flown)
+        last_outer = self._outer.pass_by(stack.recorder.log, began_us, interval_us, rows)
+        if waits or last_outer != ticks - 1:
+            stack.simulator.has_arrived = True
+        if ticks:
+            self._autopilot.pass_by(ticks, began_us + ticks * interval_us, rows[ticks - 1])
+        mag, baro = self._sensors.pass_by()
+        if flown:
+            self._simulator.pass_by(flown, result)
+        if self._estimation is not None and sensed:
+            self._estimation.pass_by(began_us + (ticks + waits) * interval_us, interval_us, mag, baro)
+        if waits:
+            self._simulator.commands[:] = self._autopilot.tick(began_us + (ticks + 1) * interval_us)
+        return int(ticks + waits)

@@ -1,0 +1,80 @@
+"""Quiet ticks with a simulator in another process: exchanges over the socket without Python between them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from flightstack.core.contract import FloatArray, RecordArray, SingleArray
+from flightstack.core.kernel_calls import address_of
+from flightstack.params.config import TRUTH, StackConfig
+from flightstack.process.assembly import Stack, build
+from flightstack.process.exchange_kernel import EXCHANGE, Exchange, exchange
+from flightstack.process.quiet_block import QuietBlock, as_bytes, compiles, estimators_of
+from flightstack.simulator_link.frame_kernels import SENSOR_NEWS, SHAPE
+from flightstack.simulator_link.sensor_frames import ACCEL, BARO, GYRO, MAG, SENSOR_SHAPE, VALUES
+from flightstack.transports import compiled_socket
+from flightstack.transports.compiled_socket import CompiledSocket
+
+MOST = 1000
+"""Exchanges of a call."""
+
+
+class ExchangedSteps:
+    """The simulator's kernel is an exchange with its process; see ``QuietSimulator``."""
+
+    def __init__(self, stack: Stack, descriptor: int) -> None:
+        """``descriptor`` is that of the socket."""
+        link, inbox = stack.simulator, stack.simulator.sensors
+        answer, plant = link.actuators, link.plant
+        self.socket = CompiledSocket(descriptor)
+        self.commands: FloatArray = answer.rotor_speed_rad_s
+        self.values: SingleArray = np.zeros(VALUES, np.float32) if inbox is None else inbox.frame.values
+        count = len(estimators_of(stack))
+        self.wires: SingleArray = (
+            self.values[:6].reshape(1, 6) if count == 1 else np.zeros((count, 6), np.float32)
+        )
+        self.news: RecordArray = np.zeros(1, SENSOR_NEWS)
+        self.record: RecordArray = np.zeros(1, EXCHANGE)
+        frame = as_bytes(answer.frame)
+        self.record[0] = Exchange(
+            frame.ctypes.data, answer.shape.size, answer.shape.extra, stack.rates.interval_us, int(ACCEL | GYRO),
+            int(MAG), int(BARO), 0, 0, 0, 0,
+        )  # fmt: skip
+        self._took_ns = np.zeros(MOST, np.int64)
+        shapes = np.array([[plant.shape], [SENSOR_SHAPE]], SHAPE)
+        values, wires = self.values.view(np.uint8), self.wires.view(np.uint8)
+        taking = shapes, as_bytes(plant.frame), wires, values, self.news, np.zeros(count, np.int64)
+        self.world: tuple[Any, ...] = (self.socket.arguments, self.record, frame, self._took_ns, taking)
+        self.step = address_of(exchange, self.world, 0, 0)
+
+    def begin(self, began_ns: int, deadline_ns: int) -> None:
+        """Prepare for ticks from ``began_ns`` on, with no exchange after ``deadline_ns``."""
+        self.socket.clear()
+        record = self.record
+        record["deadline_ns"], record["ended_ns"] = deadline_ns, began_ns
+        record["waited_ns"], record["began"] = 0, 0
+
+    def room(self) -> int:
+        """Return how many exchanges a call can make."""
+        return MOST - int(self.record["began"][0])
+
+    def pass_by(self, count: int, result: int) -> None:
+        """Count steps: the link has counted them."""
+
+    @property
+    def took_ns(self) -> Any:
+        """Durations of the ticks whose answer was sent."""
+        return self._took_ns[: int(self.record["began"][0])]
+
+
+def compile_any() -> None:
+    """Compile the kernels of quiet ticks with those of a vehicle on the true state: for others they are the same."""
+    compile_kernels(build(StackConfig(state=TRUTH), lambda: None))
+
+
+def compile_kernels(stack: Stack) -> None:
+    """Compile the kernels of quiet ticks, or load them from the cache, if they can run."""
+    if compiled_socket.IS_AVAILABLE and compiles(stack):
+        QuietBlock(stack, ExchangedSteps(stack, -1))

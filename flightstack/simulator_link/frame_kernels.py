@@ -1,0 +1,109 @@
+"""The frames of the lockstep exchange in compiled code: FS_PLANT_STATE, FS_ACTUATORS and HIL_SENSOR of MAVLink 2.
+
+They are those of ``hot_frames`` and ``sensor_frames``: a frame that is not exactly as expected is left to them. A
+module of its own, with few imports: the key of a kernel in the cache depends on all of them.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flightstack.core.compiled import compiled
+from flightstack.core.record_types import dtype_of
+
+HEADER, CHECKSUM = 10, 2
+"""Bytes before and after the payload."""
+
+
+def _table() -> np.ndarray[Any, np.dtype[np.int64]]:
+    """Return the checksums (CRC-16/MCRF4XX) of single bytes."""
+    checksums = np.arange(256)
+    for _ in range(8):
+        checksums = (checksums >> 1) ^ np.where(checksums & 1, 0x8408, 0)
+    return checksums
+
+
+_CHECKSUMS = _table()
+
+
+class SensorNews(NamedTuple):
+    """What HIL_SENSOR has besides the inertial sensor: 1 for a new measurement."""
+
+    has_mag: int
+    has_baro: int
+
+
+SENSOR_NEWS = dtype_of(SensorNews)
+
+
+class Shape(NamedTuple):
+    """What identifies a message, and where its payload ends."""
+
+    size: int
+    """Of the payload, not truncated."""
+    extra: int
+    """Last byte of the checksum."""
+    first_id: int
+    """Bytes of the message id."""
+    second_id: int
+    third_id: int
+
+
+SHAPE = dtype_of(Shape)
+
+
+@compiled
+def checksum_of(data: Any, begin: int, end: int, extra: int) -> int:
+    """Return the checksum of the bytes from ``begin`` to before ``end``, and of ``extra``."""
+    total = 0xFFFF
+    for i in range(begin, end):
+        total = (total >> 8) ^ _CHECKSUMS[(total ^ data[i]) & 0xFF]
+    return int((total >> 8) ^ _CHECKSUMS[(total ^ extra) & 0xFF])
+
+
+@compiled
+def read_bytes(data: Any, at: int, count: int) -> int:
+    """Return an unsigned number of ``count`` bytes, little-endian."""
+    value = 0
+    for i in range(count):
+        value |= int(data[at + i]) << (8 * i)
+    return value
+
+
+@compiled
+def write_bytes(data: Any, at: int, count: int, value: int) -> None:
+    """Write an unsigned number as ``count`` bytes, little-endian."""
+    for i in range(count):
+        data[at + i] = (value >> (8 * i)) & 0xFF
+
+
+@compiled
+def frame_size(data: Any, at: int, end: int, shape: Any) -> int:
+    """Return the size of the intact frame of the message at ``at``, within ``end``; 0 if there is none."""
+    if end - at < HEADER + CHECKSUM + 1 or data[at] != 0xFD or data[at + 2] != 0:
+        return 0
+    size, shape = int(data[at + 1]), shape[0]
+    crc_at = at + HEADER + size
+    if size == 0 or size > shape["size"] or crc_at + CHECKSUM > end:
+        return 0
+    if (
+        data[at + 7] != shape["first_id"]
+        or data[at + 8] != shape["second_id"]
+        or data[at + 9] != shape["third_id"]
+    ):
+        return 0
+    if checksum_of(data, at + 1, crc_at, shape["extra"]) != read_bytes(data, crc_at, CHECKSUM):
+        return 0
+    return HEADER + size + CHECKSUM
+
+
+@compiled
+def seal(frame: Any, time_us: int, size: int, extra: int) -> int:
+    """Complete the frame around a payload of ``size`` bytes that begins with the time; return the size of the frame."""
+    frame[1] = size
+    frame[4] = (frame[4] + 1) & 0xFF
+    write_bytes(frame, HEADER, 8, time_us)
+    write_bytes(frame, HEADER + size, CHECKSUM, checksum_of(frame, 1, HEADER + size, extra))
+    return HEADER + size + CHECKSUM

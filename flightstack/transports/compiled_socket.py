@@ -1,0 +1,110 @@
+"""A connected socket and the clock for compiled code: system calls without Python between them.
+
+Compiled code calls the C library at its addresses. It waits as long as the socket does, and leaves what it cannot do
+(less than it sends is accepted, a timeout, a signal, a closed connection) to Python.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import socket
+import sys
+import time
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flightstack.core.compiled import IS_DISABLED, compiled
+from flightstack.core.contract import RecordArray
+from flightstack.core.kernel_calls import call_c
+from flightstack.core.record_types import dtype_of
+from flightstack.transports.tcp import BUFFER_SIZE
+
+IS_AVAILABLE = sys.platform == "linux" and sys.maxsize > 1 << 32 and not IS_DISABLED
+"""True if the C library has the functions under the names and with the types of this module."""
+_MONOTONIC = getattr(time, "CLOCK_MONOTONIC", 0)
+_NS_PER_S = 1_000_000_000
+
+
+class Socket(NamedTuple):
+    """A socket, the addresses of functions and buffers, and what was done."""
+
+    descriptor: int
+    send: int
+    receive: int
+    clock: int
+    time_at: int
+    in_at: int
+    sent: int
+    """Bytes of the newest message that were sent; −1 without one."""
+    received: int
+    """Bytes that wait in the inbox; 0 at the end of the connection, −1 for none."""
+
+
+SOCKET = dtype_of(Socket)
+_FLAGS = int(getattr(socket, "MSG_DONTWAIT", 0)) | int(getattr(socket, "MSG_NOSIGNAL", 0))
+
+
+class CompiledSocket:
+    """What compiled code needs of a connected socket, which must stay open. Python may use it between two calls."""
+
+    def __init__(self, descriptor: int) -> None:
+        library = ctypes.CDLL(None)
+        send, receive, clock = (
+            ctypes.cast(function, ctypes.c_void_p).value
+            for function in (library.send, library.recv, library.clock_gettime)
+        )
+        self.inbox = np.zeros(BUFFER_SIZE, np.uint8)
+        """Received bytes."""
+        self._time = np.zeros(2, np.int64)
+        addresses = send, receive, clock, self._time.ctypes.data, self.inbox.ctypes.data
+        self._record: RecordArray = np.array([(descriptor, *addresses, -1, -1)], SOCKET)
+        self.arguments: tuple[Any, ...] = (self._record, self._time, self.inbox)
+        """Argument ``line`` of the compiled functions."""
+
+    @property
+    def sent(self) -> int:
+        """Bytes of the newest message that were sent; −1 without one."""
+        return int(self._record["sent"][0])
+
+    @property
+    def received(self) -> memoryview | None:
+        """Bytes that were received and not taken, empty at the end of the connection; None for none."""
+        count = int(self._record["received"][0])
+        return None if count < 0 else self.inbox[:count].data
+
+    def clear(self) -> None:
+        """Forget what was sent and received."""
+        self._record["sent"], self._record["received"] = -1, -1
+
+
+@compiled
+def now_ns(line: Any) -> int:
+    """Return the time of ``time.clock_gettime_ns(time.CLOCK_MONOTONIC)``."""
+    record, time_array, _inbox = line
+    call_c(record[0]["clock"], (_MONOTONIC, record[0]["time_at"]))
+    return int(time_array[0] * _NS_PER_S + time_array[1])
+
+
+@compiled
+def forget(line: Any) -> None:
+    """Count what was sent and received as taken."""
+    line[0][0]["sent"], line[0][0]["received"] = -1, -1
+
+
+@compiled
+def send_from(line: Any, address: int, size: int) -> bool:
+    """Send ``size`` bytes at ``address``; return False if not all were accepted."""
+    record = line[0][0]
+    sent = call_c(record["send"], (record["descriptor"], address, size, _FLAGS))
+    record["sent"] = max(sent, 0)
+    return bool(sent == size)
+
+
+@compiled
+def receive_into(line: Any) -> int:
+    """Wait for bytes in the inbox; return their number, 0 at the end of the connection, −1 for none."""
+    record, _time, inbox = line
+    count = call_c(record[0]["receive"], (record[0]["descriptor"], record[0]["in_at"], len(inbox), 0))
+    record[0]["received"] = count
+    return int(count)

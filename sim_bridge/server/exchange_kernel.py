@@ -1,0 +1,130 @@
+"""Quiet exchanges with the flight stack in another process as one compiled call: commands in, state and sensors out.
+
+It takes answers that are exactly the expected frame; all else waits in the inbox, as it came, for Python. A module of
+its own, with few imports: the key of a kernel in the cache depends on all of them.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from flightstack.core.arrays import copy_all
+from flightstack.core.compiled import compiled
+from flightstack.core.record_types import dtype_of
+from flightstack.simulator_link.frame_kernels import (
+    HEADER,
+    frame_size,
+    read_bytes,
+    seal,
+    write_bytes,
+)
+from flightstack.transports.compiled_socket import forget, receive_into, send_from
+from sim_bridge.step_kernel import simulate
+
+FIELDS_AT, NUMBER_AT = 60, 64
+"""Places in the payload of HIL_SENSOR: bits of the new measurements, and number of the sensor."""
+
+
+class Exchanges(NamedTuple):
+    """What the kernel needs besides socket, frames and plant, and what it notes."""
+
+    outbox_at: int
+    """Address of the buffer of the messages."""
+    state_size: int
+    """Of the payload of the state; then the last byte of the checksum, that of the sensors', and the valid flag."""
+    state_extra: int
+    sensor_extra: int
+    valid_flag: int
+    contact_flag: int
+    lockstep_flag: int
+    """Flags of the answers."""
+    rotor_count: int
+    interval_us: int
+    imu_fields: int
+    """Bits of HIL_SENSOR; the next two too."""
+    mag_fields: int
+    baro_fields: int
+    largest_result: int
+    """Of a step that the flight continues after."""
+    steps: int
+    """What was done: number of steps, result of the last one, and size of the last message."""
+    result: int
+    size: int
+
+
+EXCHANGES = dtype_of(Exchanges)
+
+
+@compiled
+def _sensor_size(fields: int, number: int) -> int:
+    """Return the size of the payload of HIL_SENSOR without trailing zeros; ``fields`` are not 0."""
+    if number > 0:
+        return NUMBER_AT + 1
+    size = FIELDS_AT
+    while fields > 0:
+        fields >>= 8
+        size += 1
+    return size
+
+
+@compiled
+def _write_sensors(e: Any, at: int, outbox: Any, frames: Any, wires: Any, news: Any, time_us: int) -> int:
+    """Write HIL_SENSOR of all inertial sensors to the outbox, the first one last; return where they end."""
+    for k in range(len(wires) - 1, -1, -1):
+        frame, fields = frames[k], e["imu_fields"]
+        if k == 0:
+            fields |= e["mag_fields"] if news["has_mag"] != 0 else 0
+            fields |= e["baro_fields"] if news["has_baro"] != 0 else 0
+        copy_all(wires[k], frame[HEADER + 8 :])
+        write_bytes(frame, HEADER + FIELDS_AT, 4, fields)
+        write_bytes(frame, HEADER + NUMBER_AT, 1, k)
+        size = seal(frame, time_us, _sensor_size(fields, k), e["sensor_extra"])
+        copy_all(frame[:size], outbox[at:])
+        at += size
+    return at
+
+
+@compiled
+def _is_answer(line: Any, count: int, time_us: int, e: Any, shape: Any) -> bool:
+    """Return True if the inbox has the answer to the state at ``time_us``, and nothing else."""
+    inbox = line[2]
+    if frame_size(inbox, 0, count, shape) != count or read_bytes(inbox, HEADER, 8) != time_us:
+        return False
+    flags_at = count - 3
+    is_lockstep = inbox[flags_at] & e["lockstep_flag"] != 0
+    return bool(is_lockstep and inbox[flags_at - 1] == e["rotor_count"])
+
+
+@compiled
+def serve_steps(
+    line: Any, exchanges: Any, answer: Any, shape: Any, state: Any, sensors: Any, outbox: Any, world: Any, count: int,
+    time_us: int,
+) -> None:  # fmt: skip
+    """Make up to ``count`` steps, each after the answer to the state at ``time_us`` or later, and send its messages.
+
+    ``answer`` and ``state`` are frames, ``sensors`` the frames of HIL_SENSOR and the bytes of the measurements, of
+    which there are none without sensors.
+    """
+    e, news = exchanges[0], world[4][0]
+    frames, wires = sensors
+    e["steps"], e["result"], e["size"] = 0, 0, 0
+    for _ in range(count):
+        size = receive_into(line)
+        if size != len(answer) or not _is_answer(line, size, time_us, e, shape):
+            return
+        for i in range(size):
+            answer[i] = line[2][i]
+        forget(line)
+        time_us += e["interval_us"]
+        e["result"] = simulate(world, time_us, int(answer[size - 3]))
+        e["steps"] += 1
+        if e["result"] > e["largest_result"]:
+            return
+        flags_at = HEADER + e["state_size"] - 1
+        state[flags_at] = e["valid_flag"] | (e["contact_flag"] if e["result"] != 0 else 0)
+        end = seal(state, time_us, e["state_size"], e["state_extra"])
+        copy_all(state[:end], outbox)
+        end = _write_sensors(e, end, outbox, frames, wires, news, time_us)
+        e["size"] = end
+        if not send_from(line, e["outbox_at"], end):
+            return
