@@ -19,9 +19,13 @@ from typing import Any
 import numpy as np
 
 from flightstack.commander.failsafe_monitor import FailsafeMonitor
-from flightstack.core.compiled import IS_DISABLED
+from flightstack.core.compiled import IS_DISABLED, direct
 from flightstack.core.contract import STATE_SIZE
 from flightstack.core.kernel_cache import is_shared
+from flightstack.estimation.delayed_filter import field_kernel, push_kernel
+from flightstack.estimation.health import SUMMARY, health_kernel
+from flightstack.estimation.memory import MEMORY
+from flightstack.estimation.rings import MAG_RING
 from flightstack.flight_log.recorder import FlightRecorder
 from flightstack.guidance.kernels import goal_kernel
 from flightstack.guidance.navigator import Navigator
@@ -35,16 +39,22 @@ from flightstack.simulator_link.endpoint import SimulatorEndpoint
 
 GUIDANCE = "flightstack.process.compile_helper:compile_guidance"
 COMMANDER = "flightstack.process.compile_helper:compile_commander"
+ESTIMATOR = "flightstack.process.compile_helper:compile_estimator"
+QUIET_TICKS = "flightstack.process.quiet_exchange:compile_any"
 
 helper: subprocess.Popen[bytes] | None = None
 _tasks: tuple[str, ...] = ()
 
 
-def start(announced: Sequence[str] = (), tasks: Sequence[str] = (GUIDANCE, COMMANDER)) -> None:
+def start(
+    announced: Sequence[str] = (),
+    tasks: Sequence[str] = (GUIDANCE, COMMANDER),
+    later: Sequence[str] = (),
+) -> None:
     """Start the helper with ``tasks``, "module:function" each, if the cache is cold and a second CPU is available.
 
-    It ends at the latest with this process. It announces its kernels on stderr if ``announced`` names all kernels of
-    the program.
+    Nothing waits for those of ``later``, which it does while this process compiles the filter. It ends at the latest
+    with this process. It announces its kernels on stderr if ``announced`` names all kernels of the program.
     """
     global helper, _tasks  # noqa: PLW0603  # one helper for each process
     if helper is not None or not is_useful():
@@ -52,7 +62,7 @@ def start(announced: Sequence[str] = (), tasks: Sequence[str] = (GUIDANCE, COMMA
     path = os.pathsep.join(str(Path(entry).absolute()) for entry in sys.path)
     try:
         helper = subprocess.Popen(
-            [sys.executable, "-P", "-m", __name__, ",".join(tasks), *announced],
+            [sys.executable, "-P", "-m", __name__, ";".join(map(",".join, (tasks, later))), *announced],
             stdin=subprocess.PIPE,  # closes with this process
             stdout=subprocess.PIPE,
             stderr=None if announced else subprocess.DEVNULL,
@@ -120,8 +130,16 @@ def compile_commander() -> None:
     FlightRecorder(lambda: None, {}, dict, DEFAULT_HOME, lambda: simulator.battery)
 
 
-def _run(tasks: Sequence[str]) -> None:
-    for task in tasks:
+def compile_estimator() -> None:
+    """Compile the kernels of the estimator besides that of the IMU, which takes longer than all others."""
+    memory = np.zeros(1, MEMORY)
+    direct(health_kernel, memory, np.zeros(1, SUMMARY))
+    direct(push_kernel, memory, MAG_RING, np.zeros(4))
+    direct(field_kernel, memory)
+
+
+def _run(tasks: str) -> None:
+    for task in filter(None, tasks.split(",")):
         module, _, function = task.partition(":")
         getattr(importlib.import_module(module), function)()
 
@@ -135,8 +153,10 @@ def _end_with_parent() -> None:
 if __name__ == "__main__":
     threading.Thread(target=_end_with_parent, daemon=True).start()
     notice = announce_compilation("flightstack", sys.argv[2:], began=True) if sys.argv[2:] else None
-    _run(sys.argv[1].split(","))
+    first, _, last = sys.argv[1].partition(";")
+    _run(first)
     if notice is not None:
         notice.stop()  # the vehicle flies
     os.write(1, b"\n")
+    _run(last)
     compile_guidance().warm_up_streams()

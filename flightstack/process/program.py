@@ -13,7 +13,7 @@ from flightstack.core.atomic_file import check_new
 from flightstack.core.errors import ConfigError, TargetError
 from flightstack.core.port_numbers import simulator_port, system_id
 from flightstack.firmware.choice import PYTHON
-from flightstack.params.config import DEFAULT_HOME, FLOWN_ON, StackConfig, parse_home
+from flightstack.params.config import DEFAULT_HOME, ESTIMATED, FLOWN_ON, StackConfig, parse_home
 from flightstack.params.gains_file import hidden_gains
 from flightstack.params.param_file import begin_param_file
 from flightstack.params.vehicle import hidden_vehicle
@@ -59,13 +59,19 @@ def _start(given: RunOptions) -> tuple[App, StackConfig, ProcessConfig] | None:
     _print_warnings(given)
     announce_compilation("flightstack", kernels_of(config))
     if config.loops == PYTHON:
-        compile_helper.start(kernels_of(config))
+        compile_helper.start(kernels_of(config), later=_later(config))
     if given.check:
         _check(config)
         return None
     process = _process_config(given, directory)
     config = _open_files(given, directory, config, process)
     return App(config, process), config, process
+
+
+def _later(config: StackConfig) -> tuple[str, ...]:
+    """Return the tasks of the compile helper for which nothing waits."""
+    estimator = (compile_helper.ESTIMATOR,) if config.state == ESTIMATED else ()
+    return (compile_helper.QUIET_TICKS, *estimator) if config.lockstep else estimator
 
 
 def _check_combinations(given: RunOptions) -> None:
