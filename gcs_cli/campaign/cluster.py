@@ -12,6 +12,7 @@ import logging
 import math
 import pickle
 import secrets
+import socket
 import time
 import warnings
 from collections.abc import Generator, Iterator, Mapping, Sequence
@@ -61,7 +62,7 @@ class ClusterPool:
         self._address = address
         _silence()
         try:
-            distributed.comm.get_address_host_port(address, strict=True)
+            self._place: tuple[str, int] = distributed.comm.get_address_host_port(address, strict=True)
         except ValueError:
             problem = "is no address of a scheduler, such as tcp://10.0.0.1:8786"
             raise CliError(f"--scheduler {address}: {problem}", USAGE) from None
@@ -95,6 +96,7 @@ class ClusterPool:
             self._installation = installation()
             warnings.filterwarnings("ignore", module="distributed")  # other versions of libraries
             try:
+                _wait_for(self._place)
                 self._client = distributed.Client(self._address, timeout=ANSWER_S, set_as_default=False)
             except ImportError as error:
                 raise CliError(f"--scheduler {self._address}: {error}", USAGE) from None
@@ -112,6 +114,22 @@ class ClusterPool:
         if self._client is not None:
             with contextlib.suppress(*_LOST):
                 self._client.close(timeout=_CLOSE_S)
+
+
+def _wait_for(place: tuple[str, int]) -> None:
+    """Wait until something listens at host and port; raise OSError after ``ANSWER_S``.
+
+    Dask waits too, but a Ctrl-C then leaves a client that ends after 20 s, with a traceback.
+    """
+    deadline_s = time.monotonic() + ANSWER_S
+    while True:
+        try:
+            with socket.create_connection(place, timeout=ANSWER_S):
+                return
+        except OSError:
+            if time.monotonic() >= deadline_s:
+                raise
+            time.sleep(_TICK_S)
 
 
 class _Run:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -110,6 +111,16 @@ def test_ctrl_c_cancels_the_flights_and_keeps_those_that_are_over(folder: Path, 
         run.interrupt()
         assert run.end() == 130
     worker.kill()
+    assert run.lines == ["gcs: interrupted: 0 of 3 flights are over; the same command continues"]
+
+
+def test_ctrl_c_ends_the_wait_for_a_scheduler(folder: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
+    run = Process("gcs_cli", "campaign", "c.toml", "--scheduler", address)
+    wait_until(Path("runs/campaign-c/flights.jsonl").exists)
+    run.interrupt()
+    assert run.end() == 130
     assert run.lines == ["gcs: interrupted: 0 of 3 flights are over; the same command continues"]
 
 
