@@ -8,7 +8,7 @@ import numpy as np
 
 from flightstack.core.compiled import IS_DISABLED
 from flightstack.core.contract import FloatArray, RecordArray, SingleArray
-from flightstack.core.kernel_calls import address_of
+from flightstack.core.kernel_calls import address_of, as_bytes
 from flightstack.simulator_link.frame_kernels import SENSOR_NEWS
 from flightstack.simulator_link.sensor_frames import BARO as BARO_FIELDS
 from flightstack.simulator_link.sensor_frames import HIL_VALUES, VALUES
@@ -30,10 +30,6 @@ _NO_BYTES = np.zeros(0, np.uint8)
 _NO_SENSOR: tuple[Any, ...] = (_NO_BYTES, np.zeros(3), np.zeros((0, 0)), np.zeros(1, np.int64))
 
 
-def _bytes(records: Any) -> Any:
-    return np.frombuffer(records, np.uint8)
-
-
 def compiles(simulator: Simulator) -> bool:
     """Return True if the plant is compiled Python."""
     return not IS_DISABLED and type(simulator.plant) is CompiledPlant
@@ -43,7 +39,7 @@ def _sensor(sensor: Magnetometer | Barometer | None) -> tuple[Any, ...]:
     """Return record, output, deviates and their cursor of a sensor."""
     if sensor is None:
         return _NO_SENSOR
-    return _bytes(sensor.records), sensor.out, sensor.noise.block, sensor.noise.cursor
+    return as_bytes(sensor.records), sensor.out, sensor.noise.block, sensor.noise.cursor
 
 
 class QuietSteps:
@@ -67,7 +63,7 @@ class QuietSteps:
         self.news: RecordArray = np.zeros(1, SENSOR_NEWS)
         """Its new measurements in the last step, besides those of the inertial sensor."""
         plant = (
-            _bytes(self._plant.memory), commands, simulator.steps, _bytes(self._plant.output), CONTACT,
+            as_bytes(self._plant.memory), commands, simulator.steps, as_bytes(self._plant.output), CONTACT,
             *self._copied(taken),
         )  # fmt: skip
         sensing = self._sensing()
@@ -80,7 +76,7 @@ class QuietSteps:
         """Return the bytes that a step copies, and where to."""
         if taken is None:
             return _NO_BYTES.copy(), _NO_BYTES.copy()
-        return _bytes(self._simulator.frame.frame), _bytes(taken)
+        return as_bytes(self._simulator.frame.frame), as_bytes(taken)
 
     def _sensing(self) -> tuple[Any, ...]:
         sensors, truth = self._sensors, self._simulator.frame

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -25,6 +26,11 @@ def address_of(kernel: Callable[..., Any], *examples: Any) -> int:
     address = int(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
     assert address, f"{kernel.__name__} has no address"
     return address
+
+
+def as_bytes(record: Any) -> Any:
+    """Return the bytes of records or of a frame, as an array that shares their memory."""
+    return np.frombuffer(record, np.uint8)
 
 
 def _call(result: Any) -> Any:

@@ -243,15 +243,21 @@ class App:
         link, loop = self.stack.simulator, LockstepLoop(self.stack, simulator)
         self._follower = AffinityFollower(simulator.socket)
         is_over, fresh = False, True  # fresh: the state received before the start
+        owes_ground = False  # the ground links wait until no received bytes do: a reboot would lose them
         while True:
             data = None
             if fresh:
                 is_over = is_over or (until is not None and until())
                 if is_over and loop.ends_period:
                     return
-                data = loop.run(self._next_ground_ns, self._next_log_us, until is None)
-                if loop.serves_ground:
-                    self._between_ticks(simulator, loop.ends_period)
+                may_run_on = until is None and not owes_ground
+                data = loop.run(self._next_ground_ns, self._next_log_us, may_run_on)
+                owes_ground = owes_ground or loop.serves_ground
+                if loop.ends_period:
+                    self._end_period()
+                if owes_ground and data is None:
+                    owes_ground = False
+                    self._between_ticks(simulator)
             if data is None:
                 loop.pace.begin_wait(time.monotonic_ns())
                 # a command between the end and the next outer tick would act at a time that depends on the machine
@@ -302,22 +308,27 @@ class App:
             timing.tick(began_ns, time.monotonic_ns())
             tick += 1
             ends_period = tick % self.stack.rates.divisor == 0
+            if ends_period:
+                self._end_period()
             if ends_period or self._serves_pauses:
-                self._between_ticks(simulator, ends_period)
+                self._between_ticks(simulator)
                 check_deadline(heard_s + self._process.simulator_timeout_s, self.stack, self._process)
             elif self._ground.is_sending:
                 self._ground.send()
 
-    def _between_ticks(self, simulator: TcpClient, ends_period: bool) -> None:
-        """Serve the ground links, log the timing at the end of an outer period, and check for a stop."""
+    def _end_period(self) -> None:
+        """Log the timing if it is due, and notices of the link to the simulator."""
         time_us = self.stack.now.time_us
-        if ends_period and time_us >= self._next_log_us:
+        if time_us >= self._next_log_us:
             self._next_log_us = time_us + 1_000_000
             fields = self.stack.report.log_fields(time_us // self.stack.rates.interval_us)
             self.stack.recorder.timing(time_us, **fields)
             if not self._lockstep:
                 self.stack.simulator.steps.compare(self.stack.simulator.time_us, time_us)
         self._report_notices()
+
+    def _between_ticks(self, simulator: TcpClient) -> None:
+        """Serve the ground links if they are due, and check for a stop."""
         now_ns = time.monotonic_ns()
         if now_ns < self._next_ground_ns:
             return

@@ -120,6 +120,7 @@ class SimulatorPace:
         self._began_ns = began_ns
         if self._waits_ns:
             self.note_wait(began_ns, began_ns - self._waits_ns)
+            self._waits_ns = 0
 
     def note_wait(self, ended_ns: int, waited_ns: int) -> None:
         """Note the end of a wait for a state, or of several, the longest of which took ``waited_ns``."""

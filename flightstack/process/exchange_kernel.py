@@ -13,7 +13,10 @@ from flightstack.core.compiled import compiled
 from flightstack.core.record_types import dtype_of
 from flightstack.simulator_link.frame_kernels import (
     CHECKSUM,
+    FIELDS_AT,
     HEADER,
+    NUMBER_AT,
+    VALUES_AT,
     frame_size,
     read_bytes,
     seal,
@@ -21,8 +24,6 @@ from flightstack.simulator_link.frame_kernels import (
 )
 from flightstack.transports.compiled_socket import forget, now_ns, receive_into, send_from
 
-VALUES_AT, FIELDS_AT, NUMBER_AT = 8, 60, 64
-"""Places in the payload of HIL_SENSOR: measurements, bits of the new ones, and number of the sensor."""
 _FRAME = HEADER + CHECKSUM
 
 
@@ -72,6 +73,15 @@ def _news(inbox: Any, at: int, size: int, number: int, bits: Any) -> int:
 
 
 @compiled
+def _is_finite(inbox: Any, at: int, size: int) -> bool:
+    """Return True if ``size`` bytes of single-precision numbers are finite."""
+    for i in range(at, at + size, 4):  # noqa: SIM110  # compiled code has no generators
+        if inbox[i + 3] & 0x7F == 0x7F and inbox[i + 2] & 0x80 != 0:  # all bits of the exponent
+            return False
+    return True
+
+
+@compiled
 def _take(inbox: Any, end: int, time_us: int, bits: Any, taking: Any) -> bool:
     """Take the frames of a quiet step at ``time_us``, ``end`` bytes; return False, and take nothing, for any other."""
     shapes, state, wires, values, news_array, places = taking
@@ -85,6 +95,8 @@ def _take(inbox: Any, end: int, time_us: int, bits: Any, taking: Any) -> bool:
         if others < 0 or read_bytes(inbox, at + HEADER, 8) != time_us:
             return False
         places[k] = at + HEADER + VALUES_AT
+        if not _is_finite(inbox, places[k], len(wires[k])):  # no measurement
+            return False
         at += size
     if at != end:
         return False

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import socket
 import time
+from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 from flightstack.core.contract import FloatArray
@@ -31,7 +33,7 @@ class QuietLockstep:
 
     def __init__(self, stack: Stack, lockstep: Lockstep, connection: socket.socket) -> None:
         self._stack, self._lockstep, self._connection = stack, lockstep, connection
-        self._autopilot, self._interval_us = stack.parts.autopilot, stack.rates.interval_us
+        self._autopilot = stack.parts.autopilot
         self._is_possible = compiled_socket.IS_AVAILABLE and compiles(stack)
         self._steps: ExchangedSteps | None = None
         self._block: QuietBlock | None = None
@@ -74,10 +76,10 @@ class QuietLockstep:
         assert self._steps is not None
         return int(self._steps.record["ended_ns"][0])
 
-    def run(self, now_ns: int, deadline_ns: int, most: int) -> Ran:
-        """Run the tick of the newest state and those that follow, ``most`` at most, up to ``deadline_ns``.
+    def run(self, now_ns: int, deadline_ns: int, most: Callable[[int], int]) -> Ran:
+        """Run the tick of the newest state and those that follow, up to ``deadline_ns``.
 
-        Times are those of the monotonic clock.
+        ``most`` returns how many more may follow a number of them. Times are those of the monotonic clock.
         """
         steps, block = self._steps, self._block
         assert steps is not None
@@ -86,17 +88,14 @@ class QuietLockstep:
         link = self._stack.simulator
         stamp_us = link.stamp_us
         if self._autopilot.next_outer == 0 and self._lockstep.is_due:
-            ticks = block.run_periods(most) or 1
+            ticks = block.run_periods(most(0)) or 1
         else:
             steps.commands[:] = self._lockstep.tick(now_ns)
             ticks = 1
-        if (
-            steps.socket.sent < 0
-            and most > ticks
-            and self._lockstep.is_quiet
-            and (count := block.count(runs_on=True)) > 0
-        ):
-            ticks += block.run(min(count, most - ticks))
+        if steps.socket.sent < 0 and self._lockstep.is_quiet:
+            count = min(block.count(runs_on=True), most(ticks))
+            if count > 0:
+                ticks += block.run(count)
         if link.stamp_us != stamp_us and link.sensors is not None:
             link.sensors.pass_by(self._stack.now.time_us, link.stamp_us)
         sent = steps.socket.sent
@@ -144,7 +143,7 @@ class LockstepLoop:
 
     def _run_on(self, began_ns: int, deadline_ns: int, next_log_us: int) -> memoryview | None:
         stack, quiet = self._stack, self._quiet
-        ran = quiet.run(began_ns, deadline_ns, self._most(next_log_us))
+        ran = quiet.run(began_ns, deadline_ns, partial(self._most, next_log_us))
         self._answered += ran.ticks
         self.serves_ground = True
         if ran.unsent is None:
@@ -160,9 +159,16 @@ class LockstepLoop:
             raise LinkClosedError
         return ran.received
 
-    def _most(self, next_log_us: int) -> int:
-        """Return the number of ticks up to the end of the first outer period that ends after ``next_log_us``."""
-        left = self._divisor - self._answered % self._divisor
+    def _most(self, next_log_us: int, ticks: int) -> int:
+        """Return the number of ticks after ``ticks`` up to the end of the period at which the log gets something.
+
+        That is the first outer period that ends after ``next_log_us``, or the present one for a notice of the link.
+        """
+        left = -(self._answered + ticks) % self._divisor
+        if not (ticks or left):  # a period begins
+            left = self._divisor
+        if self._stack.simulator.steps.has_notices:
+            return left
         ahead_us = next_log_us - self._stack.now.time_us - left * self._interval_us
         period_us = self._divisor * self._interval_us
         return left + max(0, -(-ahead_us // period_us)) * self._divisor

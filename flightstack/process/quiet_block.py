@@ -16,7 +16,7 @@ from flightstack.commander.fault_detector import follow_rotors
 from flightstack.control.loops import PythonLoops
 from flightstack.core.compiled import IS_DISABLED, direct
 from flightstack.core.contract import STATE_SIZE, FloatArray, LoopRow, RecordArray, SingleArray, Vector3
-from flightstack.core.kernel_calls import address_of
+from flightstack.core.kernel_calls import address_of, as_bytes
 from flightstack.estimation.delayed_filter import imu_kernel, push_kernel
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.filter_core import PythonCore
@@ -81,11 +81,6 @@ def compiles(stack: Stack) -> bool:
     """Return True if loops and filters are compiled Python in this process."""
     parts = [(stack.loops, PythonLoops), *((each.core, PythonCore) for each in estimators_of(stack))]
     return not IS_DISABLED and all(type(part) is kind for part, kind in parts)
-
-
-def as_bytes(record: Any) -> Any:
-    """Return the bytes of records or of a frame."""
-    return np.frombuffer(record, np.uint8)
 
 
 def _sensing(stack: Stack, simulator: QuietSimulator) -> _Arguments:

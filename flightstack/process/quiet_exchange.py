@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from flightstack.core.contract import FloatArray, RecordArray, SingleArray
-from flightstack.core.kernel_calls import address_of
+from flightstack.core.kernel_calls import address_of, as_bytes
 from flightstack.params.config import TRUTH, StackConfig
 from flightstack.process.assembly import Stack, build
 from flightstack.process.exchange_kernel import EXCHANGE, Exchange, exchange
-from flightstack.process.quiet_block import QuietBlock, as_bytes, compiles, estimators_of
+from flightstack.process.quiet_block import QuietBlock, compiles, estimators_of
 from flightstack.simulator_link.frame_kernels import SENSOR_NEWS, SHAPE
 from flightstack.simulator_link.sensor_frames import ACCEL, BARO, GYRO, MAG, SENSOR_SHAPE, VALUES
 from flightstack.transports import compiled_socket

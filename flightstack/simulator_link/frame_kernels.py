@@ -15,6 +15,8 @@ from flightstack.core.record_types import dtype_of
 
 HEADER, CHECKSUM = 10, 2
 """Bytes before and after the payload."""
+VALUES_AT, FIELDS_AT, NUMBER_AT = 8, 60, 64
+"""Places in the payload of HIL_SENSOR: measurements, bits of the new ones, and number of the sensor."""
 
 
 def _table() -> np.ndarray[Any, np.dtype[np.int64]]:

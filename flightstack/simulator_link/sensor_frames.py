@@ -20,7 +20,7 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.fields import int16, int32, whole
 from flightstack.mavlink.frames import CHECKSUM_SIZE, HEADER, HEADER_V2, MAGIC_V2, checksum, pack_frame
 from flightstack.mavlink.link import Message
-from flightstack.simulator_link.frame_kernels import Shape
+from flightstack.simulator_link.frame_kernels import FIELDS_AT, Shape
 
 HIL_SENSOR_ID: int = mavlink.MAVLINK_MSG_ID_HIL_SENSOR
 HIL_GPS_ID: int = mavlink.MAVLINK_MSG_ID_HIL_GPS
@@ -52,7 +52,7 @@ VALUES = HIL_VALUES.itemsize // 4
 _ALIGNMENT = 6  # puts the payload at offset 16 of the buffer
 _PAYLOAD = struct.Struct("<Q13fIB")
 _TIME, _FIELDS = struct.Struct("<Q"), struct.Struct("<IB")
-_FIELDS_AT = _PAYLOAD.size - _FIELDS.size
+assert _PAYLOAD.size - _FIELDS.size == FIELDS_AT
 _CRC = struct.Struct("<H")
 _HEAD = struct.Struct("<BBB4x3s")  # magic, size, incompatible flags, message
 _SENSOR_EXTRA: int = mavlink.MAVLink_hil_sensor_message.crc_extra
@@ -132,11 +132,11 @@ class HilSensorFrame:
         self.time_us, self.fields, self.number = time_us, fields, number
         frame[4] = (frame[4] + 1) & 255
         _TIME.pack_into(frame, HEADER_V2, time_us)
-        _FIELDS.pack_into(frame, HEADER_V2 + _FIELDS_AT, fields, number)
+        _FIELDS.pack_into(frame, HEADER_V2 + FIELDS_AT, fields, number)
         if not fields | number:  # the last values may be zero, and must not be overwritten by the checksum
-            payload = bytes(frame[HEADER_V2 : HEADER_V2 + _FIELDS_AT]).rstrip(b"\x00") or b"\x00"
+            payload = bytes(frame[HEADER_V2 : HEADER_V2 + FIELDS_AT]).rstrip(b"\x00") or b"\x00"
             return memoryview(pack_frame(HIL_SENSOR_ID, payload, _SENSOR_EXTRA, *frame[4:7]))
-        size = _PAYLOAD.size if number else _FIELDS_AT + ((fields.bit_length() + 7) >> 3)
+        size = _PAYLOAD.size if number else FIELDS_AT + ((fields.bit_length() + 7) >> 3)
         end = HEADER_V2 + size
         frame[1] = size
         frame[end] = _SENSOR_EXTRA  # the checksum covers one more byte, which is not sent
@@ -159,7 +159,7 @@ class HilSensorFrame:
         if size < _PAYLOAD.size:
             payload[size:] = bytes(_PAYLOAD.size - size)
         (self.time_us,) = _TIME.unpack_from(payload)
-        self.fields, self.number = _FIELDS.unpack_from(payload, _FIELDS_AT)
+        self.fields, self.number = _FIELDS.unpack_from(payload, FIELDS_AT)
         return True
 
     def set(self, time_us: int, measurement: HilMeasurement) -> None:

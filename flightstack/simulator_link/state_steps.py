@@ -44,6 +44,11 @@ class StateSteps:
         self._pace_is_off = False
         self._notices: list[Notice] = []
 
+    @property
+    def has_notices(self) -> bool:
+        """True if there are new notices."""
+        return bool(self._notices)
+
     def take_notices(self) -> list[Notice]:
         """Return new notices and clear them."""
         if not self._notices:

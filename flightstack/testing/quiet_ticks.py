@@ -10,9 +10,13 @@ from flightstack.process.assembly import Stack
 from flightstack.process.quiet_block import QuietBlock, compiles, estimators_of
 from flightstack.simulator_link.hot_frames import VALID_FLAG, ActuatorsFrame
 from flightstack.vehicle.autopilot import Lockstep
+from flightstack.vehicle.quiet_kernel import LARGEST_RESULT
 from sim_bridge import quiet_steps
+from sim_bridge.plant.layout import CONTACT
 from sim_bridge.quiet_steps import QuietSteps
 from sim_bridge.simulator import Simulator
+
+assert CONTACT == LARGEST_RESULT
 
 
 def _have_equal_sensors(stack: Stack, simulator: Simulator) -> bool:

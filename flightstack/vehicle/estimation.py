@@ -173,6 +173,8 @@ class Estimation:
         With ``measures``, kernels also take magnetometer and barometer, and record the true state.
         """
         now = self._now
+        if self._reset_counts() != self._counts:  # another sensor was selected after the last check
+            return 0
         finds_origin = not now.has_state and self.estimator.frame is not None
         if finds_origin or now.landed is not self._landed or not self._sensors.is_quiet:
             return 0
@@ -206,9 +208,12 @@ class Estimation:
         self._feed.update_imus(time_us, step_us, wires)
         self._check_resets(time_us)
 
-    def _check_resets(self, time_us: int) -> None:
+    def _reset_counts(self) -> tuple[float, float, float]:
         position, velocity, yaw = self._numbers
-        counts = position[0], velocity[0], yaw[0]
+        return position[0], velocity[0], yaw[0]
+
+    def _check_resets(self, time_us: int) -> None:
+        counts = self._reset_counts()
         if counts != self._counts:
             self._counts = counts
             self._follow_resets()

@@ -12,7 +12,10 @@ from flightstack.core.arrays import copy_all
 from flightstack.core.compiled import compiled
 from flightstack.core.record_types import dtype_of
 from flightstack.simulator_link.frame_kernels import (
+    FIELDS_AT,
     HEADER,
+    NUMBER_AT,
+    VALUES_AT,
     frame_size,
     read_bytes,
     seal,
@@ -20,9 +23,6 @@ from flightstack.simulator_link.frame_kernels import (
 )
 from flightstack.transports.compiled_socket import forget, receive_into, send_from
 from sim_bridge.step_kernel import simulate
-
-FIELDS_AT, NUMBER_AT = 60, 64
-"""Places in the payload of HIL_SENSOR: bits of the new measurements, and number of the sensor."""
 
 
 class Exchanges(NamedTuple):
@@ -75,7 +75,7 @@ def _write_sensors(e: Any, at: int, outbox: Any, frames: Any, wires: Any, news: 
         if k == 0:
             fields |= e["mag_fields"] if news["has_mag"] != 0 else 0
             fields |= e["baro_fields"] if news["has_baro"] != 0 else 0
-        copy_all(wires[k], frame[HEADER + 8 :])
+        copy_all(wires[k], frame[HEADER + VALUES_AT :])
         write_bytes(frame, HEADER + FIELDS_AT, 4, fields)
         write_bytes(frame, HEADER + NUMBER_AT, 1, k)
         size = seal(frame, time_us, _sensor_size(fields, k), e["sensor_extra"])

@@ -7,6 +7,9 @@ from typing import Any
 import numpy as np
 
 from flightstack.core.compiled import direct
+from flightstack.core.geodesy import GeoPoint
+from flightstack.core.kernel_calls import as_bytes
+from flightstack.params.vehicle import Vehicle
 from flightstack.simulator_link.frame_kernels import SHAPE
 from flightstack.simulator_link.hot_frames import GROUND_CONTACT_FLAG, LOCKSTEP_FLAG, VALID_FLAG
 from flightstack.simulator_link.sensor_frames import ACCEL, BARO, GYRO, MAG, SENSOR_SHAPE
@@ -17,15 +20,12 @@ from sim_bridge.plant.layout import CONTACT
 from sim_bridge.quiet_steps import QuietSteps
 from sim_bridge.server.endpoint import FlightStackEndpoint
 from sim_bridge.server.exchange_kernel import EXCHANGES, Exchanges, serve_steps
+from sim_bridge.simulator import Simulator
 
-MOST = 200
+MOST = 50
 """Steps of a call: between two calls the process ends at a signal."""
 _OUTBOX = 4096
 _NO_FRAME = np.zeros(0, np.uint8)
-
-
-def _bytes(data: Any) -> Any:
-    return np.frombuffer(data, np.uint8)
 
 
 class QuietExchanges:
@@ -40,6 +40,8 @@ class QuietExchanges:
         self._outbox = np.zeros(_OUTBOX, np.uint8)
         self._record = np.zeros(1, EXCHANGES)
         self._arguments: tuple[Any, ...] = ()
+        self.count = 0
+        """Number of exchanges until now."""
         self._serve: Any = None
 
     def room(self) -> int:
@@ -67,15 +69,16 @@ class QuietExchanges:
             GROUND_CONTACT_FLAG, LOCKSTEP_FLAG, len(simulator.vehicle.rotors), simulator.interval_us,
             int(ACCEL | GYRO), int(MAG), int(BARO), CONTACT, 0, 0, 0,
         )  # fmt: skip
-        frames = (_NO_FRAME,) if sensors is None else tuple(map(_bytes, sensors.raw_frames))
+        frames = (_NO_FRAME,) if sensors is None else tuple(map(as_bytes, sensors.raw_frames))
         self._arguments = (
-            self._socket.arguments, self._record, _bytes(link.actuators.frame), np.array([link.actuators.shape], SHAPE),
-            _bytes(state.frame), (frames, steps.wires.view(np.uint8)), self._outbox, steps.world,
+            self._socket.arguments, self._record, as_bytes(link.actuators.frame),
+            np.array([link.actuators.shape], SHAPE), as_bytes(state.frame), (frames, steps.wires.view(np.uint8)),
+            self._outbox, steps.world,
         )  # fmt: skip
         self._serve = direct(serve_steps, *self._arguments, 0, 0)
 
-    def run(self, count: int) -> int:
-        """Run up to ``count`` exchanges, ``room`` at most; return their number. Raise PlantDivergedError.
+    def run(self, count: int) -> None:
+        """Run up to ``count`` exchanges, ``room`` at most; raise PlantDivergedError.
 
         Then send ``unsent``, and go on with ``received``.
         """
@@ -84,9 +87,9 @@ class QuietExchanges:
         self._socket.clear()
         self._serve(*self._arguments, count, self._simulator.time_us)
         done = Exchanges(*self._record[0].item())
+        self.count += done.steps if done.result <= CONTACT else done.steps - 1
         if done.steps:
             self._steps.pass_by(done.steps, done.result)
-        return done.steps
 
     @property
     def unsent(self) -> memoryview:
@@ -100,3 +103,9 @@ class QuietExchanges:
         """Bytes that were received and are not the expected answer, none at the end of the connection; else None."""
         assert self._socket is not None
         return self._socket.received
+
+
+def compile_exchanges(simulator: Simulator, vehicle: Vehicle, home: GeoPoint) -> None:
+    """Compile the kernels of the exchanges of a simulator that is not flown, with its sensors."""
+    simulator.start_sensors(home)
+    QuietExchanges(FlightStackEndpoint(simulator, vehicle, home), -1).prepare()

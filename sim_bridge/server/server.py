@@ -16,6 +16,7 @@ from flightstack.process.clock import minimise_timer_slack
 from flightstack.process.compile_notice import announce_compilation
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.output import complain, say
+from sim_bridge.plant.compiled_plant import CompiledPlant
 from sim_bridge.plant.faults.schedule import Fault
 from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.plants import kernels_of
@@ -72,7 +73,7 @@ def serve(options: ServerOptions) -> int:
         _print_start(options, listener.getsockname()[1])
         announce_compilation("sim-bridge", kernels_of(options.plant))
         simulator = _make_simulator(options)  # may compile kernels; a client may connect meanwhile
-        _compile_exchanges(options)
+        _compile_exchanges(options, simulator)
         try:
             client = _await_client(listener, stop, options.timeout_s)
         except StoppedError:
@@ -126,15 +127,15 @@ def _make_simulator(options: ServerOptions) -> Simulator:
     return simulator
 
 
-def _compile_exchanges(options: ServerOptions) -> None:
-    """Compile what exchanges at full speed need, or load it from the cache, with a simulator that is not used."""
-    if not math.isinf(options.speed):
+def _compile_exchanges(options: ServerOptions, flown: Simulator) -> None:
+    """Compile what exchanges at full speed need, or load it from the cache, with a simulator that is not flown."""
+    if not (math.isinf(options.speed) and type(flown.plant) is CompiledPlant):
         return
-    simulator = Simulator(
-        options.vehicle, options.plant, options.plant_options, physics_hz=options.physics_hz
-    )
-    simulator.start_sensors(options.home)
-    _quiet_exchanges(FlightStackEndpoint(simulator, options.vehicle, options.home), -1).prepare()
+    from sim_bridge.server.quiet_exchanges import compile_exchanges
+
+    vehicle, physics_hz = options.vehicle, options.physics_hz
+    simulator = Simulator(vehicle, options.plant, options.plant_options, physics_hz=physics_hz)
+    compile_exchanges(simulator, vehicle, options.home)
 
 
 def _quiet_exchanges(link: FlightStackEndpoint, descriptor: int) -> QuietExchanges:

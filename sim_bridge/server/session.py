@@ -169,7 +169,11 @@ class Session:
 
     def _run_quietly(self, quiet: QuietExchanges, count: int) -> None:
         """Run exchanges without Python, and take what was received besides."""
-        self.exchanges += quiet.run(count)
+        before = quiet.count
+        try:
+            quiet.run(count)
+        finally:
+            self.exchanges += quiet.count - before
         if quiet.unsent:
             self._connection.send(quiet.unsent)
         if (data := quiet.received) is not None:

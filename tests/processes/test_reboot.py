@@ -39,6 +39,15 @@ def test_a_reboot_keeps_plan_and_parameters(tmp_path: Path, options: tuple[str, 
         assert errors.count("flightstack: rebooted") == 1
 
 
+def test_many_reboots_at_full_speed_lose_no_state(tmp_path: Path) -> None:
+    """A state that was received but not taken when the reboot came was lost: both processes waited for ever."""
+    with vehicle(tmp_path, "--log", "none", "--params", "none", speed="max") as there:
+        for _ in range(12):
+            there.wait_until_healthy()
+            assert gcs("--connect", there.link, "--timeout", 60, "reboot").returncode == 0
+        there.wait_until_healthy()
+
+
 def test_no_reboot_in_the_air(tmp_path: Path) -> None:
     with vehicle(tmp_path, "--log", "none", "--params", "none", speed="max") as there:
         there.wait_until_healthy()

@@ -18,6 +18,7 @@ from flightstack.params.config import TRUTH
 from flightstack.testing import World
 from flightstack.testing.instances import free_instance
 from tests.support.commands import flightstack_command, gcs
+from tests.support.inertial_sensors import x_quad_with_imus
 from tests.support.process import BOUND_S, Process
 from tests.support.vehicle_processes import INNER_HZ, wait_until_healthy
 from tests.support.warm_children import warm_children
@@ -73,6 +74,31 @@ def test_flight_on_sensors_gives_the_same_log_in_three_processes_and_in_one(tmp_
     _, log = fly(tmp_path / "flight", instance, "--vehicle", "x_quad", "--seed", "7", "--state", "estimated")
     with World(vehicle="x_quad", state="estimated", seed=7, params={"MAV_SYS_ID": instance + 1}) as world:
         assert world.fly("hop").log.content == log
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--state", "truth", "--fault", "clock:jump=1.5@8.3"),
+        ("--state", "estimated", "--fault", "clock:jump=0.5@8.5"),
+        ("--vehicle", "two imus", "--fault", "sensor:imu:off@8.301-9"),
+    ],
+    ids=lambda options: options[3].partition("@")[0],
+)
+def test_what_the_simulator_does_to_a_flight_has_the_same_log_at_any_speed(
+    options: tuple[str, ...], tmp_path: Path
+) -> None:
+    """At full speed the exchanges run without Python; at another one each runs in Python."""
+    words = [x_quad_with_imus(tmp_path) if word == "two imus" else word for word in options]
+    common = (MISSIONS / "square.plan", "--instance", free_instance(), *words)
+    logs = []
+    for number, speed in enumerate(("max", "20", "max")):
+        out = tmp_path / str(number)
+        with warm_children():
+            run = gcs("fly", *common, "--out", out, "--speed", speed)
+        logs.append((out / "flight.ulg").read_bytes())
+        assert f" {options[3]}" in run.stdout
+    assert logs[0] == logs[1] == logs[2]
 
 
 GCS_LOSS_S = 5

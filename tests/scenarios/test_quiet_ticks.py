@@ -51,6 +51,26 @@ def test_quiet_ticks_of_two_inertial_sensors_fly_as_ticks_with_bytes(tmp_path: P
         assert flown(quiet) == flown(exchanged)
 
 
+@pytest.mark.parametrize("fault_s", [6.8, 7.2])
+def test_another_inertial_sensor_is_followed_as_in_ticks_with_bytes(fault_s: float, tmp_path: Path) -> None:
+    """The reset that its selection makes comes after the filters have run, not within their tick."""
+    conditions = {"state": "estimated", "vehicle": x_quad_with_imus(tmp_path), "seed": 1}
+    logs = []
+    for options in ({}, {"make_engine": BytesEngine}):
+        with World(**conditions, **options) as world:
+            world.wait_until_ready()
+            world.upload("square.plan")
+            world.arm()
+            world.start_mission()
+            world.run_for(fault_s)
+            world.fault("sensor:imu:off", for_s=0.7)
+            world.run_until("landed", 60.0)
+            assert any("flying on" in text for text in world.texts)
+            assert any("Estimate reset" in text for text in world.texts)
+            logs.append(world.engine.newest_log())
+    assert logs[0] == logs[1]
+
+
 def test_a_reset_of_the_estimate_ends_a_compiled_call(monkeypatch: pytest.MonkeyPatch) -> None:
     """GNSS jumps and, much later, back, when no fault acts. Guidance follows a reset before the loops run."""
     resets: list[int] = []

@@ -6,10 +6,11 @@ Both ends are sockets that keep messages apart, so that the test can write sever
 from __future__ import annotations
 
 import contextlib
+import math
 import socket
 import time
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import pytest
 
@@ -19,19 +20,19 @@ from flightstack.mavlink.dialect import FS_PLANT_STATE_ID, mavlink
 from flightstack.mavlink.link import Link
 from flightstack.params.vehicle import load_vehicle
 from flightstack.process.exchange_kernel import exchange
-from flightstack.process.lockstep_loop import LockstepLoop
 from flightstack.process.quiet_exchange import ExchangedSteps
 from flightstack.simulator_link.hot_frames import LOCKSTEP_FLAG, ActuatorsFrame
 from flightstack.simulator_link.sensor_frames import BARO, HIL_SENSOR_ID, MAG
 from flightstack.testing import World
 from flightstack.transports.compiled_socket import IS_AVAILABLE
-from flightstack.transports.tcp import LinkClosedError, wait_in_kernel
+from flightstack.transports.tcp import wait_in_kernel
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.server.endpoint import FlightStackEndpoint
 from sim_bridge.server.quiet_exchanges import QuietExchanges
 from sim_bridge.simulator import Simulator
 from tests.support.bytes_engine import BytesEngine
 from tests.support.inertial_sensors import x_quad_with_imus
+from tests.support.message_sockets import messages, socket_pair
 
 pytestmark = pytest.mark.skipif(IS_DISABLED or not IS_AVAILABLE, reason="needs compiled code on Linux")
 
@@ -43,20 +44,8 @@ LATER_NS = 1 << 62
 @pytest.fixture
 def sockets() -> Iterator[tuple[socket.socket, socket.socket]]:
     """The end of the kernel, and that of the test."""
-    ours, others = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    wait_in_kernel(ours)
-    others.setblocking(False)
-    with ours, others:
-        yield ours, others
-
-
-def messages(end: socket.socket) -> list[bytes]:
-    found = []
-    while True:
-        try:
-            found.append(end.recv(4096))
-        except BlockingIOError:
-            return found
+    with socket_pair() as pair:
+        yield pair
 
 
 def fill(end: socket.socket) -> None:
@@ -181,6 +170,22 @@ def test_other_bytes_are_left_to_python_as_they_came(how: str, sockets: Any) -> 
         assert len(messages(others)) == 1  # the answer was sent
 
 
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_a_measurement_that_is_not_finite_is_left_to_python(value: float, sockets: Any) -> None:
+    ours, others = sockets
+    with World(make_engine=BytesEngine, state="estimated") as world:
+        world.run_for(0.11)
+        vehicle = Vehicle(world, ours)
+        vehicle.simulator.apply(vehicle.engine.actuators)
+        vehicle.simulator.sensors.imu_wires[0][4] = value
+        data = bytes(vehicle.simulator.outgoing())
+        before = vehicle.taken()
+        others.send(data)
+        assert vehicle.exchange() == -1
+        assert vehicle.steps.socket.received == data
+        assert vehicle.taken() == before
+
+
 def test_a_state_of_another_time_is_left_to_python(sockets: Any) -> None:
     ours, others = sockets
     with World(make_engine=BytesEngine, state="truth") as world:
@@ -270,7 +275,9 @@ def test_a_simulator_sends_the_bytes_of_the_codecs(kind: str, tmp_path: Any, soc
         times_us = [quiet.simulator.time_us + 2000 * k for k in range(count)]
         for time_us in times_us:
             others.send(answer(time_us))
-        assert quiet.quiet.run(count) == count
+        before = quiet.quiet.count
+        quiet.quiet.run(count)
+        assert quiet.quiet.count - before == count
         assert messages(others) == [codec.exchange(answer(time_us)) for time_us in times_us]
         assert not quiet.quiet.unsent
         assert quiet.quiet.received is None
@@ -299,13 +306,14 @@ def test_other_answers_are_left_to_python_as_they_came(how: str, sockets: Any) -
     count = served.quiet.room()
     before = bytes(served.link.actuators.frame)
     others.send(ANSWERS[how])
-    assert served.quiet.run(count) == 0
+    served.quiet.run(count)
+    assert served.quiet.count == 0
     assert served.quiet.received == ANSWERS[how]
     assert bytes(served.link.actuators.frame) == before
     assert messages(others) == []
 
 
-def test_exchanges_end_at_a_fault_and_at_other_requests(sockets: Any) -> None:
+def test_exchanges_wait_for_replies_and_for_the_next_state(sockets: Any) -> None:
     ours, _ = sockets
     served = Served(load_vehicle("x_quad"), (FS_PLANT_STATE_ID,), ours)
     assert served.quiet.room() > 40
@@ -335,58 +343,6 @@ def test_the_rest_of_a_state_that_is_not_accepted_is_left_to_python() -> None:
         served = Served(load_vehicle("x_quad"), (FS_PLANT_STATE_ID,), ours)
         fill(ours)
         others.send(answer(2000))
-        assert served.quiet.run(served.quiet.room()) == 1
+        served.quiet.run(served.quiet.room())
+        assert served.quiet.count == 1
         assert served.quiet.unsent == bytes(served.simulator.frame.frame)
-
-
-# ---------------------------------------------------------------------- the loop
-
-
-class Peer(NamedTuple):
-    """The simulator's socket, for the loop."""
-
-    socket: socket.socket
-
-    def send(self, data: bytes | memoryview) -> None:
-        self.socket.send(data)
-
-
-def test_ticks_in_lockstep_run_on_up_to_the_deadline(sockets: Any) -> None:
-    """A vehicle on the ground: each call runs an outer period, whose answers are those of ticks in Python."""
-    ours, others = sockets
-    with World(make_engine=BytesEngine, state="truth") as world, World(state="truth") as other:
-        stack, simulator, engine = world.engine.stack, world.engine.simulator, world.engine
-        loop = LockstepLoop(stack, Peer(ours))
-        for period in range(4):
-            for _ in range(4):
-                simulator.apply(engine.actuators)
-                others.send(bytes(simulator.outgoing()))
-            assert loop.run(LATER_NS, 0, may_run_on=True) is None
-            assert loop.serves_ground
-            assert loop.ends_period
-            answers = messages(others)
-            assert len(answers) == 5
-            assert engine.actuators.open(answers[-1])
-            assert stack.now.time_us == (5 * period + 4) * 2000
-            simulator.apply(engine.actuators)
-            assert stack.simulator.receive(memoryview(bytes(simulator.outgoing())))
-        other.run_for(0.04)
-        assert other.engine.stack.now.time_us == stack.now.time_us
-        assert other.engine.stack.now.row.tolist() == stack.now.row.tolist()
-
-
-def test_a_tick_alone_is_run_where_more_may_not(sockets: Any) -> None:
-    ours, others = sockets
-    with World(make_engine=BytesEngine, state="truth") as world:
-        loop = LockstepLoop(world.engine.stack, Peer(ours))
-        assert loop.run(LATER_NS, 0, may_run_on=False) is None
-        assert (len(messages(others)), loop.ends_period, loop.serves_ground) == (1, False, False)
-
-
-def test_the_end_of_the_connection_ends_the_loop(sockets: Any) -> None:
-    ours, others = sockets
-    with World(make_engine=BytesEngine, state="truth") as world:
-        loop = LockstepLoop(world.engine.stack, Peer(ours))
-        others.shutdown(socket.SHUT_WR)
-        with pytest.raises(LinkClosedError):
-            loop.run(LATER_NS, 0, may_run_on=True)

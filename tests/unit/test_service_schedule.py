@@ -131,6 +131,8 @@ def test_own_work_between_two_states_is_no_pause() -> None:
         pace.begin_wait(time_ns)
         pace.note_tick(time_ns + 20_000)
         assert not pace.may_pause()
+        pace.note_tick(time_ns + 4_000_000)  # bytes that were received with the last answer: without a wait
+        assert not pace.may_pause()
 
 
 def test_pause_is_silence_from_the_start_of_a_tick() -> None:
