@@ -1,4 +1,4 @@
-"""Hands the arrays of plant and sensors to the kernel of quiet steps: those in which nothing but these changes."""
+"""Hands the arrays of plant and sensors to the kernel of quiet steps: those without a fault or another message."""
 
 from __future__ import annotations
 

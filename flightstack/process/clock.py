@@ -80,7 +80,7 @@ NO_DURATIONS = Distribution(0.0, 0.0, 0.0)
 
 
 class Durations:
-    """The last ``WINDOW`` durations: eight seconds at 500 Hz."""
+    """The last ``WINDOW`` durations: eight seconds of real time at 500 Hz."""
 
     def __init__(self) -> None:
         self._values = np.zeros(WINDOW)

@@ -31,9 +31,11 @@ class Exchange(NamedTuple):
     """What the kernel needs besides socket and frames, and what it notes."""
 
     answer_at: int
-    """Address of the frame of the answer; then the size of its payload and the last byte of its checksum."""
+    """Address of the frame of the answer."""
     answer_size: int
+    """Of the payload."""
     answer_extra: int
+    """CRC_EXTRA of the answer."""
     interval_us: int
     imu_fields: int
     """Bits of HIL_SENSOR; the next two too."""

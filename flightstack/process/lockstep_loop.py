@@ -23,9 +23,9 @@ class Ran(NamedTuple):
 
     ticks: int
     unsent: memoryview | None
-    """The rest of the newest answer; None if the answer is not sealed yet."""
+    """The rest of the newest answer, empty if all of it was sent; None if it is not sealed yet."""
     received: memoryview | None
-    """Bytes that wait for the link, none at the end of the connection; None without any."""
+    """Bytes that the link is to take, empty if the peer closed the connection; None if nothing was received."""
 
 
 class QuietLockstep:
@@ -88,7 +88,7 @@ class QuietLockstep:
         link = self._stack.simulator
         stamp_us = link.stamp_us
         if self._autopilot.next_outer == 0 and self._lockstep.is_due:
-            ticks = block.run_periods(most(0)) or 1
+            ticks = block.run_periods(most(0)) or 1  # 0: the outer tick alone, in Python
         else:
             steps.commands[:] = self._lockstep.tick(now_ns)
             ticks = 1
@@ -115,7 +115,7 @@ class LockstepLoop:
         self.pace = SimulatorPace()
         """Recognises a simulator that waits between states."""
         self.serves_ground = False
-        """True if the last call of ``run`` ended an outer period, or at its deadline."""
+        """True if the last call of ``run`` ended an outer period, or ran on: ground links may be due."""
 
     @property
     def ends_period(self) -> bool:
@@ -160,9 +160,9 @@ class LockstepLoop:
         return ran.received
 
     def _most(self, next_log_us: int, ticks: int) -> int:
-        """Return the number of ticks after ``ticks`` up to the end of the period at which the log gets something.
+        """Return how many ticks may follow ``ticks``: up to the end of the outer period after which the log is written.
 
-        That is the first outer period that ends after ``next_log_us``, or the present one for a notice of the link.
+        That is the first one that ends after ``next_log_us``, or the present one if the link has a notice.
         """
         left = -(self._answered + ticks) % self._divisor
         if not (ticks or left):  # a period begins

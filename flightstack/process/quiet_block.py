@@ -1,8 +1,8 @@
 """A block of ticks in which nothing is due, as one compiled call on the arrays of the flight stack's parts.
 
-Between two outer ticks, and in outer ticks without an event, there remain simulator, filter and loops. Each part states
-beforehand for how long it has nothing else to do. The parts that then remain are those of any other tick, and write the
-same log. The simulator is in this process, or exchanges its messages with it.
+A tick is quiet if it has no event: then it only runs simulator, filter, guidance and loops. Each other part states
+beforehand for how long it has nothing to do. The kernels are those of any other tick, and write the same log. The
+simulator is in this process, or exchanges its messages with it.
 """
 
 from __future__ import annotations
@@ -254,7 +254,7 @@ class QuietBlock:
         return self._no_log if log is None else log.inner, imu_log or self._no_imu_log
 
     def _room(self, is_taken: bool) -> int:
-        """Return how many ticks ``run`` can run: 0 if a log is full or a fault acts between steps."""
+        """Return how many ticks ``run`` can run: 0 if a log is full, or if the plant's steps need Python."""
         log, imu_log = self._logs()
         steps = min(self._simulator.room(), imu_log.capacity - imu_log.n, self._sensors.room())
         return min(steps + is_taken, log.capacity - log.n)
@@ -266,7 +266,7 @@ class QuietBlock:
         return (self._estimation.quiet_until_us(measures=True) - 1 - time_us) // self._interval_us
 
     def count(self, *, runs_on: bool = False) -> int:
-        """Return how many of the next ticks ``run`` can run, the last one of which is over.
+        """Return how many ticks ``run`` can run after the present one, which is over.
 
         They end before the next outer tick, unless ``runs_on`` and the next outer ticks are nominal.
         """

@@ -18,7 +18,7 @@ from flightstack.transports import compiled_socket
 from flightstack.transports.compiled_socket import CompiledSocket
 
 MOST = 1000
-"""Exchanges of a call."""
+"""Exchanges of a call at most: two seconds of simulated time, which the deadline of the ground links cuts short."""
 
 
 class ExchangedSteps:

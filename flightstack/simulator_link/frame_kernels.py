@@ -46,7 +46,7 @@ class Shape(NamedTuple):
     size: int
     """Of the payload, not truncated."""
     extra: int
-    """Last byte of the checksum."""
+    """CRC_EXTRA, the last byte that goes into the checksum."""
     first_id: int
     """Bytes of the message id."""
     second_id: int

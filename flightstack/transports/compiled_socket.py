@@ -1,7 +1,7 @@
 """A connected socket and the clock for compiled code: system calls without Python between them.
 
-Compiled code calls the C library at its addresses. It waits as long as the socket does, and leaves what it cannot do
-(less than it sends is accepted, a timeout, a signal, a closed connection) to Python.
+Compiled code calls the C library at its addresses. It waits for ``RECEIVE_TIMEOUT_S`` of ``tcp``, and leaves to Python
+what it cannot do: a message that is not accepted whole, a timeout, a signal, a closed connection.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Socket(NamedTuple):
     sent: int
     """Bytes of the newest message that were sent; −1 without one."""
     received: int
-    """Bytes that wait in the inbox; 0 at the end of the connection, −1 for none."""
+    """Bytes that wait in the inbox; 0 if the peer closed the connection, −1 without any (timeout, signal, reset)."""
 
 
 SOCKET = dtype_of(Socket)
@@ -69,7 +69,7 @@ class CompiledSocket:
 
     @property
     def received(self) -> memoryview | None:
-        """Bytes that were received and not taken, empty at the end of the connection; None for none."""
+        """Bytes that were received and not taken, empty if the peer closed the connection; None without any."""
         count = int(self._record["received"][0])
         return None if count < 0 else self.inbox[:count].data
 

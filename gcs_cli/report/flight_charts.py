@@ -256,14 +256,14 @@ def _battery(battery: Series) -> Figure:
 def timing_figures(timings: Sequence[LoopTiming]) -> Iterator[Figure]:
     """Yield execution time, and lateness in real time, of the loops."""
     real_time = bool(timings) and timings[-1].real_time
-    caption = "Time that a tick of the loops took; each point covers one second of wall time."
+    caption = "Time that a tick of the loops took; each point covers the newest 4096 ticks."
     if not timings:
         caption = "No loop timing was received during this flight."
     elif not real_time:
         caption += " In lockstep the loops run as fast as the machine goes; they have no deadline to miss."
     yield _timing("Loop timing: execution of a tick", timings, "execution", caption)
     if real_time:
-        caption = "How late ticks began; each point covers one second of wall time."
+        caption = "How late ticks began; each point covers the newest 4096 ticks."
         yield _timing("Loop timing: lateness of a tick", timings, "lateness", caption)
 
 

@@ -57,7 +57,7 @@ class Text(NamedTuple):
 
 
 class LoopTiming(NamedTuple):
-    """Figures of one second of wall time; ``time_s`` is the flight's, the others are in µs of wall time."""
+    """Figures of the newest 4096 ticks; ``time_s`` is the flight's, the others are in µs of wall time."""
 
     time_s: float
     period_us: float

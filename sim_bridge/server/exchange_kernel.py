@@ -31,10 +31,13 @@ class Exchanges(NamedTuple):
     outbox_at: int
     """Address of the buffer of the messages."""
     state_size: int
-    """Of the payload of the state; then the last byte of the checksum, that of the sensors', and the valid flag."""
+    """Of the payload of the state."""
     state_extra: int
+    """CRC_EXTRA of the state."""
     sensor_extra: int
+    """CRC_EXTRA of HIL_SENSOR."""
     valid_flag: int
+    """Flag of each state; then that of one that touches the ground."""
     contact_flag: int
     lockstep_flag: int
     """Flags of the answers."""
@@ -100,7 +103,7 @@ def serve_steps(
     line: Any, exchanges: Any, answer: Any, shape: Any, state: Any, sensors: Any, outbox: Any, world: Any, count: int,
     time_us: int,
 ) -> None:  # fmt: skip
-    """Make up to ``count`` steps, each after the answer to the state at ``time_us`` or later, and send its messages.
+    """Receive up to ``count`` answers, the first to the state at ``time_us``; make a step after each, and send it.
 
     ``answer`` and ``state`` are frames, ``sensors`` the frames of HIL_SENSOR and the bytes of the measurements, of
     which there are none without sensors.

@@ -23,7 +23,7 @@ from sim_bridge.server.exchange_kernel import EXCHANGES, Exchanges, serve_steps
 from sim_bridge.simulator import Simulator
 
 MOST = 50
-"""Steps of a call: between two calls the process ends at a signal."""
+"""Steps of a call at most: a signal ends the process between two calls."""
 _OUTBOX = 4096
 _NO_FRAME = np.zeros(0, np.uint8)
 
@@ -87,7 +87,9 @@ class QuietExchanges:
         self._socket.clear()
         self._serve(*self._arguments, count, self._simulator.time_us)
         done = Exchanges(*self._record[0].item())
-        self.count += done.steps if done.result <= CONTACT else done.steps - 1
+        self.count += (
+            done.steps if done.result <= CONTACT else done.steps - 1
+        )  # as a step that raises in Python
         if done.steps:
             self._steps.pass_by(done.steps, done.result)
 
@@ -100,7 +102,7 @@ class QuietExchanges:
 
     @property
     def received(self) -> memoryview | None:
-        """Bytes that were received and are not the expected answer, none at the end of the connection; else None."""
+        """Bytes that are not the expected answer, empty if the peer closed the connection; None without any."""
         assert self._socket is not None
         return self._socket.received
 
