@@ -37,8 +37,8 @@ ANSWER_S = 10.0
 _AHEAD, _FEWEST = 2, 2
 """Flights at the scheduler: for each thread of a worker one that is flown and the next one; at least."""
 _TICK_S = 0.1
-_LOOK_S = 1.0
-"""Time between two looks at the cluster's size."""
+_SIZE_S = 1.0
+"""Time between two requests for the size of the cluster."""
 _CLOSE_S = 2.0
 """Longest wait for the end of the connection: without its scheduler Dask tries to connect for a while."""
 _PACKAGE = "flightstack"
@@ -140,7 +140,7 @@ class _Run:
         self._flying: dict[int, Any] = {}
         """Futures of Dask by the number of their cases."""
         self._done: SimpleQueue[int] = SimpleQueue()
-        self._threads, self._next_look_s = 1, -math.inf
+        self._threads, self._next_size_s = 1, -math.inf
         self._seen: set[str] = set()
         """Addresses of workers that were checked."""
         self._has_noted = False
@@ -150,8 +150,8 @@ class _Run:
     def room(self) -> int:
         """Return how many more flights are to be submitted; workers come and go."""
         now_s = time.monotonic()
-        if now_s >= self._next_look_s:
-            self._next_look_s = now_s + _LOOK_S
+        if now_s >= self._next_size_s:
+            self._next_size_s = now_s + _SIZE_S
             with self._losing_scheduler():
                 threads: Mapping[str, int] = self._client.nthreads()
                 if not threads.keys() <= self._seen:
