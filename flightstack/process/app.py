@@ -63,11 +63,10 @@ class App:
         self._process = process
         self._config = config
         self._files = ProcessFiles(process)
-        self.stack = self._files.build(config)
+        self.stack = self._files.build(config, self._prepare_reboot)
         self._files.adopt(self.stack, config)
         if config.lockstep:
             compile_kernels(self.stack)
-        self.stack.ground.vehicle.prepare_reboot = self._prepare_reboot
         self._next: tuple[Stack, StackConfig] | None = None
         self._ground = GroundConnection(process.ports, self.stack.ground)
         self._lockstep = config.lockstep
@@ -148,7 +147,8 @@ class App:
             parse_loops(config.loops).kind == SERIAL
         )  # a serial port opens once: test with other loops
         try:
-            stack = self._files.build(replace(config, loops=PYTHON) if is_exclusive else config)
+            tested = replace(config, loops=PYTHON) if is_exclusive else config
+            stack = self._files.build(tested, self._prepare_reboot)
         except (ConfigError, TargetError) as error:
             complain(f"not rebooted: {error}")
             return f"not rebooted: {error}"
@@ -166,11 +166,10 @@ class App:
         self._ground.detach(time.monotonic())  # sends the acknowledgement of the command
         self._files.close_loops()
         config = reboot_config(old, self._config)
-        new, config = self._next or (self._files.build(config), config)
+        new, config = self._next or (self._files.build(config, self._prepare_reboot), config)
         self._next = None
         self._files.adopt(new, config)
         self.stack = new
-        new.ground.vehicle.prepare_reboot = self._prepare_reboot
         self._ground.attach(new.ground)
         self._next_log_us = 0
         transfer_state(old, new)

@@ -31,7 +31,7 @@ from flightstack.params.vehicle import Vehicle
 from flightstack.process import compile_helper
 from flightstack.process.clock import LoopTiming, Rates, TimingReport, rates
 from flightstack.process.config_check import loops_setup
-from flightstack.services.commands.context import VehicleContext
+from flightstack.services.commands.context import PrepareReboot, VehicleContext, always_reboots
 from flightstack.services.logs.log_store import NO_LOGS, LogStore
 from flightstack.services.routing.hub import GroundHub
 from flightstack.services.telemetry.telemetry import Telemetry
@@ -117,7 +117,11 @@ def kernels_of(config: StackConfig) -> tuple[str, ...]:
 
 
 def build(
-    config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS, make: LoopsMaker = make_loops
+    config: StackConfig,
+    open_log: OpenLog,
+    logs: LogStore = NO_LOGS,
+    prepare_reboot: PrepareReboot = always_reboots,
+    make: LoopsMaker = make_loops,
 ) -> Stack:
     """Build a stack with the loops of ``make`` that serves ``logs`` to ground stations.
 
@@ -130,7 +134,7 @@ def build(
     backend = make(config.loops, setup, config.lockstep)
     compile_helper.finish(with_streams=not config.lockstep)
     try:
-        return _join(config, setup, loop_rates, backend, open_log, logs)
+        return _join(config, setup, loop_rates, backend, open_log, logs, prepare_reboot)
     except BaseException:
         backend.close()  # a target may hold a process or a serial port
         raise
@@ -154,18 +158,18 @@ def _join(
     backend: ControlBackend,
     open_log: OpenLog,
     logs: LogStore,
+    prepare_reboot: PrepareReboot,
 ) -> Stack:
-    vehicle = setup.vehicle
     params, loaded = load_parameters(config, backend)
     behaviour, system_id = behaviour_of(params), int(params.value(SYSTEM_ID))
     info = _log_info(config, setup, loop_rates, backend.version)
     simulator = SimulatorEndpoint(
-        vehicle, config.home, config.lockstep, system_id, loop_rates.interval_us,
+        setup.vehicle, config.home, config.lockstep, system_id, loop_rates.interval_us,
         uses_sensors=config.state == ESTIMATED,
     )  # fmt: skip
     recorder = _recorder(open_log, info, params, simulator, config.home)
     parts = assemble(
-        vehicle, backend, behaviour, config.home, loop_rates.divisor, loop_rates.outer_hz, recorder,
+        setup.vehicle, backend, behaviour, config.home, loop_rates.divisor, loop_rates.outer_hz, recorder,
         simulator.state, simulator.rotor_speed_rad_s, simulator,
     )  # fmt: skip
     parts.warm_up(with_streams=not config.lockstep)
@@ -174,17 +178,17 @@ def _join(
     timing = LoopTiming(round(1e9 / loop_rates.inner_hz))
     report = TimingReport(timing, loop_rates, config.lockstep)
     generic = params.value(AUTOPILOT) == GENERIC
-    vehicle_id = vehicle_info(vehicle, system_id, generic, parts.places.frame)
+    vehicle_id = vehicle_info(setup.vehicle, system_id, generic, parts.places.frame)
 
     def status() -> VehicleStatus:
         sensed = None if estimation is None else estimation.sensed()
         return vehicle_status(vehicle_id, parts, simulator.battery, sensed)
 
     telemetry = Telemetry(status, lambda: parts.now.time_us, report.message, estimation is not None)
-    context = VehicleContext.of(parts, params, simulator, generic, logs)
+    context = VehicleContext.of(parts, params, simulator, generic, logs, prepare_reboot)
     ground = GroundHub(context, parts, telemetry, vehicle_id)
     return Stack(
-        vehicle, loop_rates, simulator, parts, ground, recorder, timing, report, params, loaded, backend, status,
+        setup.vehicle, loop_rates, simulator, parts, ground, recorder, timing, report, params, loaded, backend, status,
         autopilot, estimation,
     )  # fmt: skip
 

@@ -66,7 +66,7 @@ class LogFiles:
 
 
 class FileTail:
-    """A growing file, read from the start; implements ``services.logs.log_stream.LogTail``."""
+    """A growing file, read from the start; implements ``services.logs.log_store.LogTail``."""
 
     def __init__(self, path: Path, is_open: Callable[[], bool]) -> None:
         """Open ``path``; ``is_open`` returns True while it is written. Raise OSError."""

@@ -16,7 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from flightstack.services.logs.log_store import LogInfo
+from flightstack.services.logs.log_store import LogInfo, LogTail
 
 SUFFIX = ".ulg"
 _OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | os.O_CLOEXEC
@@ -108,14 +108,20 @@ class _Known(NamedTuple):
 class LogLibrary:
     """Index of the logs in ``folder``.
 
-    ``own_log`` returns the name of the log that this process writes, or None. At most once per ``SCAN_INTERVAL_S``, new
-    files, recently written ones and the own log are examined; all files once per ``RECENT_S`` and when the own log
-    starts or ends.
+    ``own_log`` returns the name of the log that this process writes, or None; ``open_tail`` opens it for streaming. At
+    most once per ``SCAN_INTERVAL_S``, new files, recently written ones and the own log are examined; all files once per
+    ``RECENT_S`` and when the own log starts or ends.
     """
 
-    def __init__(self, folder: Path, own_log: Callable[[], str | None] = lambda: None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        own_log: Callable[[], str | None] = lambda: None,
+        open_tail: Callable[[], LogTail | None] = lambda: None,
+    ) -> None:
         self._folder = folder
         self._own_log = own_log
+        self.open_tail = open_tail
         self._own: str | None = None
         self._known: dict[str, _Known] = {}
         self._logs: tuple[LogInfo, ...] = ()

@@ -17,6 +17,7 @@ from flightstack.process.log_library import LogLibrary
 from flightstack.process.process_config import ProcessConfig, complain
 from flightstack.process.signing_file import create_key, open_signing, replace_key
 from flightstack.process.state_directory import PLANS_NAME, FileSaver, PlanFile
+from flightstack.services.commands.context import PrepareReboot, always_reboots
 from flightstack.services.logs.log_store import NO_LOGS
 
 
@@ -31,15 +32,13 @@ class ProcessFiles:
         self._plans = None if process.state is None else PlanFile(process.state / PLANS_NAME)
         self._signing: Signing | None = None
 
-    def build(self, config: StackConfig) -> Stack:
+    def build(self, config: StackConfig, prepare_reboot: PrepareReboot = always_reboots) -> Stack:
         """Build a stack for ``adopt``; raise ConfigError, TargetError."""
         if self._params is not None:
             self._params.flush()  # the new stack reads the file
         log = self._process.log
-        stack = build(
-            config, self._open_log, NO_LOGS if log is None else LogLibrary(log.parent, self._own_log)
-        )
-        stack.ground.vehicle.open_log_tail = self._open_tail
+        logs = NO_LOGS if log is None else LogLibrary(log.parent, self._own_log, self._open_tail)
+        stack = build(config, self._open_log, logs, prepare_reboot)
         self._use_signing(stack)
         return stack
 

@@ -53,7 +53,7 @@ def make_services(
     metadata = ComponentMetadata(
         parameters_json(vehicle.params.specs.values()), VENDOR, info.model, __version__
     )
-    log_stream = LogStream(own, lambda: vehicle.open_log_tail(), has_room)  # noqa: PLW0108  # the process sets it later
+    log_stream = LogStream(own, vehicle.logs.open_tail, has_room)
     link_commands = LinkCommands(own, telemetry, peer_at, log_stream, metadata)
     failures = FailureCommands(vehicle.simulator, lambda: parts.now.behaviour.failures_allowed != 0)
     return [

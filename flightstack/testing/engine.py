@@ -87,7 +87,7 @@ class Engine:
             self.config,
             self._open_log,
             self._flight_logs,
-            lambda *choice: self._wrap_loops(make_loops(*choice)),
+            make=lambda *choice: self._wrap_loops(make_loops(*choice)),
         )
 
     def _begin(self) -> None:

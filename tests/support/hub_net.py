@@ -9,6 +9,7 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 from flightstack.params.config import TRUTH, StackConfig
 from flightstack.process.assembly import build
+from flightstack.services.logs.log_store import NO_LOGS, LogStore
 from flightstack.services.routing.peer import PeerAddress
 
 ALICE, BOB = PeerAddress(GROUND, "alice", 1), PeerAddress("api", "bob", 2)
@@ -53,8 +54,8 @@ class Station:
 class Net:
     """A hub without a process, with its own clock; by default vehicle time advances with it."""
 
-    def __init__(self) -> None:
-        stack = build(StackConfig(system_id=7, state=TRUTH), lambda: None)
+    def __init__(self, logs: LogStore = NO_LOGS) -> None:
+        stack = build(StackConfig(system_id=7, state=TRUTH), lambda: None, logs)
         self.stack, self.hub = stack, stack.ground
         stack.now.has_state = True
         self.now_s = 50.0

@@ -9,6 +9,7 @@ import pytest
 from flightstack.core.geodesy import GeoPoint
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.config import DEFAULT_HOME
+from flightstack.services.logs.log_store import NoLogs
 from tests.support.hub_net import ACCEPTED, ALICE, BOB, DENIED, NAN, REJECTED, UNSUPPORTED, Net, Station
 
 SET_HOME, GET_HOME = mavlink.MAV_CMD_DO_SET_HOME, mavlink.MAV_CMD_GET_HOME_POSITION
@@ -135,9 +136,16 @@ class Tail:
         self.closed = True
 
 
-def test_a_log_is_streamed_to_who_asked_until_told_to_stop(net: Net) -> None:
+class OneLog(NoLogs):
+    """A log in progress."""
+
+    def __init__(self, tail: Tail) -> None:
+        self.open_tail = lambda: tail
+
+
+def test_a_log_is_streamed_to_who_asked_until_told_to_stop() -> None:
     tail = Tail()
-    net.hub.vehicle.open_log_tail = lambda: tail
+    net = Net(OneLog(tail))
     alice, bob = net.join(ALICE), net.join(BOB, system=251)
     assert alice.ask(START, 0.0) == ACCEPTED
     net.run(0.1)

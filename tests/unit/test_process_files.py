@@ -89,8 +89,7 @@ def test_failed_build_keeps_current_stack(tmp_path: Path) -> None:
 
 def test_a_reboot_that_cannot_be_prepared_is_refused_with_the_reason(tmp_path: Path) -> None:
     files, config = process_files(tmp_path, signs=False), StackConfig()
-    stack = files.build(config)
-    stack.ground.vehicle.prepare_reboot = lambda: "the parameter file cannot be read"
+    stack = files.build(config, lambda: "the parameter file cannot be read")
     station = Link(255, 190)
     stack.ground.receive(PEER, station.encode(REBOOT), 0.0)
     answers = [m for _, data in stack.ground.poll(0.0) for m in station.decode(data)]

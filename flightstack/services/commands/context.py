@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol, TypeAlias
 
 from flightstack.core.geodesy import LocalFrame
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address
 from flightstack.params.store import ParamStore
-from flightstack.services.logs.log_store import NO_LOGS, LogStore
-from flightstack.services.logs.log_stream import LogTail
+from flightstack.services.logs.log_store import LogStore
 from flightstack.vehicle.assembly import VehicleParts
 from flightstack.vehicle.flight_state import FlightState, Journal
 from flightstack.vehicle.mode_control import Readiness, Takeoff
@@ -77,6 +76,14 @@ class FailureLink(Protocol):
         """Return the MAV_RESULT of the request once; None while there is none."""
 
 
+PrepareReboot: TypeAlias = Callable[[], str | None]
+"""Prepares the reboot of the process; returns the reason that it is not possible, or None."""
+
+
+def always_reboots() -> None:
+    """Return None: a vehicle without a process needs no preparation."""
+
+
 @dataclass
 class VehicleContext:
     """The parts of the vehicle that command handlers use."""
@@ -91,15 +98,12 @@ class VehicleContext:
     frame: LocalFrame
     params: ParamStore
     simulator: FailureLink
-    is_generic: bool = False
+    is_generic: bool
     """True if the vehicle reports MAV_AUTOPILOT_GENERIC (FS_AUTOPILOT); fixed at start."""
+    logs: LogStore
+    prepare_reboot: PrepareReboot
     shutdown_requested: bool = False
     reboot_requested: bool = False
-    prepare_reboot: Callable[[], str | None] = field(default=lambda: None)
-    """Prepare the reboot; return the reason that it is not possible, or None."""
-    logs: LogStore = NO_LOGS
-    open_log_tail: Callable[[], LogTail | None] = field(default=lambda: None)
-    """Open the log in progress for streaming; return None while there is none."""
 
     @classmethod
     def of(
@@ -107,13 +111,14 @@ class VehicleContext:
         parts: VehicleParts,
         params: ParamStore,
         simulator: FailureLink,
-        is_generic: bool = False,
-        logs: LogStore = NO_LOGS,
+        is_generic: bool,
+        logs: LogStore,
+        prepare_reboot: PrepareReboot,
     ) -> VehicleContext:
         """Return the context for the vehicle of ``parts``."""
         return cls(
             parts.now, parts.journal, parts.requests, parts.readiness, parts.mission, parts.area, parts.takeoff,
-            parts.places.frame, params, simulator, is_generic, logs=logs,
+            parts.places.frame, params, simulator, is_generic, logs, prepare_reboot,
         )  # fmt: skip
 
 

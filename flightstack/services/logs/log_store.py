@@ -25,6 +25,23 @@ class LogInfo(NamedTuple):
         return datetime.fromtimestamp(self.time_utc_s, UTC).strftime("%Y-%m-%d")
 
 
+class LogTail(Protocol):
+    """Reader of the log in progress, from its beginning."""
+
+    def read(self, count: int) -> bytes:
+        """Return the next bytes, at most ``count``; none if there are no new ones."""
+        ...
+
+    @property
+    def ended(self) -> bool:
+        """True if the log is complete."""
+        ...
+
+    def close(self) -> None:
+        """Close the reader."""
+        ...
+
+
 class LogStore(Protocol):
     """The logs of one vehicle."""
 
@@ -34,6 +51,10 @@ class LogStore(Protocol):
 
     def open(self, name: str) -> VirtualFile | None:
         """Open a log; return None if the name does not exist. Raise OSError if it cannot be read."""
+        ...
+
+    def open_tail(self) -> LogTail | None:
+        """Open the log in progress to stream it; return None while there is none."""
         ...
 
     def erase(self) -> int:
@@ -51,6 +72,10 @@ class NoLogs:
     def open(self, name: str) -> VirtualFile | None:
         """Return None."""
         return None
+
+    def open_tail(self) -> None:
+        """Return None."""
+        return
 
     def erase(self) -> int:
         """Erase nothing."""

@@ -8,34 +8,17 @@ until it is acknowledged. Data follows in LOGGING_DATA without acknowledgement. 
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from typing import Protocol
 
 from flightstack.flight_log.ulog import DEFINITION_TYPES, HEADER_SIZE, MESSAGE_HEADER
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Message, is_for, sender
+from flightstack.services.logs.log_store import LogTail
 from flightstack.services.rate_limit import RateLimit, always_has_room
 
 CHUNK = 249
 NO_MESSAGE_BEGINS = 255
 RESEND_S = 0.25
 GIVE_UP_S = 5.0
-
-
-class LogTail(Protocol):
-    """Reader of the log in progress, from its beginning."""
-
-    def read(self, count: int) -> bytes:
-        """Return the next bytes, at most ``count``; none if there are no new ones."""
-        ...
-
-    @property
-    def ended(self) -> bool:
-        """True if the log is complete."""
-        ...
-
-    def close(self) -> None:
-        """Close the reader."""
-        ...
 
 
 class _Boundaries:
