@@ -7,10 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from flightstack.commander.failsafe import RULES, Action, Failsafe, action_of
-from flightstack.estimation.health import EstimateHealth
-from flightstack.estimation.imu_track import IMU_MISSING_S
+from flightstack.core.compiled import compiled, plain
+from flightstack.core.record_types import dtype_of
+from flightstack.estimation.health import EstimateHealth, WatchArray, update_health
+from flightstack.estimation.imu_track import IMU_MISSING_S, TrackArray
+from flightstack.estimation.memory import MemoryArray
 from flightstack.params.behaviour import Behaviour
 
 MISSING_S = 1.0
@@ -60,19 +64,78 @@ def estimate_refusals(health: EstimateHealth | None, behaviour: Behaviour) -> tu
     return (*reasons, *(f"{rule.begins[0].lower()}{rule.begins[1:]}" for rule in acting))
 
 
+class EstimateLimits(NamedTuple):
+    """Limits of the estimate in flight [1σ]; zero or less is none, but for the velocity."""
+
+    position_m: float
+    dead_reckoning_s: float
+    tilt_rad: float
+    velocity_m_s: float
+
+
+LIMITS = dtype_of(EstimateLimits)
+
+
+def limits_of(behaviour: Behaviour) -> EstimateLimits:
+    """Return the limits of the parameters."""
+    return EstimateLimits(
+        behaviour.position_accuracy_m,
+        behaviour.dead_reckoning_s,
+        math.radians(behaviour.tilt_accuracy_deg),
+        behaviour.velocity_accuracy_m_s,
+    )
+
+
+_FAILSAFES = (
+    Failsafe.IMU_FAULT,
+    Failsafe.ATTITUDE_DOUBTFUL,
+    Failsafe.POSITION_LOST,
+    Failsafe.GNSS_REFUSED,
+)
+"""Failsafes of the first bits of ``facts_of``."""
+
+
+@compiled
+def facts_of(h: Any, limits: Any, mag_fault: int) -> int:
+    """Return a bit for each fact of a health that the vehicle acts on.
+
+    These are the conditions of ``_FAILSAFES``, an unknown velocity, a fault of the magnetometer and of the barometer.
+    """
+    bits: int = 0
+    if h.imu_age_s > IMU_MISSING_S or h.imu_is_stuck:
+        bits |= 1
+    if h.tilt_rad > limits.tilt_rad > 0.0:
+        bits |= 2
+    if h.unaided_s > limits.dead_reckoning_s or h.is_inaccurate or h.lag_s > LATE_S:
+        bits |= 4
+    if h.refused_s > REFUSED_S:
+        bits |= 8
+    if h.velocity_m_s > limits.velocity_m_s:
+        bits |= 16
+    if mag_fault != 0:
+        bits |= 32
+    if h.baro_is_stuck or h.baro_age_s > MISSING_S:
+        bits |= 64
+    return bits
+
+
+@compiled
+def watch_estimate(
+    memory: MemoryArray, watch: WatchArray, track: TrackArray, limits: Any, has_origin: bool, time_s: float
+) -> int:
+    """Update the health after a sample of the inertial sensor at ``time_s``; return the facts of it.
+
+    ``track`` has the sample; ``limits`` is an array of one ``EstimateLimits``.
+    """
+    newest = watch[0]["newest"]
+    newest["imu_s"], newest["repeats"] = time_s, track[0]["repeats"]
+    update_health(memory, watch, has_origin, limits[0]["position_m"], time_s)
+    return facts_of(watch[0]["health"], limits[0], memory[0]["flags"]["mag_fault"])
+
+
 def estimate_failsafes(health: EstimateHealth | None, behaviour: Behaviour) -> frozenset[Failsafe]:
     """Return the conditions of failsafes in flight."""
     if health is None:
         return frozenset()
-    b = behaviour
-    is_off = health.is_inaccurate or health.lag_s > LATE_S
-    conditions = (
-        (Failsafe.IMU_FAULT, health.imu_age_s > IMU_MISSING_S or health.imu_is_stuck),
-        (Failsafe.ATTITUDE_DOUBTFUL, health.tilt_rad > math.radians(b.tilt_accuracy_deg) > 0.0),
-        (
-            Failsafe.POSITION_LOST,
-            health.unaided_s > b.dead_reckoning_s or is_off,
-        ),
-        (Failsafe.GNSS_REFUSED, health.refused_s > REFUSED_S),
-    )
-    return frozenset(failsafe for failsafe, holds in conditions if holds)
+    bits = plain(facts_of)(health, limits_of(behaviour), 0)
+    return frozenset(failsafe for at, failsafe in enumerate(_FAILSAFES) if bits >> at & 1)

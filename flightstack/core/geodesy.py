@@ -43,6 +43,11 @@ class LocalFrame:
         self._north_m_per_deg = math.radians(meridian_m)
         self._east_m_per_deg = math.radians(max(parallel_m, 1e-6))
 
+    @property
+    def scales(self) -> tuple[float, float]:
+        """Metres per degree to the north and to the east."""
+        return self._north_m_per_deg, self._east_m_per_deg
+
     def to_ned(self, point: GeoPoint) -> Vector3:
         """Return the NED position [m] of a geodetic point relative to the origin."""
         east_deg = (point.longitude_deg - self.origin.longitude_deg + 180.0) % 360.0 - 180.0

@@ -15,10 +15,11 @@ _Field: TypeAlias = tuple[str, Any] | tuple[str, Any, tuple[int, ...]]
 def dtype_of(kind: type) -> np.dtype[np.void]:
     """Return the dtype of a record with the fields of the NamedTuple ``kind``; raise TypeError for another annotation.
 
-    A field ``float`` or ``int`` is a number, float64 or int64, and ``Annotated[FloatArray, N, …]`` an array of them of
-    that shape. ``Annotated[Record, Kind]`` is a record in the record, ``Annotated[RecordArray, Kind, N]`` an array of
-    records. A NamedTuple of floats is a row of them, which ``kind(*as_tuple(record[name], size))`` reads. The fields of
-    a NamedTuple of arrays stand in the record themselves; in C they are a structure within that of the record.
+    A field ``float``, ``int`` or ``bool`` is a float64, an int64 or a byte, and ``Annotated[FloatArray, N, …]`` an
+    array of floats of that shape. ``Annotated[Record, Kind]`` is a record in the record, ``Annotated[RecordArray,
+    Kind, N]`` an array of records. A NamedTuple of floats is a row of them, which ``kind(*as_tuple(record[name],
+    size))`` reads. The fields of a NamedTuple of arrays stand in the record themselves; in C they are a structure
+    within that of the record.
     """
     return np.dtype(_fields(kind))
 
@@ -40,7 +41,7 @@ def _fields(kind: type) -> list[_Field]:
     return fields
 
 
-_NUMBERS: dict[Any, str] = {float: "f8", int: "i8"}
+_NUMBERS: dict[Any, str] = {float: "f8", int: "i8", bool: "?"}
 _ITEMS: dict[Any, str] = {np.float64: "f8", np.int64: "i8"}
 
 
@@ -54,5 +55,5 @@ def _field(kind: type, name: str, hint: Any) -> _Field:
     items = get_args(get_args(base)[1])[0] if len(get_args(base)) > 1 else None
     item = inner if items is np.void else None if inner is not None else _ITEMS.get(items)
     if item is None or not shape or not all(type(size) is int and size > 0 for size in shape):
-        raise TypeError(f"{kind.__name__}.{name}: annotate it: float, int or Annotated[FloatArray, N]")
+        raise TypeError(f"{kind.__name__}.{name}: annotate it: float, int, bool or Annotated[FloatArray, N]")
     return name, item, tuple(shape)

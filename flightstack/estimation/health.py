@@ -19,7 +19,7 @@ from flightstack.estimation.kalman import (
 )
 from flightstack.estimation.memory import MemoryArray, MemoryRecord
 from flightstack.estimation.sensor_feed import NewestSamples
-from flightstack.estimation.sensor_samples import BaroSample, GnssFix
+from flightstack.estimation.sensor_samples import GnssFix
 
 SMOOTHING = 0.1
 """Share of the newest test ratio in its mean."""
@@ -98,6 +98,7 @@ class HealthSummary(NamedTuple):
 
 
 SUMMARY = dtype_of(HealthSummary)
+SummaryRecord: TypeAlias = Annotated[Record, HealthSummary]
 SummaryArray: TypeAlias = Annotated[RecordArray, HealthSummary]
 """An array of one summary, shape (1,)."""
 
@@ -120,9 +121,8 @@ def _mean_ratio(mean: float, m: MemoryRecord, first: int, count: int) -> float:
 
 
 @compiled
-def health_kernel(memory: MemoryArray, summary: SummaryArray) -> None:
+def _summarise(m: MemoryRecord, s: SummaryRecord) -> None:
     """Write the summary of an estimator's record; it holds the mean ratios of the last call."""
-    m, s = memory[0], summary[0]
     p, o, x = m["covariance"], m["observations"], m["nominal"]
     position_s = min(o[GNSS_POSITION]["fused_s"], o[GNSS_POSITION + 1]["fused_s"])
     velocity_s = min(o[GNSS_VELOCITY]["fused_s"], o[GNSS_VELOCITY + 1]["fused_s"])
@@ -137,6 +137,12 @@ def health_kernel(memory: MemoryArray, summary: SummaryArray) -> None:
     s["position_ratio"] = _mean_ratio(s["position_ratio"], m, GNSS_POSITION, 2)
     s["height_ratio"] = _mean_ratio(s["height_ratio"], m, BARO, 1)
     s["heading_ratio"] = _mean_ratio(s["heading_ratio"], m, MAG, 3)
+
+
+@compiled
+def health_kernel(memory: MemoryArray, summary: SummaryArray) -> None:
+    """Write the summary of an estimator's memory, as the target does."""
+    _summarise(memory[0], summary[0])
 
 
 class PressureTrack(NamedTuple):
@@ -154,28 +160,37 @@ class PressureTrack(NamedTuple):
     repeats: int = 0
     """Pressures on the ground that equal the last one, in turn."""
 
-    def is_stuck(self, landed: bool, height_m: float, time_s: float) -> bool:
-        """Return True if the pressure should have changed: by its noise, or in a climb or descent."""
-        if landed:
-            should_change = self.changes == NOISY
-        else:
-            should_change = not self.is_ideal or abs(height_m - self.height_m) > CLIMBED_M
-        return should_change and time_s - self.equal_since_s > STUCK_S
+
+@compiled
+def is_stuck(track: PressureTrack, landed: bool, height_m: float, time_s: float) -> bool:
+    """Return True if the pressure should have changed: by its noise, or in a climb or descent."""
+    if landed:
+        should_change = track.changes == NOISY
+    else:
+        should_change = not track.is_ideal or abs(height_m - track.height_m) > CLIMBED_M
+    return should_change and time_s - track.equal_since_s > STUCK_S
 
 
+@compiled
 def pressure_step(
     memory: PressureTrack, pressure_hpa: float, landed: bool, height_m: float, time_s: float
 ) -> PressureTrack:
     """Compare a pressure with the last one; changes count at rest, where those of a barometer are its noise."""
     if pressure_hpa != memory.pressure_hpa:
         changes = min(memory.changes + 1, NOISY) if landed else memory.changes
-        return PressureTrack(pressure_hpa, time_s, height_m, changes, memory.is_ideal and changes < NOISY)
+        return PressureTrack(pressure_hpa, time_s, height_m, changes, memory.is_ideal and changes < NOISY, 0)
     if not landed or memory.changes == NOISY:
         return memory
     repeats = memory.repeats + 1
-    if repeats < IDEAL:
-        return memory._replace(height_m=height_m, repeats=repeats)
-    return memory._replace(changes=0, height_m=height_m, is_ideal=True, repeats=repeats)
+    is_ideal = repeats >= IDEAL
+    return PressureTrack(
+        memory.pressure_hpa,
+        memory.equal_since_s,
+        height_m,
+        0 if is_ideal else memory.changes,
+        is_ideal or memory.is_ideal,
+        repeats,
+    )
 
 
 class Accuracy(NamedTuple):
@@ -185,13 +200,98 @@ class Accuracy(NamedTuple):
     exceeded_s: float = 0.0
 
 
+@compiled
 def accuracy_step(memory: Accuracy, deviation_m: float, limit_m: float, time_s: float) -> Accuracy:
     """Compare a deviation with its limit, with hysteresis; a limit of zero or less is none."""
     if limit_m <= 0.0:
-        return Accuracy()
+        return Accuracy(False, 0.0)
     if deviation_m > limit_m * (ACCURATE_SHARE if memory.is_inaccurate else 1.0):
         return Accuracy(True, time_s)
     return Accuracy(memory.is_inaccurate and time_s - memory.exceeded_s < ACCURATE_S, memory.exceeded_s)
+
+
+class Newest(NamedTuple):
+    """Newest measurements. Times [s] are minus infinity without one."""
+
+    imu_s: float
+    repeats: int
+    """Number of successive samples of the inertial sensor that repeat the one before."""
+    mag_s: float
+    baro_s: float
+    pressure_hpa: float
+    fix_s: float
+    """Of the newest sample of GNSS, if it has a three-dimensional fix."""
+
+
+class HealthWatch(NamedTuple):
+    """Memory of the health of one estimator."""
+
+    newest: Annotated[Record, Newest]
+    summary: Annotated[Record, HealthSummary]
+    pressure: Annotated[Record, PressureTrack]
+    compared_s: float
+    """Time of the last pressure in ``pressure``."""
+    accuracy: Annotated[Record, Accuracy]
+    health: Annotated[Record, EstimateHealth]
+
+
+WATCH = dtype_of(HealthWatch)
+WatchRecord: TypeAlias = Annotated[Record, HealthWatch]
+WatchArray: TypeAlias = Annotated[RecordArray, HealthWatch]
+"""An array of one such record, shape (1,)."""
+
+
+@compiled
+def _baro_is_stuck(m: MemoryRecord, w: WatchRecord, time_s: float) -> bool:
+    """Compare the newest pressure with the last one, which the health may be newer than."""
+    newest, p = w["newest"], w["pressure"]
+    if newest["baro_s"] == -math.inf:
+        return False
+    landed, height_m = m["flags"]["landed"] != 0, -m["state"][2]
+    track = PressureTrack(
+        p["pressure_hpa"], p["equal_since_s"], p["height_m"], p["changes"], p["is_ideal"], p["repeats"]
+    )
+    if newest["baro_s"] != w["compared_s"]:
+        track = pressure_step(track, newest["pressure_hpa"], landed, height_m, time_s)
+        p["pressure_hpa"], p["equal_since_s"], p["height_m"] = (
+            track.pressure_hpa,
+            track.equal_since_s,
+            track.height_m,
+        )
+        p["changes"], p["is_ideal"], p["repeats"] = track.changes, track.is_ideal, track.repeats
+        w["compared_s"] = newest["baro_s"]
+    return is_stuck(track, landed, height_m, time_s)
+
+
+@compiled
+def update_health(
+    memory: MemoryArray, watch: WatchArray, has_origin: bool, limit_m: float, time_s: float
+) -> None:
+    """Write the health at ``time_s``; ``limit_m`` is that of the horizontal deviation, -1 for none."""
+    m, w = memory[0], watch[0]
+    h, s, a, newest = w["health"], w["summary"], w["accuracy"], w["newest"]
+    _summarise(m, s)
+    accuracy = accuracy_step(
+        Accuracy(a["is_inaccurate"], a["exceeded_s"]), s["horizontal_m"], limit_m, time_s
+    )
+    a["is_inaccurate"], a["exceeded_s"] = accuracy.is_inaccurate, accuracy.exceeded_s
+    fix_age_s = time_s - newest["fix_s"]
+    h["aligned"], h["has_origin"] = m["flags"]["aligned"] != 0, has_origin
+    h["imu_age_s"], h["imu_is_stuck"] = time_s - newest["imu_s"], newest["repeats"] >= STUCK_SAMPLES
+    h["mag_age_s"], h["baro_age_s"], h["fix_age_s"] = (
+        time_s - newest["mag_s"],
+        time_s - newest["baro_s"],
+        fix_age_s,
+    )
+    h["baro_is_stuck"] = _baro_is_stuck(m, w, time_s)
+    h["unaided_s"] = s["unaided_s"] if has_origin else math.inf
+    h["refused_s"] = s["refused_s"] if has_origin and fix_age_s < MISSING_FIX_S else 0.0
+    h["is_inaccurate"] = accuracy.is_inaccurate
+    h["lag_s"], h["tilt_rad"] = s["lag_s"], s["tilt_rad"]
+    h["horizontal_m"], h["velocity_m_s"] = s["horizontal_m"], s["velocity_m_s"]
+    h["gyro_bias_rad_s"], h["accel_bias_m_s2"] = s["gyro_bias_rad_s"], s["accel_bias_m_s2"]
+    h["velocity_ratio"], h["position_ratio"] = s["velocity_ratio"], s["position_ratio"]
+    h["height_ratio"], h["heading_ratio"] = s["height_ratio"], s["heading_ratio"]
 
 
 class HealthMonitor:
@@ -200,56 +300,34 @@ class HealthMonitor:
     def __init__(self, memory: RecordArray) -> None:
         """``memory`` is the estimator's, shape (1,)."""
         self._memory = memory
-        self._flags: Record = memory["flags"][0]
-        self._state: FloatArray = memory["state"][0]
-        self._summary = np.zeros(1, SUMMARY)
-        self._accuracy = Accuracy()
-        self._pressure = PressureTrack()
-        self._baro: BaroSample | None = None
-        self._summarise = direct(health_kernel, memory, self._summary)
+        self.watch: RecordArray = np.zeros(1, WATCH)
+        """Memory of the health, shape (1,)."""
+        self.watch["pressure"]["pressure_hpa"] = self.watch["compared_s"] = math.nan
+        self._newest: RecordArray = self.watch["newest"]
+        self._health: Record = self.watch["health"][0]
+        self._update = direct(update_health, memory, self.watch, False, 0.0, 0.0)
+
+    def take(self, samples: NewestSamples) -> None:
+        """Note the newest measurements."""
+        imu, mag, baro, gnss = samples.imu, samples.mag, samples.baro, samples.gnss
+        has_fix = gnss is not None and gnss.fix_type >= GnssFix.FIX_3D
+        self._newest[0] = Newest(
+            -math.inf if imu is None else imu.time_s,
+            samples.imu_track.repeats,
+            -math.inf if mag is None else mag.time_s,
+            -math.inf if baro is None else baro.time_s,
+            math.nan if baro is None else baro.pressure_hpa,
+            gnss.time_s if gnss is not None and has_fix else -math.inf,
+        )
 
     def update(
         self, samples: NewestSamples, has_origin: bool, limit_m: float, time_s: float
     ) -> EstimateHealth:
         """Return the health at ``time_s``; ``limit_m`` is that of the horizontal deviation, -1 for none."""
-        self._summarise(self._memory, self._summary)
-        summary = HealthSummary(*self._summary.tolist()[0])
-        self._accuracy = accuracy_step(self._accuracy, summary.horizontal_m, limit_m, time_s)
-        fix_age_s, imu = _fix_age_s(samples, time_s), samples.imu
-        return EstimateHealth(
-            bool(self._flags["aligned"]),
-            has_origin,
-            math.inf if imu is None else time_s - imu.time_s,
-            samples.imu_track.repeats >= STUCK_SAMPLES,
-            math.inf if samples.mag is None else time_s - samples.mag.time_s,
-            math.inf if samples.baro is None else time_s - samples.baro.time_s,
-            self._baro_is_stuck(samples.baro, time_s),
-            fix_age_s,
-            summary.unaided_s if has_origin else math.inf,
-            summary.refused_s if has_origin and fix_age_s < MISSING_FIX_S else 0.0,
-            self._accuracy.is_inaccurate,
-            summary.lag_s,
-            summary.horizontal_m,
-            summary.velocity_m_s,
-            summary.tilt_rad,
-            summary.gyro_bias_rad_s,
-            summary.accel_bias_m_s2,
-            summary.velocity_ratio,
-            summary.position_ratio,
-            summary.height_ratio,
-            summary.heading_ratio,
-        )
+        self.take(samples)
+        self._update(self._memory, self.watch, has_origin, limit_m, time_s)
+        return self.health()
 
-    def _baro_is_stuck(self, baro: BaroSample | None, time_s: float) -> bool:
-        if baro is None:
-            return False
-        landed, height_m = bool(self._flags["landed"]), -float(self._state[2])
-        if baro is not self._baro:  # the health may be newer than the pressure
-            self._pressure = pressure_step(self._pressure, baro.pressure_hpa, landed, height_m, time_s)
-        self._baro = baro
-        return self._pressure.is_stuck(landed, height_m, time_s)
-
-
-def _fix_age_s(samples: NewestSamples, time_s: float) -> float:
-    gnss = samples.gnss
-    return math.inf if gnss is None or gnss.fix_type < GnssFix.FIX_3D else time_s - gnss.time_s
+    def health(self) -> EstimateHealth:
+        """Return the health of the last update."""
+        return EstimateHealth(*self._health.item())

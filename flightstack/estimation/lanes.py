@@ -106,6 +106,19 @@ class Lanes:
         self._take_over(change(self.selection, best, time_us * 1e-6, "is missing" if is_late else "is stuck"))
         return True
 
+    @property
+    def watch(self) -> RecordArray:
+        """Memory of the health of the first estimator."""
+        return self._monitors[0].watch
+
+    def begin_watch(self) -> None:
+        """Note the newest measurements of the first estimator: a kernel is to update its health."""
+        self._monitors[0].take(self._feed.lanes[0].newest)
+
+    def watched(self) -> EstimateHealth:
+        """Return the health that a kernel has updated."""
+        return self._monitors[0].health()
+
     def update(self, has_origin: bool, limit_m: float, time_us: int) -> tuple[EstimateHealth, bool]:
         """Compare all lanes at 20 Hz; return the health of the selected one, and True if another one was selected.
 

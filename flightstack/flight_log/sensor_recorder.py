@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from flightstack.core.compiled import plain
-from flightstack.core.contract import FloatArray, Vector3
+from flightstack.core.contract import FloatArray
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.periods import next_due
 from flightstack.estimation.sensed import Sensed
@@ -26,7 +26,7 @@ from flightstack.flight_log.estimator_topics import (
 from flightstack.flight_log.flight_log import FlightLog, Trace
 from flightstack.flight_log.local_position import fill_local_position
 from flightstack.flight_log.recorder import FlightRecorder
-from flightstack.flight_log.sensor_rows import store_truth
+from flightstack.flight_log.sensor_rows import store_global, store_truth
 from flightstack.flight_log.sensor_topics import (
     BARO_GROUP,
     GNSS_GROUP,
@@ -66,6 +66,8 @@ class SensorRecorder:
         """``frame`` is the vehicle's local frame; ``home`` is the origin of the true position."""
         self._recorder = recorder
         self._frame, self._true_frame = frame, LocalFrame(home)
+        self.place: FloatArray = np.array((*home, *self._true_frame.scales))
+        """Origin of the true position, as ``store_global`` takes it."""
         self.offset_m: FloatArray = np.zeros(3)
         """Of the true frame's origin in the vehicle's [m NED].
 
@@ -98,14 +100,14 @@ class SensorRecorder:
         return None if self._log is None else self._log.sampled[group.name]
 
     @property
-    def truth_due_us(self) -> int:
-        """Time from which ``state`` records the true state."""
-        return NEVER_US if self._log is None else self._truth_us
+    def truth_due_us(self) -> tuple[int, int]:
+        """Times from which ``state`` records the true state, and its place on the earth."""
+        return (NEVER_US, NEVER_US) if self._log is None else (self._truth_us, self._global_us)
 
     def due_us(self, with_truth: bool) -> int:
         """Return the time from which ``state`` records something; 0 for a new log.
 
-        Without ``with_truth``, something besides the rows of ``TRUTH_GROUP``.
+        Without ``with_truth``, something besides the true state.
         """
         if self._recorder.log is not self._log:
             return 0
@@ -113,11 +115,11 @@ class SensorRecorder:
             return self._local_us
         if with_truth:
             return min(self._local_us, self._truth_us)
-        return min(self._local_us, self._global_us, self._estimator_us)
+        return min(self._local_us, self._estimator_us)
 
-    def pass_by(self, truth_due_us: int) -> None:
-        """Follow the rows of ``TRUTH_GROUP`` that a kernel recorded: the next one is due at ``truth_due_us``."""
-        self._truth_us = truth_due_us
+    def pass_by(self, truth_due_us: tuple[int, int]) -> None:
+        """Follow the rows of the true state that a kernel recorded: the next ones are due at ``truth_due_us``."""
+        self._truth_us, self._global_us = truth_due_us
 
     def sample(self, sample: Sample) -> None:
         """Record a sample of another sensor that the estimator takes."""
@@ -164,5 +166,4 @@ class SensorRecorder:
         plain(store_truth)(log.sampled[TRUTH_GROUP.name].append(time_us), truth, self.offset_m)
         if time_us >= self._global_us:
             self._global_us = next_due(time_us, GLOBAL_INTERVAL_US)
-            place = self._true_frame.to_geo(Vector3(*truth[:3].tolist()))
-            log.sampled[TRUTH_GLOBAL_GROUP.name].append(time_us)[:] = place
+            plain(store_global)(log.sampled[TRUTH_GLOBAL_GROUP.name].append(time_us), truth, self.place)

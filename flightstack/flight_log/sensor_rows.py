@@ -32,3 +32,15 @@ def store_truth(row: FloatArray, state: FloatArray, offset_m: FloatArray) -> Non
         row[i] = state[i]
     for i in range(3):
         row[i] += offset_m[i]
+
+
+@compiled
+def store_global(row: FloatArray, state: FloatArray, place: FloatArray) -> None:
+    """Fill a row of ``TRUTH_GLOBAL_GROUP``, as ``LocalFrame.to_geo`` does.
+
+    ``place`` is the origin: latitude and longitude [°], altitude [m], metres per degree to the north and to the east.
+    """
+    longitude_deg = place[1] + state[1] / place[4]
+    if abs(longitude_deg) > 180.0:  # beyond the date line
+        longitude_deg = (longitude_deg + 180.0) % 360.0 - 180.0
+    row[0], row[1], row[2] = place[0] + state[0] / place[3], longitude_deg, place[2] - state[2]

@@ -53,7 +53,7 @@ _KERNELS = (
     "follow_rotors", "detect", "fence_step", "store_outer_row", "outer_heading", "euler_rad",
 )  # fmt: skip
 _LOOP_KERNELS = ("inner_kernel", "outer_kernel")
-_ESTIMATOR_KERNELS = ("imu_kernel", "push_kernel", "field_kernel", "health_kernel")
+_ESTIMATOR_KERNELS = ("imu_kernel", "push_kernel", "field_kernel", "update_health")
 _REAL_TIME_KERNELS = ("stream_kernel",)
 """Kernels that a vehicle in lockstep compiles or loads at their first use."""
 

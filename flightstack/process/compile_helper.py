@@ -18,12 +18,14 @@ from typing import Any
 
 import numpy as np
 
+from flightstack.commander.estimate_checks import LIMITS, watch_estimate
 from flightstack.commander.failsafe_monitor import FailsafeMonitor
 from flightstack.core.compiled import IS_DISABLED, direct
 from flightstack.core.contract import STATE_SIZE
 from flightstack.core.kernel_cache import is_shared
 from flightstack.estimation.delayed_filter import field_kernel, push_kernel
-from flightstack.estimation.health import SUMMARY, health_kernel
+from flightstack.estimation.health import HealthMonitor
+from flightstack.estimation.imu_track import ImuTrack
 from flightstack.estimation.memory import MEMORY
 from flightstack.estimation.rings import MAG_RING
 from flightstack.flight_log.recorder import FlightRecorder
@@ -133,7 +135,8 @@ def compile_commander() -> None:
 def compile_estimator() -> None:
     """Compile the kernels of the estimator besides that of the IMU, which takes longer than all others."""
     memory = np.zeros(1, MEMORY)
-    direct(health_kernel, memory, np.zeros(1, SUMMARY))
+    watch = HealthMonitor(memory).watch
+    direct(watch_estimate, memory, watch, ImuTrack().memory, np.zeros(1, LIMITS), False, 0.0)
     direct(push_kernel, memory, MAG_RING, np.zeros(4))
     direct(field_kernel, memory)
 

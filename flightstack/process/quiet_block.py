@@ -12,6 +12,7 @@ from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
+from flightstack.commander.estimate_checks import LIMITS, watch_estimate
 from flightstack.commander.fault_detector import follow_rotors
 from flightstack.control.loops import PythonLoops
 from flightstack.core.compiled import IS_DISABLED, direct
@@ -20,16 +21,24 @@ from flightstack.core.kernel_calls import address_of, as_bytes
 from flightstack.estimation.delayed_filter import imu_kernel, push_kernel
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.filter_core import PythonCore
+from flightstack.estimation.health import WATCH
 from flightstack.estimation.imu_track import RECORD_SIZE, take_wire
 from flightstack.estimation.rings import MAG_RING
 from flightstack.estimation.sensor_samples import BaroSample, MagSample
 from flightstack.flight_log.flight_log import DEFAULT_CAPACITY, Trace
-from flightstack.flight_log.sensor_recorder import NEVER_US, TRUTH_INTERVAL_US
-from flightstack.flight_log.sensor_topics import BARO_GROUP, IMU_GROUP, MAG_GROUP, TRUTH_GROUP
+from flightstack.flight_log.sensor_recorder import GLOBAL_INTERVAL_US, NEVER_US, TRUTH_INTERVAL_US
+from flightstack.flight_log.sensor_topics import (
+    BARO_GROUP,
+    IMU_GROUP,
+    MAG_GROUP,
+    TRUTH_GLOBAL_GROUP,
+    TRUTH_GROUP,
+)
 from flightstack.process.assembly import Stack
 from flightstack.process.quiet_outer import QuietOuter
 from flightstack.simulator_link.hot_frames import VALID_FLAG
-from flightstack.simulator_link.sensor_frames import HIL_VALUES, HilValues
+from flightstack.simulator_link.sensor_frames import HIL_VALUES
+from flightstack.vehicle.estimation import HEALTH_US
 from flightstack.vehicle.quiet_kernel import (
     QUIET_CALLS,
     QUIET_COUNTERS,
@@ -37,13 +46,13 @@ from flightstack.vehicle.quiet_kernel import (
     QuietCounters,
     fly_quiet_ticks,
 )
-from flightstack.vehicle.slow_kernel import SLOW_MARKS
+from flightstack.vehicle.slow_kernel import SLOW_MARKS, SlowMarks
 
 _Arguments: TypeAlias = tuple[Any, ...]
 """Arguments of the kernel for one part."""
 
 
-_GROUPS = (MAG_GROUP, BARO_GROUP, TRUTH_GROUP)
+_GROUPS = (MAG_GROUP, BARO_GROUP, TRUTH_GROUP, TRUTH_GLOBAL_GROUP)
 """In the order of the kernel's counters of new rows."""
 
 
@@ -111,7 +120,7 @@ def _estimates(stack: Stack) -> list[_Arguments]:
 
 
 class QuietSensors:
-    """The sensors that are not inertial, and the log of the truth, of a vehicle that flies on its sensors.
+    """The sensors that are not inertial, health, and the log of the truth, of a vehicle that flies on its sensors.
 
     Of one that flies on the true state: nothing is due.
     """
@@ -119,19 +128,22 @@ class QuietSensors:
     def __init__(self, stack: Stack, values: SingleArray, news: RecordArray) -> None:
         """``values`` and ``news`` are those of ``QuietSimulator``."""
         estimation = self._estimation = stack.estimation
-        self._values = values
         self._no_traces = [Trace(DEFAULT_CAPACITY, group.columns, lambda: None) for group in _GROUPS]
         self._marks = np.zeros(1, SLOW_MARKS)
-        self._marks["truth_us"] = NEVER_US
-        self.push = 0
-        """Address of the kernel that gives a filter a measurement."""
-        offset_m = np.zeros(3)
+        self._marks["truth_us"] = self._marks["global_us"] = self._marks["health_us"] = NEVER_US
+        self.push = self.watch = 0
+        """Addresses of the kernels that give a filter a measurement, and update the health."""
+        offset_m, place, watch, limits = np.zeros(3), np.zeros(5), np.zeros(1, WATCH), np.zeros(1, LIMITS)
         if estimation is not None:
-            self.push = address_of(push_kernel, estimation.estimators[0].memory, MAG_RING, np.zeros(4))
-            offset_m = estimation.recorder.offset_m
+            memory, track = estimation.estimators[0].memory, estimation.feed.lanes[0].newest.imu_track
+            watch, limits = estimation.watch, estimation.limits
+            self.push = address_of(push_kernel, memory, MAG_RING, np.zeros(4))
+            self.watch = address_of(watch_estimate, memory, watch, track.memory, limits, False, 0.0)
+            offset_m, place = estimation.recorder.offset_m, estimation.recorder.place
         scratch = np.zeros(4), np.zeros(4), np.zeros(2), np.zeros(2)
-        truth = stack.simulator.truth, offset_m, TRUTH_INTERVAL_US
-        self.constant: tuple[Any, ...] = (self._marks, news, values.view(HIL_VALUES), scratch, truth)
+        truth = stack.simulator.truth, offset_m, place, TRUTH_INTERVAL_US, GLOBAL_INTERVAL_US
+        health = watch, limits, HEALTH_US
+        self.constant: tuple[Any, ...] = (self._marks, news, values.view(HIL_VALUES), scratch, truth, health)
         """Argument ``slow`` of the kernel."""
 
     def room(self) -> int:
@@ -140,16 +152,15 @@ class QuietSensors:
 
     def following(self) -> tuple[Any, ...]:
         """Return the argument ``following`` of the kernel; call once before each of its calls."""
-        marks, estimation, delays_s = self._marks, self._estimation, (0.0, 0.0)
-        truth_us = marks["truth_us"][0]
-        marks[0] = 0
-        marks["truth_us"] = truth_us
+        marks, estimation, delays_s, facts = self._marks, self._estimation, (0.0, 0.0), (0, False)
         if estimation is not None:
             params = estimation.estimators[0].params
             delays_s = float(params.mag_delay_s), float(params.baro_delay_s)
-            marks["truth_us"] = estimation.recorder.truth_due_us
-        logs = ((trace.rows, trace.times_us, trace.n) for trace in self._open_traces())
-        return (delays_s, *logs)
+            marks[0] = 0
+            marks["truth_us"], marks["global_us"] = estimation.recorder.truth_due_us
+            marks["health_us"], facts = estimation.begin_watch()
+        logs = tuple((trace.rows, trace.times_us, trace.n) for trace in self._open_traces())
+        return delays_s, logs, facts
 
     def _open_traces(self) -> list[Trace]:
         """Return the traces of the open log; without one, traces that are not recorded."""
@@ -158,24 +169,27 @@ class QuietSensors:
         trace = self._estimation.recorder.trace
         return [trace(group) or none for group, none in zip(_GROUPS, self._no_traces, strict=True)]
 
-    def pass_by(self) -> tuple[MagSample | None, BaroSample | None]:
-        """Count the new rows; return the newest samples."""
-        estimation = self._estimation
-        if estimation is None:
-            return None, None
-        mag_us, baro_us, *rows, truth_us = self._marks[0].item()
-        if truth_us != NEVER_US:
-            estimation.recorder.pass_by(truth_us)
-            for trace, new in zip(self._open_traces(), rows, strict=True):
-                trace.n += new
-        values = HilValues(*self._values.tolist())
-        mag = MagSample(mag_us * 1e-6, Vector3(*values.mag_gauss)) if mag_us else None
+    def count_rows(self) -> None:
+        """Count the new rows of the log."""
+        marks = SlowMarks(*self._marks[0].item())
+        if self._estimation is None or marks.truth_us == NEVER_US:
+            return
+        self._estimation.recorder.pass_by((marks.truth_us, marks.global_us))
+        rows = marks.mag_rows, marks.baro_rows, marks.truth_rows, marks.global_rows
+        for trace, new in zip(self._open_traces(), rows, strict=True):
+            trace.n += new
+
+    def pass_by(self, time_us: int, interval_us: int) -> None:
+        """Bring the estimation to ``time_us``."""
+        assert self._estimation is not None
+        marks = SlowMarks(*self._marks[0].item())
+        mag = MagSample(marks.mag_us * 1e-6, Vector3(*marks.field_gauss.tolist())) if marks.mag_us else None
         baro = (
-            BaroSample(baro_us * 1e-6, values.pressure_hpa, values.altitude_m, values.temperature_c)
-            if baro_us
+            BaroSample(marks.baro_us * 1e-6, marks.pressure_hpa, marks.altitude_m, marks.temperature_c)
+            if marks.baro_us
             else None
         )
-        return mag, baro
+        self._estimation.pass_by(time_us, interval_us, mag, baro, marks.health_us)
 
 
 class QuietBlock:
@@ -209,7 +223,7 @@ class QuietBlock:
             self._simulator.step,
             address_of(loops.kernel, now.state, 1.0, now.rotor_speed, loops.memory, row),
             address_of(follow_rotors, row, faults.rotors, faults.lags),
-            *(0, 0, 0),
+            *(0, 0, 0, 0),
         )
         if self._estimation is not None:
             track, record = self._estimation.feed.lanes[0].newest.imu_track, self._no_imu_log.rows[0]
@@ -217,6 +231,7 @@ class QuietBlock:
                 take=address_of(take_wire, track.memory, sensing[0][0], 0.0, 1, record),
                 estimate=address_of(imu_kernel, self._estimation.estimators[0].memory, track.ring[0]),
                 push=self._sensors.push,
+                watch=self._sensors.watch,
             )
         return np.array([calls], QUIET_CALLS)
 
@@ -330,11 +345,11 @@ class QuietBlock:
             stack.simulator.has_arrived = True
         if ticks:
             self._autopilot.pass_by(ticks, began_us + ticks * interval_us, rows[ticks - 1])
-        mag, baro = self._sensors.pass_by()
+        self._sensors.count_rows()
         if flown:
             self._simulator.pass_by(flown, result)
-        if self._estimation is not None and sensed:
-            self._estimation.pass_by(began_us + (ticks + waits) * interval_us, interval_us, mag, baro)
+        if sensed:
+            self._sensors.pass_by(began_us + (ticks + waits) * interval_us, interval_us)
         if waits:
             self._simulator.commands[:] = self._autopilot.tick(began_us + (ticks + 1) * interval_us)
         return int(ticks + waits)

@@ -6,9 +6,18 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from flightstack.commander.estimate_checks import MISSING_S, estimate_refusals
+import numpy as np
+
+from flightstack.commander.estimate_checks import (
+    LIMITS,
+    MISSING_S,
+    estimate_refusals,
+    facts_of,
+    limits_of,
+)
 from flightstack.commander.failsafe_monitor import FailsafeMonitor
 from flightstack.control.backend import ControlBackend
+from flightstack.core.compiled import plain
 from flightstack.core.contract import FloatArray, SingleArray, Vector3
 from flightstack.core.enums import Severity
 from flightstack.core.geodesy import earth_field_ned_gauss
@@ -23,7 +32,7 @@ from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed
 from flightstack.estimation.sensor_samples import BaroSample, ImuSample, MagSample
 from flightstack.estimation.snapshot import snapshot
-from flightstack.flight_log.sensor_recorder import SensorRecorder
+from flightstack.flight_log.sensor_recorder import NEVER_US, SensorRecorder
 from flightstack.guidance.navigator import Navigator
 from flightstack.params.estimator import ESTIMATOR_SPECS, MULTI_IMU
 from flightstack.params.store import ParamStore
@@ -93,8 +102,10 @@ class Estimation:
         self.recorder, self._truth = recorder, truth
         self._feed = SensorFeed(first, now.state, recorder, spares)
         self._lanes = Lanes(self._feed, estimators)
+        self.watch, self.limits = self._lanes.watch, np.zeros(1, LIMITS)
+        """Memory and limits of the health, for a kernel that updates it."""
         self._landed = False
-        self._health_due_us = 0
+        self._health_due_us, self._facts = 0, -1
         self._time_us = 0  # of the newest message of the sensors
         self._read_selected()
         self._seen, self._counts = sum_of_resets(self.estimator.memory), (0.0, 0.0, 0.0)
@@ -170,7 +181,8 @@ class Estimation:
     def quiet_until_us(self, measures: bool) -> int:
         """Return the time from which a tick has more to do than ``update_imus``; 0 if the next one has.
 
-        With ``measures``, kernels also take magnetometer and barometer, and record the true state.
+        With ``measures``, kernels also take magnetometer and barometer, record the true state, and update the health of
+        a single inertial sensor.
         """
         now = self._now
         if self._reset_counts() != self._counts:  # another sensor was selected after the last check
@@ -178,16 +190,35 @@ class Estimation:
         finds_origin = not now.has_state and self.estimator.frame is not None
         if finds_origin or now.landed is not self._landed or not self._sensors.is_quiet:
             return 0
-        return min(self._health_due_us, self.recorder.due_us(with_truth=not measures))
+        recorder_us = self.recorder.due_us(with_truth=not measures)
+        return recorder_us if measures and self._lanes.is_alone else min(self._health_due_us, recorder_us)
 
-    def pass_by(self, time_us: int, step_us: int, mag: MagSample | None, baro: BaroSample | None) -> None:
+    def begin_watch(self) -> tuple[int, tuple[int, bool]]:
+        """Return the time from which a kernel updates the health, and its facts now with True if there is an origin.
+
+        The kernel stops when the facts change. The health of several inertial sensors is left to ``update``.
+        """
+        if not self._lanes.is_alone:
+            return NEVER_US, (0, False)
+        self._lanes.begin_watch()
+        self.limits[0] = limits_of(self._now.behaviour)
+        return self._health_due_us, (self._facts, self._now.has_state)
+
+    def pass_by(
+        self, time_us: int, step_us: int, mag: MagSample | None, baro: BaroSample | None, health_due_us: int
+    ) -> None:
         """Follow the measurements up to ``time_us`` that the kernels of sensors and filters took.
 
-        ``mag`` and ``baro`` are the newest of them, None without one.
+        ``mag`` and ``baro`` are the newest of them, None without one; the next health is due at ``health_due_us``.
         """
         self._time_us = time_us
         self._feed.pass_by(time_us, step_us, mag, baro)
         self._check_resets(time_us)
+        if self._lanes.is_alone and health_due_us != self._health_due_us:
+            self._health_due_us, self.health = health_due_us, self._lanes.watched()
+            self._use_health()
+        if time_us >= self._health_due_us:  # in a tick with a reset
+            self._update_health(time_us)
 
     @property
     def feed(self) -> SensorFeed:
@@ -269,6 +300,12 @@ class Estimation:
         since_change_s = time_us * 1e-6 - self._lanes.selection.changed_s
         if has_failed and not had_failed and now.has_state and since_change_s > _TOLD_S:
             users.journal.say(Severity.WARNING, "A spare inertial sensor has failed")
+        self._use_health()
+
+    def _use_health(self) -> None:
+        """Act on the newest health."""
+        now, users = self._now, self._users
+        self._facts = plain(facts_of)(self.health, limits_of(now.behaviour), self._mag_fault[0])
         users.failsafes.take_health(self.health)
         if self._mag_fault[0] and not self._mag_has_failed:
             self._mag_has_failed = True

@@ -16,7 +16,7 @@ from flightstack.core.contract import FloatArray, LoopRow
 from flightstack.core.kernel_calls import call_kernel, call_kernel_int
 from flightstack.core.record_types import dtype_of
 from flightstack.vehicle.outer_kernel import guide, note_outer
-from flightstack.vehicle.slow_kernel import log_truth, take_slow
+from flightstack.vehicle.slow_kernel import log_truth, take_slow, watch_health
 
 _REFERENCE, _COMMAND, _SPEED = (
     columns.start for columns in (LoopRow.REFERENCE_ATTITUDE, LoopRow.ROTOR_COMMAND, LoopRow.ROTOR_SPEED)
@@ -33,6 +33,7 @@ class QuietCalls(NamedTuple):
     take: int
     estimate: int
     push: int
+    watch: int
 
 
 class QuietCounters(NamedTuple):
@@ -125,7 +126,9 @@ def _advance(
         if is_known[0] != 0:
             copy_all(known, state)
         log_truth(slow, time_us, following)
-        if _total(resets) != resets_before:
+        if _total(resets) != resets_before or not watch_health(
+            calls["watch"], slow, time_us, sensing[3][0], sensing[1][0], following
+        ):
             counters["waits"] = 1
             return False
     return True
@@ -141,9 +144,9 @@ def fly_quiet_ticks(
 
     The state of the first tick ``is_taken``, or the simulator advances to it with ``commands``; its time is that of
     the vehicle and ``boot_us``. The first outer tick is that after ``outer_in`` ticks. It stops without a step of the
-    simulator, when its result is larger than ``LARGEST_RESULT``, after a reset of the estimate, and at an outer tick
-    that is not nominal: then the tick waits. Records are bytes. ``sensing`` has an element for each inertial sensor,
-    none on the true state. ``slow`` and ``following`` are those of ``slow_kernel``.
+    simulator, when its result is larger than ``LARGEST_RESULT``, after a reset of the estimate or other facts of its
+    health, and at an outer tick that is not nominal: then the tick waits. Records are bytes. ``sensing`` has an element
+    for each inertial sensor, none on the true state. ``slow`` and ``following`` are those of ``slow_kernel``.
     """
     rows, row_times, row_at = log
     calls, outer_calls = calls_of[0][0], calls_of[1][0]

@@ -1,19 +1,19 @@
-"""New samples of magnetometer and barometer, and the log of the truth, in quiet ticks, as compiled code.
+"""Magnetometer and barometer, the health of the estimate and the log of the truth in quiet ticks, as compiled code.
 
-It calls the kernel that the estimator runs in any other tick, on the same arrays and in the same order.
+It calls the kernels that the estimator runs in any other tick, on the same arrays and in the same order.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
-from flightstack.core.kernel_calls import call_kernel
+from flightstack.core.kernel_calls import call_kernel, call_kernel_int
 from flightstack.core.record_types import dtype_of
 from flightstack.estimation.rings import BARO_RING, MAG_RING
-from flightstack.flight_log.sensor_rows import store_baro, store_mag, store_truth
+from flightstack.flight_log.sensor_rows import store_baro, store_global, store_mag, store_truth
 
 
 class SlowMarks(NamedTuple):
@@ -22,12 +22,22 @@ class SlowMarks(NamedTuple):
     mag_us: int
     """Time of the newest sample, or 0; the next one too."""
     baro_us: int
+    field_gauss: Annotated[FloatArray, 3]
+    """That sample."""
+    pressure_hpa: float
+    """That sample; the next two too."""
+    altitude_m: float
+    temperature_c: float
     mag_rows: int
-    """New rows of the log; the next two too."""
+    """New rows of the log; the next three too."""
     baro_rows: int
     truth_rows: int
+    global_rows: int
     truth_us: int
-    """Time from which the log of the truth takes a row."""
+    """Time from which the log of the true state takes a row; the next one of its place on the earth."""
+    global_us: int
+    health_us: int
+    """Time from which the health of the estimate is updated."""
 
 
 SLOW_MARKS = dtype_of(SlowMarks)
@@ -48,9 +58,9 @@ def take_slow(push: int, slow: Any, time_us: int, filters: Any, following: Any) 
 
     Those that are not finite are none. ``push`` is the address of the kernel. ``following`` has delays and logs.
     """
-    marks_array, news_array, parts, rows, _truth = slow
+    marks_array, news_array, parts, rows, _truth, _health = slow
     marks, news, values = marks_array[0], news_array[0], parts[0]
-    delays_s, mag_log, baro_log, _truth_log = following
+    delays_s, (mag_log, baro_log, _truth_log, _global_log), _health = following
     mag_sample, mag_copy, baro_sample, baro_copy = rows
     mag_delay_s, baro_delay_s = delays_s
     if news["has_mag"] != 0:
@@ -63,6 +73,7 @@ def take_slow(push: int, slow: Any, time_us: int, filters: Any, following: Any) 
             store_mag(_log_row(mag_log, marks["mag_rows"], time_us), time_us, x, y, z)
             marks["mag_rows"] += 1
             marks["mag_us"] = time_us
+            marks["field_gauss"][0], marks["field_gauss"][1], marks["field_gauss"][2] = x, y, z
     if news["has_baro"] != 0:
         altitude_m = float(values["altitude_m"])
         if math.isfinite(altitude_m):
@@ -72,7 +83,8 @@ def take_slow(push: int, slow: Any, time_us: int, filters: Any, following: Any) 
             marks["baro_rows"] += 1
             pressure_hpa, temperature_c = float(values["pressure_hpa"]), float(values["temperature_c"])
             store_baro(row, time_us, pressure_hpa, altitude_m, temperature_c)
-            marks["baro_us"] = time_us
+            marks["baro_us"], marks["pressure_hpa"] = time_us, pressure_hpa
+            marks["altitude_m"], marks["temperature_c"] = altitude_m, temperature_c
 
 
 @compiled
@@ -86,11 +98,36 @@ def _log_row(log: Any, count: int, time_us: int) -> Any:
 
 @compiled
 def log_truth(slow: Any, time_us: int, following: Any) -> None:
-    """Record the true state if it is due."""
-    marks = slow[0][0]
+    """Record the true state, and with it its place on the earth, if they are due."""
+    marks, logs = slow[0][0], following[1]
     if time_us < marks["truth_us"]:
         return
-    state, offset_m, interval_us = slow[4]
+    state, offset_m, place, interval_us, global_interval_us = slow[4]
     marks["truth_us"] = (time_us // interval_us + 1) * interval_us
-    store_truth(_log_row(following[3], marks["truth_rows"], time_us), state, offset_m)
+    store_truth(_log_row(logs[2], marks["truth_rows"], time_us), state, offset_m)
     marks["truth_rows"] += 1
+    if time_us >= marks["global_us"]:
+        marks["global_us"] = (time_us // global_interval_us + 1) * global_interval_us
+        store_global(_log_row(logs[3], marks["global_rows"], time_us), state, place)
+        marks["global_rows"] += 1
+
+
+@compiled
+def watch_health(watch: int, slow: Any, time_us: int, memory: Any, track: Any, following: Any) -> bool:
+    """Update the health if it is due; return False if it has other facts than before, which Python acts on.
+
+    ``watch`` is the address of the kernel; ``memory`` and ``track`` are those of the estimator.
+    """
+    marks = slow[0][0]
+    if time_us < marks["health_us"]:
+        return True
+    health, limits, interval_us = slow[5]
+    facts, has_origin = following[2]
+    marks["health_us"] = (time_us // interval_us + 1) * interval_us
+    newest = health[0]["newest"]
+    if marks["mag_us"] != 0:
+        newest["mag_s"] = marks["mag_us"] * 1e-6
+    if marks["baro_us"] != 0:
+        newest["baro_s"], newest["pressure_hpa"] = marks["baro_us"] * 1e-6, marks["pressure_hpa"]
+    found: int = call_kernel_int(watch, (memory, health, track, limits, has_origin, time_us * 1e-6))
+    return bool(found == facts)

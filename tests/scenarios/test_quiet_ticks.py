@@ -4,7 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from flightstack.commander.estimate_checks import estimate_failsafes
+from flightstack.commander.failsafe import Failsafe
 from flightstack.core.contract import FloatArray
+from flightstack.estimation.health import EstimateHealth
 from flightstack.process.quiet_block import QuietBlock
 from flightstack.testing import World
 from flightstack.testing.engine import Engine
@@ -102,6 +105,40 @@ def test_a_reset_of_the_estimate_ends_a_compiled_call(monkeypatch: pytest.Monkey
     assert resets
     with World(make_engine=BytesEngine, **conditions) as exchanged:
         assert jump(exchanged) == quiet
+
+
+def test_other_facts_of_the_estimate_end_a_compiled_call(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A limit of the position becomes smaller than its deviation, and large again."""
+    found: list[frozenset[Failsafe]] = []
+    run = QuietBlock.run
+
+    def counted(block: QuietBlock, count: int, is_taken: bool = False) -> int:
+        before = world.engine.stack.estimation.health
+        done = run(block, count, is_taken)
+        health, behaviour = world.engine.stack.estimation.health, world.engine.stack.now.behaviour
+        facts = estimate_failsafes(health, behaviour)
+        if block.waited and facts != estimate_failsafes(before, behaviour):
+            found.append(facts)
+        return done
+
+    def limited(world: World) -> tuple[bytes, list[str], EstimateHealth]:
+        world.wait_until_ready()
+        world.takeoff(2.0)
+        world.run_for(2.0)
+        for limit_m in (0.1, 5.0):
+            world.param_set("COM_POS_FS_EPH", limit_m)
+            world.run_for(3.0)
+        assert "failsafe_POSITION_LOST" in [event.name for event in world.events]
+        return world.engine.newest_log(), world.texts, world.engine.stack.estimation.health
+
+    conditions = {"state": "estimated", "seed": 5}
+    with monkeypatch.context() as patch:
+        patch.setattr(QuietBlock, "run", counted)
+        with World(**conditions) as world:
+            quiet = limited(world)
+    assert found[0] == {Failsafe.POSITION_LOST}
+    with World(make_engine=BytesEngine, **conditions) as exchanged:
+        assert limited(exchanged) == quiet
 
 
 @pytest.mark.parametrize("state", ["truth", "estimated"])

@@ -15,6 +15,7 @@ from flightstack.estimation.health import (
     EstimateHealth,
     PressureTrack,
     accuracy_step,
+    is_stuck,
     pressure_step,
 )
 from flightstack.params.behaviour import Behaviour
@@ -132,10 +133,10 @@ def test_pressure_that_changes_at_rest_has_noise(landed: bool, noise_hpa: float,
         memory = pressure_step(memory, 950.0, landed, 2.0, 10.0 + 0.05 * step)
     assert memory.equal_since_s == 10.0
     assert (memory.changes == NOISY) is is_noisy
-    assert memory.is_stuck(landed, 2.0, 11.5) is (is_noisy or not landed)
-    assert memory.is_stuck(False, 2.0, 11.5) is not (landed and not is_noisy)  # an ideal one may hover
-    assert memory.is_stuck(False, 2.5, 11.5)  # in the air a climb shows it
-    assert not memory.is_stuck(landed, 2.5, 10.5)
+    assert is_stuck(memory, landed, 2.0, 11.5) is (is_noisy or not landed)
+    assert is_stuck(memory, False, 2.0, 11.5) is not (landed and not is_noisy)  # an ideal one may hover
+    assert is_stuck(memory, False, 2.5, 11.5)  # in the air a climb shows it
+    assert not is_stuck(memory, landed, 2.5, 10.5)
 
 
 def test_pressures_that_are_equal_by_chance_are_those_of_a_barometer_with_noise() -> None:
@@ -143,4 +144,4 @@ def test_pressures_that_are_equal_by_chance_are_those_of_a_barometer_with_noise(
     for step, pressure_hpa in enumerate((955.0, 955.1, 955.1, 955.1, 955.0, 955.1)):
         memory = pressure_step(memory, pressure_hpa, True, 0.0, 0.05 * step)
     assert (memory.is_ideal, memory.changes) == (False, 4)
-    assert memory.is_stuck(False, 0.0, 1.5)
+    assert is_stuck(memory, False, 0.0, 1.5)

@@ -22,6 +22,7 @@ class Part(NamedTuple):
 class Whole(NamedTuple):
     time_s: float
     count: int
+    is_new: bool
     row: Pair
     part: Part
     pair: Annotated[Record, Pair]
@@ -32,7 +33,7 @@ def test_dtype_has_numbers_arrays_rows_parts_and_records() -> None:
     pair = [("x", "<f8"), ("y", "<f8")]
     assert dtype_of(Whole) == np.dtype(
         [
-            ("time_s", "<f8"), ("count", "<i8"), ("row", "<f8", (2,)), ("values", "<f8", (2, 3)),
+            ("time_s", "<f8"), ("count", "<i8"), ("is_new", "?"), ("row", "<f8", (2,)), ("values", "<f8", (2, 3)),
             ("numbers", "<i8", (4,)), ("pair", pair), ("pairs", pair, (3,)),
         ]
     )  # fmt: skip
@@ -40,7 +41,7 @@ def test_dtype_has_numbers_arrays_rows_parts_and_records() -> None:
 
 @pytest.mark.parametrize(
     "hint",
-    [bool, str, FloatArray, Annotated[FloatArray, 0], Annotated[FloatArray, Pair, 2], Annotated[Record, Pair, 2],
+    [complex, str, FloatArray, Annotated[FloatArray, 0], Annotated[FloatArray, Pair, 2], Annotated[Record, Pair, 2],
      Annotated[RecordArray, Pair], Annotated[RecordArray, 3], Annotated[Record, 3]],
 )  # fmt: skip
 def test_other_annotation_is_refused(hint: object) -> None:

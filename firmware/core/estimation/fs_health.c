@@ -15,7 +15,7 @@
 #define FS_BARO 6
 #define FS_MAG 7
 
-/* health.py:106 */
+/* health.py:107 */
 static fs_real largest(const fs_real values[], int32_t first, int32_t count)
 {
     fs_real largest_ = FS_LIT(0.0);
@@ -25,7 +25,7 @@ static fs_real largest(const fs_real values[], int32_t first, int32_t count)
     return largest_;
 }
 
-/* Return a mean of test ratios after the newest one, the largest of count rows. health.py:114 */
+/* Return a mean of test ratios after the newest one, the largest of count rows. health.py:115 */
 static fs_real mean_ratio(fs_real mean, const fs_estimator_memory *m, int32_t first, int32_t count)
 {
     fs_real largest_ = FS_LIT(0.0);
@@ -35,11 +35,9 @@ static fs_real mean_ratio(fs_real mean, const fs_estimator_memory *m, int32_t fi
     return mean + FS_SMOOTHING * (fs_sqrt(largest_) - mean);
 }
 
-/* health.py:123 */
-void fs_health_kernel(const fs_estimator_memory *memory, fs_health_summary *summary)
+/* Write the summary of an estimator's record; it holds the mean ratios of the last call. health.py:124 */
+static void summarise(const fs_estimator_memory *m, fs_health_summary *s)
 {
-    const fs_estimator_memory *m = memory;
-    fs_health_summary *s = summary;
     const fs_real position_s = fs_min(m->filter.observations[FS_GNSS_POSITION].fused_s,
                                       m->filter.observations[FS_GNSS_POSITION + 1].fused_s);
     const fs_real velocity_s = fs_min(m->filter.observations[FS_GNSS_VELOCITY].fused_s,
@@ -59,4 +57,10 @@ void fs_health_kernel(const fs_estimator_memory *memory, fs_health_summary *summ
     s->position_ratio = mean_ratio(s->position_ratio, m, FS_GNSS_POSITION, 2);
     s->height_ratio = mean_ratio(s->height_ratio, m, FS_BARO, 1);
     s->heading_ratio = mean_ratio(s->heading_ratio, m, FS_MAG, 3);
+}
+
+/* health.py:143 */
+void fs_health_kernel(const fs_estimator_memory *memory, fs_health_summary *summary)
+{
+    summarise(memory, summary);
 }
