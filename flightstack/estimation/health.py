@@ -309,11 +309,11 @@ class HealthMonitor:
 
     def take(self, samples: NewestSamples) -> None:
         """Note the newest measurements."""
-        imu, mag, baro, gnss = samples.imu, samples.mag, samples.baro, samples.gnss
+        track, mag, baro, gnss = samples.imu_track, samples.mag, samples.baro, samples.gnss
         has_fix = gnss is not None and gnss.fix_type >= GnssFix.FIX_3D
         self._newest[0] = Newest(
-            -math.inf if imu is None else imu.time_s,
-            samples.imu_track.repeats,
+            track.newest_s,
+            track.repeats,
             -math.inf if mag is None else mag.time_s,
             -math.inf if baro is None else baro.time_s,
             math.nan if baro is None else baro.pressure_hpa,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from typing import Annotated, Any, NamedTuple, TypeAlias
 
@@ -167,6 +168,12 @@ class ImuTrack:
             return None
         values = self._mean.tolist()
         return Vector3(*values[:3]), Vector3(*values[3:])
+
+    @property
+    def newest_s(self) -> float:
+        """Time of the newest sample; minus infinity before the first one."""
+        count = self._taken[0]
+        return float(self._each[(count - 1) % WINDOW][1][0]) if count else -math.inf
 
     @property
     def newest(self) -> ImuSample | None:

@@ -95,6 +95,11 @@ class SensorRecorder:
         """Return the row of ``IMU_GROUP`` for a sample that the estimator takes; without a log a scratch row."""
         return self._imu_row(time_us)
 
+    @property
+    def log(self) -> FlightLog | None:
+        """The log that is recorded; None without one."""
+        return self._log
+
     def trace(self, group: Group) -> Trace | None:
         """Return the rows of a group in the open log; None without one."""
         return None if self._log is None else self._log.sampled[group.name]

@@ -25,7 +25,7 @@ from flightstack.estimation.health import WATCH
 from flightstack.estimation.imu_track import RECORD_SIZE, take_wire
 from flightstack.estimation.rings import MAG_RING
 from flightstack.estimation.sensor_samples import BaroSample, MagSample
-from flightstack.flight_log.flight_log import DEFAULT_CAPACITY, Trace
+from flightstack.flight_log.flight_log import DEFAULT_CAPACITY, FlightLog, Trace
 from flightstack.flight_log.sensor_recorder import GLOBAL_INTERVAL_US, NEVER_US, TRUTH_INTERVAL_US
 from flightstack.flight_log.sensor_topics import (
     BARO_GROUP,
@@ -129,6 +129,9 @@ class QuietSensors:
         """``values`` and ``news`` are those of ``QuietSimulator``."""
         estimation = self._estimation = stack.estimation
         self._no_traces = [Trace(DEFAULT_CAPACITY, group.columns, lambda: None) for group in _GROUPS]
+        self._log: FlightLog | None = None
+        self._traces = self._no_traces
+        """Those of the log."""
         self._marks = np.zeros(1, SLOW_MARKS)
         self._marks["truth_us"] = self._marks["global_us"] = self._marks["health_us"] = NEVER_US
         self.push = self.watch = 0
@@ -164,10 +167,11 @@ class QuietSensors:
 
     def _open_traces(self) -> list[Trace]:
         """Return the traces of the open log; without one, traces that are not recorded."""
-        if self._estimation is None:
-            return self._no_traces
-        trace = self._estimation.recorder.trace
-        return [trace(group) or none for group, none in zip(_GROUPS, self._no_traces, strict=True)]
+        log = None if self._estimation is None else self._estimation.recorder.log
+        if log is not self._log:
+            self._log = log
+            self._traces = self._no_traces if log is None else [log.sampled[group.name] for group in _GROUPS]
+        return self._traces
 
     def count_rows(self) -> None:
         """Count the new rows of the log."""
