@@ -61,6 +61,8 @@ class Action(NamedTuple):
     """State that ``plan`` needs, for example a position."""
     needs_text: str = ""
     """Text of the error if that state is not reached."""
+    does_without: Condition = lambda _view: False
+    """State in which the action goes on although that state was not reached in time."""
     unseen: str = ""
     """Says why an accepted action ends without its effect: "the vehicle does not report its speed limit"."""
     goes_on_without_link: bool = False

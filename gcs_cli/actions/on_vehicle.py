@@ -171,7 +171,7 @@ def reboot() -> Action:
     def plan(view: VehicleView) -> tuple[Step, ...]:
         before = view.restarts
         command: VehicleCommand = common_commands.REBOOT
-        if not view.time_s:  # a vehicle whose clock stands, without its simulator: nothing shows its restart
+        if not _has_running_clock(view):  # such as a vehicle without its simulator: nothing shows its restart
             return (Step("reboot", command, None),)
         return (
             Step(
@@ -189,9 +189,15 @@ def reboot() -> Action:
         plan,
         "rebooting",
         "rebooted",
-        needs=lambda view: not view.time_s or view.time_s >= UP_S,
+        needs=lambda view: view.time_s is not None and view.time_s >= UP_S,
         needs_text=f"it booted less than {UP_S:g} s ago, so that its restart would not be seen: repeat the command",
+        does_without=lambda view: not _has_running_clock(view),
+        unseen="its clock does not run, so that its restart is not seen",
     )
+
+
+def _has_running_clock(view: VehicleView) -> bool:
+    return view.time_s is not None and view.time_s > 0.0
 
 
 def set_message_rate(message_id: int, name: str, rate_hz: float | None) -> Action:

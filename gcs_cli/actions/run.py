@@ -139,9 +139,11 @@ class ActionRun:
     def _begin(self, view: VehicleView, now_s: float) -> None:
         action = self.action
         if action.needs is not None and not action.needs(view):
-            if now_s - self._begun_s >= NEEDS_LIMIT_S:
+            if now_s - self._begun_s < NEEDS_LIMIT_S:
+                return
+            if not action.does_without(view):
                 self._end(Outcome.REFUSED, f"{action.name}: {action.needs_text}")
-            return
+                return
         try:
             self._steps = list(action.plan(view))
         except ActionError as error:

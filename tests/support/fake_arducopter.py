@@ -38,6 +38,8 @@ class FakeArduCopter:
     """Commands that are executed without an answer."""
     unsupported: set[int] = field(default_factory=set)
     """Commands that are answered with MAV_RESULT_UNSUPPORTED, as another autopilot does."""
+    has_streams: bool = True
+    """False for a vehicle that sends heartbeats and answers alone."""
     current_item: int = 0
     velocity_ned_m_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Reported velocity."""
@@ -68,7 +70,7 @@ class FakeArduCopter:
         if to_s >= self._heartbeat_due_s:
             self._heartbeat_due_s = to_s + 1.0
             self._out.append(self._heartbeat())
-        if to_s >= self._streams_due_s:
+        if self.has_streams and to_s >= self._streams_due_s:
             self._streams_due_s = to_s + 0.25
             self._out += self._telemetry()
         messages, self._out = self._out, []

@@ -233,6 +233,25 @@ def test_reboot_soon_after_boot_waits_until_its_restart_can_be_seen() -> None:
     assert rig.perform(on_vehicle.reboot())[:2] == (Outcome.DONE, "rebooted")
 
 
+def test_reboot_waits_for_the_time_of_a_vehicle_heard_only_by_its_heartbeat() -> None:
+    """With the first heartbeat alone, no time heard counted as a clock that stands: it ended before the restart."""
+    rig = Rig(boot_s=STEP_S)
+    rig.vehicle.streams_after_boot = True
+    assert (rig.view.identity is not None, rig.view.time_s) == (True, None)
+    result = rig.perform(on_vehicle.reboot())
+    assert result[:2] == (Outcome.DONE, "rebooted")
+    assert rig.view.restarts == 1
+
+
+def test_reboot_of_a_vehicle_without_a_clock_says_that_its_restart_is_not_seen() -> None:
+    rig = Rig(FakeArduCopter(has_streams=False))
+    assert rig.perform(on_vehicle.reboot())[:2] == (
+        Outcome.ACKNOWLEDGED,
+        "accepted: rebooting; its clock does not run, so that its restart is not seen",
+    )
+    assert [command for command, _ in rig.vehicle.commands] == [mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN]
+
+
 def test_reboot_without_an_answer_is_sent_once(rig: Rig) -> None:
     rig.vehicle.unanswered = {mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN}
     rig.run_for(20.0)
