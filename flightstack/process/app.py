@@ -22,6 +22,7 @@ from flightstack.process.connections import (
     check_deadline,
     connect_simulator,
     serve_while_idle,
+    simulator_end,
     wait_for_state,
 )
 from flightstack.process.lockstep_loop import LockstepLoop
@@ -87,26 +88,24 @@ class App:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._on_signal)
         simulator: TcpClient | None = None
-        code = EXIT_LOST
+        end = Ended(EXIT_LOST, "")
         try:
             simulator = self._connect()
             self._fly(simulator)
         except Ended as ended:
-            if str(ended):
-                complain(ended)
-            code = ended.code
+            end = ended
         except TargetError as error:
             self.stack.recorder.discard_row()
-            complain(error)
-            code = EXIT_TIMEOUT
+            end = Ended(EXIT_TIMEOUT, str(error))
         except ConfigError as error:  # at a reboot
-            complain(error)
-            code = EXIT_USAGE
+            end = Ended(EXIT_USAGE, str(error))
         except LinkClosedError:
-            code = self._simulator_loss_code()
+            end = Ended(EXIT_OK, "stopped") if self._stop_signal else simulator_end(self.stack)
         finally:
-            self._close(simulator, orderly=code == EXIT_OK)
-        return code
+            if str(end):
+                complain(end)
+            self._close(simulator, orderly=end.code == EXIT_OK)
+        return end.code
 
     def _connect(self) -> TcpClient:
         """Connect to the simulator, and reboot on request while waiting."""
@@ -178,17 +177,6 @@ class App:
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         self._stop_signal = number
-
-    def _simulator_loss_code(self) -> int:
-        now = self.stack.now
-        if self._stop_signal:
-            return EXIT_OK
-        at = f"at t={now.time_us * 1e-6:.3f} s"
-        if self.stack.simulator.peer_is_shutting_down and not now.status.armed:
-            complain(f"the simulator was shut down {at}")
-            return EXIT_OK
-        complain(f"simulator lost {at}: it closed the connection")
-        return EXIT_LOST
 
     def _close(self, simulator: TcpClient | None, orderly: bool) -> None:
         """Close logs and files; after an orderly end announce the shutdown to peers, which else report a loss."""

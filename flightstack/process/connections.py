@@ -9,7 +9,14 @@ from collections.abc import Callable, Iterator
 
 from flightstack.core.enums import Severity
 from flightstack.process.assembly import Stack
-from flightstack.process.process_config import EXIT_LOST, EXIT_TIMEOUT, Ended, ProcessConfig, complain
+from flightstack.process.process_config import (
+    EXIT_LOST,
+    EXIT_OK,
+    EXIT_TIMEOUT,
+    Ended,
+    ProcessConfig,
+    complain,
+)
 from flightstack.services.routing.hub import GroundHub
 from flightstack.services.routing.peer import PeerAddress
 from flightstack.transports.tcp import TcpClient
@@ -214,6 +221,19 @@ def _warn_of_silence(stack: Stack, process: ProcessConfig) -> None:
         f"warning: {sentence} for {SIMULATOR_WARNING_S:g} s; it may be compiling; waiting up to "
         f"{process.simulator_timeout_s:g} s"
     )
+
+
+def simulator_end(stack: Stack) -> Ended:
+    """Return the end of the process after the simulator has closed the connection.
+
+    A flight that its shutdown cut off has failed.
+    """
+    at = f"at t={stack.now.time_us * 1e-6:.3f} s"
+    if not stack.simulator.peer_is_shutting_down:
+        return Ended(EXIT_LOST, f"simulator lost {at}: it closed the connection")
+    if stack.now.status.armed:
+        return Ended(EXIT_LOST, f"the simulator was shut down {at} while the vehicle was armed")
+    return Ended(EXIT_OK, f"the simulator was shut down {at}")
 
 
 def check_deadline(deadline_s: float, stack: Stack, process: ProcessConfig) -> None:

@@ -139,6 +139,15 @@ def test_a_killed_simulator_is_named_and_the_log_stays(flying: dict[str, Process
     assert_log_is_readable(tmp_path / "flight.ulg")
 
 
+def test_a_simulator_shut_down_in_flight_is_named_and_the_flight_failed(flying: dict[str, Process]) -> None:
+    flying["simulator"].interrupt()
+    assert flying["simulator"].end() == 0
+    assert flying["stack"].end() == 1
+    said = flying["stack"].lines[-1]
+    assert said.startswith("flightstack: the simulator was shut down at t=")
+    assert said.endswith(" s while the vehicle was armed")
+
+
 def test_a_killed_flight_stack_is_named(flying: dict[str, Process], tmp_path: Path) -> None:
     flying["stack"].kill()
     assert flying["simulator"].end() == 1
