@@ -102,9 +102,7 @@ class App:
         except LinkClosedError:
             end = Ended(EXIT_OK, "stopped") if self._stop_signal else simulator_end(self.stack)
         finally:
-            if str(end):
-                complain(end)
-            self._close(simulator, orderly=end.code == EXIT_OK)
+            self._close(simulator, end)
         return end.code
 
     def _connect(self) -> TcpClient:
@@ -178,8 +176,16 @@ class App:
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         self._stop_signal = number
 
-    def _close(self, simulator: TcpClient | None, orderly: bool) -> None:
-        """Close logs and files; after an orderly end announce the shutdown to peers, which else report a loss."""
+    def _close(self, simulator: TcpClient | None, end: Ended) -> None:
+        """Close logs and files, and announce the end to the ground stations, with the reason of a failure.
+
+        The simulator is told of an orderly end alone: without it, it reports a loss.
+        """
+        orderly, reason = end.code == EXIT_OK, str(end)
+        if reason:
+            complain(reason)
+        if reason and not orderly:
+            self.stack.journal.say(Severity.CRITICAL, reason[0].upper() + reason[1:])
         self.stack.recorder.close()
         self._files.close_loops()
         if self._next is not None:
@@ -188,7 +194,7 @@ class App:
         self._files.update()
         self._files.close_plans()
         self._files.update()
-        if orderly:
+        if reason:
             self._ground.announce_shutdown()
         self._files.close_signing()
         if simulator is not None:

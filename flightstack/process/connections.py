@@ -101,7 +101,7 @@ class GroundConnection:
         self._hub = hub
 
     def announce_shutdown(self) -> None:
-        """Send the final messages of an orderly shutdown."""
+        """Send the final messages of the process."""
         for (channel, host, port), data in self._hub.farewell():
             self._ports.send(channel, (host, port), data)
         self._ports.flush()

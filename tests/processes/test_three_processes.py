@@ -136,6 +136,8 @@ def test_a_killed_simulator_is_named_and_the_log_stays(flying: dict[str, Process
     flying["simulator"].kill()
     assert flying["stack"].end() == 1
     assert "simulator lost at t=" in flying["stack"].output
+    assert "CRIT: Simulator lost at t=" in flying["station"].wait_for("imulator")
+    flying["station"].wait_for("vehicle has shut down")
     assert_log_is_readable(tmp_path / "flight.ulg")
 
 
@@ -146,6 +148,7 @@ def test_a_simulator_shut_down_in_flight_is_named_and_the_flight_failed(flying: 
     said = flying["stack"].lines[-1]
     assert said.startswith("flightstack: the simulator was shut down at t=")
     assert said.endswith(" s while the vehicle was armed")
+    assert "CRIT: The simulator was shut down at t=" in flying["station"].wait_for("imulator")
 
 
 def test_a_killed_flight_stack_is_named(flying: dict[str, Process], tmp_path: Path) -> None:
