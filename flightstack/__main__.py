@@ -1,41 +1,28 @@
-"""The ``flightstack`` command."""
+"""The ``flightstack`` command.
+
+A module of its own: an interrupt of the imports that the command line needs is an orderly end too.
+"""
 
 from __future__ import annotations
 
+import signal
 import sys
 
-from flightstack.process import collection, console, options
-from flightstack.process.command_line import (
-    PanelCommand,
-    UsageError,
-    expand_options,
-    make_app,
-    usage_sentence,
-)
-
-app = make_app(name="flightstack")
-
-
-@app.command(cls=PanelCommand)
-@expand_options
-def run(given: options.RunOptions) -> None:
-    """Connect to a simulator, run the control loops, and serve ground stations over MAVLink."""
-    from flightstack.process import program
-
-    sys.exit(program.run(given))
+from flightstack.process.console import report_interrupt
 
 
 def main() -> None:
     """Run the command."""
-    console.replace_unencodable()
+    for number in (signal.SIGINT, signal.SIGTERM):  # the main loop has its own handlers
+        signal.signal(number, signal.default_int_handler)
     try:
-        with collection.paused():
-            sys.exit(app(prog_name="flightstack", standalone_mode=False))
-    except UsageError as error:
-        console.complain(f"flightstack: {usage_sentence(error)}")
-        sys.exit(2)
-    except OSError as error:
-        sys.exit(console.report_os_error("flightstack", error))
+        from flightstack.process.command import run_command  # noqa: PLC0415  # an interrupt of it ends in order
+
+        code = run_command()
+    except KeyboardInterrupt:
+        report_interrupt("flightstack: stopped")
+        code = 0
+    sys.exit(code)
 
 
 if __name__ == "__main__":

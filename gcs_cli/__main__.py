@@ -5,13 +5,16 @@
 
 from __future__ import annotations
 
+import json
 import os
+import signal
 import sys
 
+from flightstack.process.console import report_interrupt, say
 from gcs_cli.help_generated import HELP, WIDTH
 
-_FAILED = 1
-"""``gcs_cli.errors.FAILED``, without the import."""
+_INTERRUPTED = 130
+"""``gcs_cli.errors.INTERRUPTED``, without the import."""
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -19,13 +22,21 @@ def main(argv: list[str] | None = None) -> int:
     words = sys.argv[1:] if argv is None else argv
     if len(words) == 1 and words[0] in ("-h", "--help") and _columns() >= WIDTH and _prints(HELP):
         return 0
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: the terminal is restored
     try:
         from gcs_cli.program import run
 
         return run(words)
     except KeyboardInterrupt:  # during the imports: `run` reports those of the command
-        print("gcs: interrupted", file=sys.stderr)
-        return _FAILED
+        return _report_interrupt("--json" in words)
+
+
+def _report_interrupt(as_json: bool) -> int:
+    """Report an interrupt as ``gcs_cli.output.run_command`` does, without its imports."""
+    report_interrupt("gcs: interrupted")
+    if as_json:
+        say(json.dumps({"event": "error", "message": "interrupted", "exit_code": _INTERRUPTED}))
+    return _INTERRUPTED
 
 
 def _columns() -> int:

@@ -13,13 +13,13 @@ USAGE = 2
 NO_ANSWER = 3
 """No vehicle, or no answer in time."""
 INTERRUPTED = 130
-"""``gcs test`` after Ctrl-C: the exit code of a shell for a command that SIGINT ended."""
+"""Ctrl-C or SIGTERM: the exit code of a shell for a command that SIGINT ended."""
 
 _PACKAGES = {"rerun": "rerun-sdk"}
 
 
 class CliError(Exception):
-    """One sentence for the user, and the exit code that goes with it."""
+    """One sentence for the user, empty if it was printed, and the exit code that goes with it."""
 
     def __init__(self, sentence: str, exit_code: int = FAILED) -> None:
         super().__init__(sentence)

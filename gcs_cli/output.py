@@ -14,7 +14,7 @@ import typer
 from flightstack.core.errors import ConfigError
 from flightstack.process.command_line import UsageError, usage_sentence
 from flightstack.process.console import complain, drop, say
-from gcs_cli.errors import DONE, FAILED, USAGE, CliError
+from gcs_cli.errors import DONE, FAILED, INTERRUPTED, USAGE, CliError
 
 
 class Output:
@@ -57,21 +57,17 @@ def can_draw() -> bool:
     )
 
 
-_TYPER_INTERRUPTED = 130
-"""Exit code of typer for a KeyboardInterrupt; not one of ours."""
-
-
 def run_command(run: Callable[[], int | None], as_json: bool) -> int:
     """Run a command; return its exit code. With ``as_json``, an error is also a JSON object on stdout."""
     try:
         code = run() or DONE
         if sys.stdout is not None:
             sys.stdout.flush()
-        if code != _TYPER_INTERRUPTED:
+        if code != INTERRUPTED:  # typer's code for a KeyboardInterrupt; our commands raise CliError with it
             return code
-        sentence, code = "interrupted", FAILED
+        sentence, code = "interrupted", INTERRUPTED
     except (KeyboardInterrupt, typer.Abort):
-        sentence, code = "interrupted", FAILED
+        sentence, code = "interrupted", INTERRUPTED
     except (BrokenPipeError, SystemExit):  # `gcs watch | head`, which typer ends itself
         drop(sys.stdout)
         return DONE
@@ -88,6 +84,8 @@ def run_command(run: Callable[[], int | None], as_json: bool) -> int:
         sentence, code = str(error), error.exit_code
     except ConfigError as error:
         sentence, code = str(error), USAGE
+    if not sentence:
+        return code
     complain(f"gcs: {sentence}")
     if as_json:
         say(error_line(sentence, code))

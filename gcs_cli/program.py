@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import signal
-
 import typer
 
 from flightstack.process.command_line import Version, expand_options, make_app
@@ -39,6 +37,5 @@ def run(argv: list[str]) -> int:
 
     An error is one sentence on stderr; with ``--json`` it is also an object on stdout.
     """
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: the terminal is restored
     replace_unencodable()
     return run_command(lambda: app(argv, prog_name="gcs", standalone_mode=False), as_json="--json" in argv)

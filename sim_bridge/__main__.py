@@ -1,119 +1,32 @@
-"""The command ``sim-bridge``: the simulator process, ``open-loop``, ``export-mjcf`` and ``render``."""
+"""The ``sim-bridge`` command.
+
+A module of its own: an interrupt of the imports that the command line needs is an orderly end too.
+"""
 
 from __future__ import annotations
 
+import signal
 import sys
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Annotated
 
-import typer
+from flightstack.process.console import report_interrupt
 
-from flightstack.core.errors import ConfigError
-from flightstack.process import collection, console
-from flightstack.process.command_line import (
-    Overwrite,
-    PanelCommand,
-    PanelGroup,
-    PictureOptions,
-    UsageError,
-    Version,
-    expand_options,
-    make_app,
-    usage_sentence,
-)
-from sim_bridge import options
-from sim_bridge.errors import PlantDivergedError, UsageProblemError
-from sim_bridge.output import complain
-
-app = make_app(name="sim-bridge", cls=PanelGroup)
-
-
-@app.callback(invoke_without_command=True)
-@expand_options
-def run(
-    context: typer.Context,
-    given: options.SimulatorOptions,
-    version: Version = False,  # handled by its callback
-) -> None:
-    """Simulate a vehicle for one flight stack, which connects over TCP.
-
-    Ctrl-C ends the simulation.
-    """
-    if context.invoked_subcommand is not None:
-        return
-    from sim_bridge.program import simulate
-
-    raise typer.Exit(simulate(given))
-
-
-def check_arguments(given: Sequence[str]) -> None:
-    """Check a command line of the simulator; raise UsageError, UsageProblemError or ConfigError."""
-    app([*given, "--check"], prog_name="sim-bridge", standalone_mode=False)
-
-
-@app.command("open-loop", cls=PanelCommand)
-@expand_options
-def open_loop(given: options.OpenLoopOptions) -> None:
-    """Print the state after a flight at constant rotor speeds.
-
-    Rotor speeds are not limited.
-    """
-    from sim_bridge.program import fly_open_loop
-
-    fly_open_loop(given)
-
-
-@app.command()
-@expand_options
-def render(
-    poses: Annotated[Path, typer.Argument(help="File of poses (.npz), as gcs log draw writes it.")],
-    given: PictureOptions,
-    vehicle: Annotated[str | None, typer.Option(help="Vehicle to draw.  [default: the file's]")] = None,
-    caller: Annotated[
-        str, typer.Option(hidden=True, help="Command named in error messages.")
-    ] = "sim-bridge render",
-) -> None:
-    """Draw pictures or a film of a flight."""
-    from sim_bridge.render.render_command import draw
-
-    draw(poses, given, vehicle, caller)
-
-
-@app.command()
-def export_mjcf(
-    vehicle: options.Vehicle = "paper_quad",
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="FILE", help="File to write.  [default: stdout]")
-    ] = None,
-    overwrite: Overwrite = False,
-    scene: Annotated[bool, typer.Option("--scene", help="Add sky, landmarks, light and cameras.")] = False,
-) -> None:
-    """Write a vehicle's multibody model as MJCF, for any MuJoCo.
-
-    A table of the masses goes to stderr.
-    """
-    from sim_bridge.program import write_mjcf
-
-    write_mjcf(vehicle, out, overwrite, scene)
+_ON_FILES = {"open-loop", "export-mjcf", "render"}
+_INTERRUPTED = 130
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run the command line; return the exit code."""
-    console.replace_unencodable()
+    """Run the command; return the exit code."""
+    words = sys.argv[1:] if argv is None else argv
+    for number in (signal.SIGINT, signal.SIGTERM):  # the server has its own handlers
+        signal.signal(number, signal.default_int_handler)
     try:
-        with collection.paused():
-            return app(argv, prog_name="sim-bridge", standalone_mode=False) or 0
-    except PlantDivergedError as error:
-        complain(error)
-        return 1
-    except UsageError as error:
-        complain(usage_sentence(error))
-    except (UsageProblemError, ConfigError) as error:
-        complain(error)
-    except OSError as error:
-        return console.report_os_error("sim-bridge", error)
-    return 2
+        from sim_bridge.command import run_command  # noqa: PLC0415  # an interrupt of it ends in order
+
+        return run_command(words)
+    except KeyboardInterrupt:
+        is_unfinished = not _ON_FILES.isdisjoint(words)
+        report_interrupt("sim-bridge: interrupted" if is_unfinished else "sim-bridge: stopped")
+        return _INTERRUPTED if is_unfinished else 0
 
 
 if __name__ == "__main__":

@@ -17,9 +17,9 @@ from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 from typer.models import ArgumentInfo, CommandInfo, OptionInfo
 
-import flightstack.__main__
+import flightstack.process.command
 import gcs_cli.program
-import sim_bridge.__main__
+import sim_bridge.command
 from flightstack.process.command_line import PANELS, PanelCommand, PanelGroup
 from gcs_cli.commands.examples import EXAMPLES
 from tools.generated import ROOT, write_or_check
@@ -27,8 +27,8 @@ from tools.generated import ROOT, write_or_check
 FOLDER = ROOT / "docs" / "reference"
 PROGRAMS = {
     "gcs": gcs_cli.program.app,
-    "flightstack": flightstack.__main__.app,
-    "sim-bridge": sim_bridge.__main__.app,
+    "flightstack": flightstack.process.command.app,
+    "sim-bridge": sim_bridge.command.app,
 }
 HEAD = """\
 # {name}

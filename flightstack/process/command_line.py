@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import inspect
 import sys
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
@@ -20,6 +20,9 @@ UsageError: Any = typer.BadParameter.__mro__[1]
 
 _NUMBERS = {"int": "a whole number", "float": "a number", "finite": "a finite number"}
 """Pydantic's error types for values that are no number, by their first word."""
+
+_TYPER_INTERRUPTED = 130
+"""Exit code of typer for a KeyboardInterrupt."""
 
 HELP_FLAGS = ("-h", "--help")
 
@@ -149,6 +152,17 @@ def _options_of(group: Any, without: Collection[str]) -> list[inspect.Parameter]
 
 def _default(field: dataclasses.Field[Any]) -> Any:
     return inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default
+
+
+def run_app(app: typer.Typer, name: str, arguments: Sequence[str] | None = None) -> int:
+    """Run a command line; return its exit code. An interrupt, of which typer makes an exit code, is raised again."""
+    try:
+        code = app(arguments, prog_name=name, standalone_mode=False)
+    except typer.Abort:
+        raise KeyboardInterrupt from None
+    if code == _TYPER_INTERRUPTED:
+        raise KeyboardInterrupt
+    return int(code or 0)
 
 
 def own_program(module: str, *arguments: str) -> list[str]:

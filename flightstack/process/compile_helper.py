@@ -69,6 +69,7 @@ def start(
             stdout=subprocess.PIPE,
             stderr=None if announced else subprocess.DEVNULL,
             env={**os.environ, "PYTHONPATH": path},
+            start_new_session=True,  # Ctrl-C on the terminal ends this process, which ends the helper
         )
     except OSError:
         return

@@ -16,7 +16,7 @@ import typer
 from flightstack.process.command_line import UsageError, expand_options, make_app
 from flightstack.process.console import complain
 from gcs_cli.commands.confirmation import kept_alive
-from gcs_cli.errors import DONE, USAGE, CliError
+from gcs_cli.errors import DONE, INTERRUPTED, USAGE, CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.output import run_command
 from gcs_cli.settings import LinkOptions, Settings, link_options, settings_of
@@ -58,6 +58,8 @@ def shell(
             code = _interact(runner, connection) if lines is None else runner.run_all(lines)
         finally:
             connection.close()
+    if code == INTERRUPTED:
+        raise CliError("", INTERRUPTED)
     raise typer.Exit(code)
 
 

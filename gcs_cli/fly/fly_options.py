@@ -26,7 +26,7 @@ from gcs_cli.link.endpoint import LOOPBACK
 from gcs_cli.run_directory import LOG_NAME
 from gcs_cli.transfers.plan_parts import plan_problem
 from gcs_cli.vehicle.param_info import load_parameters
-from sim_bridge.__main__ import check_arguments as check_simulator
+from sim_bridge.command import check_arguments as check_simulator
 from sim_bridge.errors import UsageProblemError
 
 GCS_LOSS_S = 5.0

@@ -14,7 +14,7 @@ from pathlib import Path
 from flightstack.core.port_numbers import vehicle_ground_port
 from flightstack.plan import Plan
 from flightstack.process.console import complain
-from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
+from gcs_cli.errors import FAILED, INTERRUPTED, NO_ANSWER, USAGE, CliError
 from gcs_cli.fly.flight import Flight, Flown, Phase
 from gcs_cli.fly.flight_watch import STALL_S
 from gcs_cli.fly.fly_display import Display, FlyConsole, make_display
@@ -111,7 +111,7 @@ def run_flight(
             return  # no process is left to shut down
         now_s = connection.now_s
         if interruption.reason:
-            flight.abort(Outcome(Code.INTERRUPTED, interruption.reason), now_s)
+            flight.abort(Outcome(Code.INTERRUPTED, interruption.reason, INTERRUPTED), now_s)
         failed = _failed_child(flight, children)
         if failed is not None:
             code = failed.exit_code if failed.exit_code in (USAGE, NO_ANSWER) else FAILED

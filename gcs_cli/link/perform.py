@@ -8,7 +8,7 @@ from flightstack.mavlink.dialect import mavlink
 from gcs_cli.actions.action import Action
 from gcs_cli.actions.run import ActionRun, Outcome, Result
 from gcs_cli.clients.command_client import ModeClient
-from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
+from gcs_cli.errors import FAILED, INTERRUPTED, NO_ANSWER, USAGE, CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.output import Output
 
@@ -35,7 +35,7 @@ def perform(connection: Connection, action: Action, output: Output, *, waits: bo
                 announced = True
                 _say(output, action, action.doing, state=Outcome.ACKNOWLEDGED.value)
     except KeyboardInterrupt:
-        raise CliError(f"interrupted while {action.doing}: the vehicle continues") from None
+        raise CliError(f"interrupted while {action.doing}: the vehicle continues", INTERRUPTED) from None
     finally:
         session.use(None)
     result = run.result

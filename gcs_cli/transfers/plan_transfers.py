@@ -7,7 +7,7 @@ from pathlib import Path
 
 from flightstack.plan import MissionItem, MissionType, Plan
 from flightstack.process.console import complain
-from gcs_cli.errors import FAILED, CliError, VehicleLostError
+from gcs_cli.errors import FAILED, INTERRUPTED, CliError, VehicleLostError
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
 from gcs_cli.output import Output
@@ -30,7 +30,7 @@ def complete_upload(connection: Connection, uploads: Uploads, file: Path | str) 
     except VehicleLostError as error:
         raise CliError(f"{error}; {uploads.state}") from None
     except KeyboardInterrupt:
-        raise CliError(f"{name()}: interrupted; {uploads.state}") from None
+        raise CliError(f"{name()}: interrupted; {uploads.state}", INTERRUPTED) from None
     except OSError as error:
         raise CliError(f"{name()}: {error.strerror or error}; {uploads.state}") from None
 

@@ -84,6 +84,10 @@ def _write(request: RenderRequest, vehicle: Vehicle, path: FlightPath, first: fl
         console.say(file)
 
 
+_INTERRUPTED = 130
+"""Exit code after Ctrl-C; as ``typer.Exit`` it would stand for an interrupt that was not reported."""
+
+
 @contextlib.contextmanager
 def _errors_reported(caller: str) -> Iterator[None]:
     """Report an error as one sentence of the called program; an unfinished file is removed."""
@@ -92,7 +96,8 @@ def _errors_reported(caller: str) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        sentence, code = "interrupted: the unfinished file is removed", 1
+        console.complain(f"{program}: interrupted: the unfinished file is removed")
+        raise SystemExit(_INTERRUPTED) from None
     except OSError as error:
         reason = error.strerror or (str(error).splitlines() or ["unknown reason"])[0]
         sentence, code = f"the pictures cannot be written: {reason}", 1

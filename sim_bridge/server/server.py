@@ -77,6 +77,7 @@ def serve(options: ServerOptions) -> int:
         try:
             client = _await_client(listener, stop, options.timeout_s)
         except StoppedError:
+            complain("stopped")
             return DONE
         except PeerSilentError:
             host, port = listener.getsockname()[:2]

@@ -109,7 +109,7 @@ def test_an_interrupted_action_says_that_the_vehicle_continues(monkeypatch: pyte
     result = told(vehicle, "land")
     assert (result.stderr, result.returncode) == (
         "gcs: interrupted while landing: the vehicle continues\n",
-        1,
+        130,
     )
 
 

@@ -202,7 +202,7 @@ def test_an_interrupted_upload_says_what_the_vehicle_holds(signals: int) -> None
 
     vehicle.ask_next_item = interrupt  # type: ignore[method-assign]
     result = told(vehicle, "mission", "upload", "fenced_square")
-    assert result.returncode == 1
+    assert result.returncode == 130
     if signals == 1:
         assert result.stderr.endswith(": interrupted (SIGTERM); the vehicle holds its former plans\n")
         assert contents(vehicle) == before
@@ -351,7 +351,7 @@ def test_an_interrupted_wait_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Connection, "wait_for_vehicle", interrupt)
     with UdpSocket("127.0.0.1") as silent:
         result = gcs("--connect", f"udpout:127.0.0.1:{silent.address[1]}", "arm")
-    assert result == ("", "gcs: interrupted\n", 1)
+    assert result == ("", "gcs: interrupted\n", 130)
 
 
 @pytest.mark.parametrize("group", [[], ["mission"]])

@@ -172,7 +172,7 @@ def test_command_imports_only_what_it_uses(module: str) -> None:
 
 @pytest.mark.parametrize("module", ["gcs_cli.fly.fly_run", "gcs_cli.sim.sim_run"])
 def test_checks_before_a_flight_need_no_compiler(module: str) -> None:
-    code = f"import {module}; from sim_bridge.__main__ import check_arguments; check_arguments([])"
+    code = f"import {module}; from sim_bridge.command import check_arguments; check_arguments([])"
     assert not loaded_by(code) & {"numba", "scipy", "jinja2", "plotly"}
 
 

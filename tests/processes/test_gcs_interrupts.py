@@ -84,7 +84,7 @@ def test_interrupted_search_ends_without_a_file(
         link = f"--connect=udpout:127.0.0.1:{silent.address[1]}"
         ended = gcs("--timeout=600", link, *name.split(), *ON_VEHICLE[name])
         thread.join()
-    assert ended == ("", "gcs: interrupted\n", 1)
+    assert ended == ("", "gcs: interrupted\n", 130)
     assert [path.name for path in tmp_path.iterdir()] == ["given.params"]
 
 
@@ -113,7 +113,7 @@ def test_interrupted_transfer_ends_without_a_file(
     Path("given.params").write_text("1\t1\tMPC_XY_CRUISE\t4.0\t9\n")
     with tcp_server(InterruptingVehicle()) as port:
         said, complaint, code = gcs(f"--connect=tcp:127.0.0.1:{port}", *name.split(), *ON_VEHICLE[name])
-    assert (said, code) == ("", 1)
+    assert (said, code) == ("", 130)
     assert "interrupted" in complaint
     assert complaint.count("\n") == 1
     assert [path.name for path in tmp_path.iterdir()] == ["given.params"]
@@ -127,7 +127,7 @@ def test_interrupted_process_ends_with_a_known_code(name: str, tmp_path: Path) -
         assert silent.wait(LONG_S)
         process.send_signal(signal.SIGINT)
         said, complaint = process.communicate(LONG_S)
-    assert (said, complaint, process.returncode) == ("", "gcs: interrupted\n", 1)
+    assert (said, complaint, process.returncode) == ("", "gcs: interrupted\n", 130)
     assert list(tmp_path.iterdir()) == []
 
 

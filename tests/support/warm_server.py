@@ -32,6 +32,8 @@ from tests.support.warm_children import warm_children
 
 LARGEST_REQUEST = 1 << 18
 LATER = (
+    "flightstack.process.command",
+    "sim_bridge.command",
     "flightstack.process.program",
     "sim_bridge.program",
     "sim_bridge.server.session",

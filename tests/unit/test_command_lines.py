@@ -13,11 +13,11 @@ import pytest
 import typer
 
 import flightstack
-from flightstack.__main__ import app as flightstack_app
+from flightstack.process.command import app as flightstack_app
 from flightstack.process.command_line import PANELS
 from gcs_cli.commands.lazy_group import LazyGroup
 from gcs_cli.program import app as gcs_app
-from sim_bridge.__main__ import app as sim_bridge_app
+from sim_bridge.command import app as sim_bridge_app
 from tests.support.commands import flightstack_command, gcs, sim_bridge_command
 
 APPS = {"flightstack": flightstack_app, "gcs": gcs_app, "sim-bridge": sim_bridge_app}

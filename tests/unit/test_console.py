@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import errno
 import io
+import subprocess
 import sys
 
 import pytest
 
 from flightstack.process import console
 from flightstack.process.console import report_os_error
-from sim_bridge import __main__ as sim_bridge
+from sim_bridge import command as sim_bridge
+from tests.support.commands import flightstack_command, sim_bridge_command
 
 
 class Output(io.TextIOWrapper):
@@ -79,5 +81,43 @@ def test_the_simulator_names_the_file_that_ends_it(
 
     monkeypatch.setattr(sim_bridge, "app", fails)
     monkeypatch.setattr("sys.stdout", io.StringIO())
-    assert sim_bridge.main([]) == 1
+    assert sim_bridge.run_command([]) == 1
     assert capsys.readouterr().err == "sim-bridge: model.xml: No such file or directory\n"
+
+
+@pytest.mark.parametrize("program", ["flightstack.process.program", "flightstack.process.command"])
+def test_an_interrupted_start_of_the_flight_stack_is_an_orderly_end(
+    program: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While it imports, compiles or loads kernels it ended with 130, and without a sentence."""
+    monkeypatch.setitem(sys.modules, program, Interrupting())
+    assert flightstack_command("--state-dir", "none") == ("", "flightstack: stopped\n", 0)
+
+
+@pytest.mark.parametrize("program", ["sim_bridge.program", "sim_bridge.command"])
+@pytest.mark.parametrize(
+    ("words", "said", "code"),
+    [((), "stopped", 0), (("open-loop", "--rotors=1,1,1,1", "--seconds=1"), "interrupted", 130)],
+)
+def test_an_interrupted_start_of_the_simulator_is_reported(
+    program: str, words: tuple[str, ...], said: str, code: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, program, Interrupting())
+    assert sim_bridge_command(*words) == ("", f"sim-bridge: {said}\n", code)
+
+
+def test_an_interrupted_exec_does_not_replace_the_exit_code() -> None:
+    program = (
+        "import sys; from flightstack.process.console import report_interrupt\n"
+        "try: exec('raise KeyboardInterrupt')\n"
+        "except KeyboardInterrupt: report_interrupt('stopped'); sys.exit(0)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.stderr, done.returncode) == ("stopped\n", 0)
+
+
+class Interrupting:
+    """A module whose import is interrupted."""
+
+    def __getattr__(self, name: str) -> object:
+        raise KeyboardInterrupt

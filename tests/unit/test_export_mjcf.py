@@ -16,7 +16,7 @@ from flightstack.simulator_link.hot_frames import ARMED_FLAG
 from gcs_cli.errors import CliError
 from gcs_cli.fly.fly_flags import FlyOptions
 from gcs_cli.fly.fly_options import checked_plan
-from sim_bridge.__main__ import main
+from sim_bridge.command import run_command as main
 from sim_bridge.multibody.mjcf import model_xml
 from sim_bridge.multibody.plant import MultibodyPlant
 from sim_bridge.plant.plant import InitialState, PlantOptions

@@ -14,11 +14,11 @@ from typing import Any
 
 import pytest
 
-from flightstack.__main__ import run as flightstack_run
 from flightstack.core.geodesy import GeoPoint
+from flightstack.process.command import run as flightstack_run
 from flightstack.testing.instances import free_instance
 from gcs_cli.__main__ import main
-from gcs_cli.errors import DONE, FAILED, USAGE, CliError
+from gcs_cli.errors import DONE, INTERRUPTED, USAGE, CliError
 from gcs_cli.fly.fly_flags import NOT_PASSED, TO_SIMULATOR, TO_STACK, FlyOptions, flag_of
 from gcs_cli.fly.fly_options import (
     check_ports,
@@ -30,8 +30,9 @@ from gcs_cli.fly.fly_options import (
     stack_arguments,
 )
 from gcs_cli.link.endpoint import DEFAULT_CONNECTION, VehicleEndpoint, parse_endpoint
+from gcs_cli.output import error_line
 from gcs_cli.transfers.plan_files import example_plans
-from sim_bridge.__main__ import run as sim_bridge_run
+from sim_bridge.command import run as sim_bridge_run
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 HOP = MISSIONS / "hop.plan"
@@ -380,5 +381,7 @@ def test_interrupt_during_the_imports_is_one_sentence(
             raise KeyboardInterrupt
 
     monkeypatch.setitem(sys.modules, "gcs_cli.program", Interrupted())
-    assert main(["status"]) == FAILED
-    assert capsys.readouterr().err == "gcs: interrupted\n"
+    assert main(["status"]) == INTERRUPTED
+    assert capsys.readouterr() == ("", "gcs: interrupted\n")
+    assert main(["status", "--json"]) == INTERRUPTED
+    assert capsys.readouterr() == (error_line("interrupted", INTERRUPTED) + "\n", "gcs: interrupted\n")

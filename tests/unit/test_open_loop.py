@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from sim_bridge.__main__ import main
+from sim_bridge.command import run_command as main
 from sim_bridge.open_loop import split_time
 
 

@@ -14,7 +14,7 @@ from flightstack.flight_log.poses_file import write_poses
 from flightstack.process.command_line import PictureOptions, expand_options, make_app
 from flightstack.process.console import complain
 from flightstack.process.supervised import supervised
-from gcs_cli.errors import FAILED, CliError
+from gcs_cli.errors import INTERRUPTED, CliError
 from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.poses import find_run, poses_of
 
@@ -62,9 +62,9 @@ def _render(arguments: list[str]) -> int:
             code = child.wait()
         except KeyboardInterrupt:
             child.terminate()
-            if _ended(child) != FAILED:  # it ended before it could report
+            if _ended(child) != INTERRUPTED:  # it ended before it could report
                 raise
-            return FAILED
+            raise CliError("", INTERRUPTED) from None
     if code < 0:
         raise CliError(f"the renderer was killed by signal {-code}")
     return code

@@ -13,7 +13,7 @@ from flightstack.core.atomic_file import check_new
 from flightstack.plan import PLAN_NAMES, MissionType, Plan
 from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.commands.confirmation import YesOption, confirm_if_armed
-from gcs_cli.errors import USAGE, CliError
+from gcs_cli.errors import INTERRUPTED, USAGE, CliError
 from gcs_cli.fly.processes import Interruption
 from gcs_cli.link import calls
 from gcs_cli.plans.formats.files import check_suffix, load_any
@@ -72,7 +72,12 @@ def add_upload(app: typer.Typer, kind: MissionType | None, text: str) -> None:
                     only=kind,
                     on_restore=say_restoring,
                 )
-                complete_upload(connection, uploads, file)
+                try:
+                    complete_upload(connection, uploads, file)
+                except CliError as error:
+                    if interruption.reason:
+                        raise CliError(str(error), INTERRUPTED) from None
+                    raise
         say_uploaded(output_of(context, link), parts, uploads)
 
 
