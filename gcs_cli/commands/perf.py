@@ -89,7 +89,7 @@ def timing_table(timing: LoopTiming) -> Table:
             share = None if value is None or period_us is None else 100.0 * value / period_us
             cells += [number(value, 1), number(share, 1)]
         table.add_row(name, *cells)
-    missed = "" if timing.lockstep else f", {timing.missed} deadlines missed"
-    table.caption = f"t {timing.time_s:.1f} s: {timing.ticks} ticks, {timing.overruns} overruns{missed}"
+    late = "" if timing.lockstep else f", {timing.overruns} overruns, {timing.missed} deadlines missed"
+    table.caption = f"t {timing.time_s:.1f} s: {timing.ticks} ticks{late}"
     table.caption_justify = "left"
     return table

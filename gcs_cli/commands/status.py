@@ -13,7 +13,7 @@ from gcs_cli.link.quality import LinkQuality
 from gcs_cli.link.subscription import Snapshot
 from gcs_cli.settings import LinkOptions, output_of
 from gcs_cli.vehicle.field_units import UNKNOWN, number
-from gcs_cli.vehicle.view_types import Estimator, Gnss, VehicleView
+from gcs_cli.vehicle.view_types import Estimator, Gnss, LoopTiming, VehicleView
 from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
@@ -108,6 +108,11 @@ def _health_facts(view: VehicleView) -> dict[str, Any]:
     return facts
 
 
+def _loops_text(timing: LoopTiming) -> str:
+    late = "lockstep" if timing.lockstep else f"{timing.overruns} overruns"
+    return f"{number(timing.inner_hz, 0)} Hz, {late}"
+
+
 def _rounded(values: tuple[float, ...] | None) -> list[float] | None:
     return None if values is None else [round(value, 4) for value in values]
 
@@ -122,7 +127,7 @@ def status_lines(view: VehicleView, quality: LinkQuality) -> list[tuple[str, str
         if geo is None
         else f"{geo.latitude_deg:.7f}°, {geo.longitude_deg:.7f}°, {geo.altitude_m:.1f} m above sea level"
     )
-    loops = None if timing is None else f"{number(timing.inner_hz, 0)} Hz, {timing.overruns} overruns"
+    loops = None if timing is None else _loops_text(timing)
     lines = {
         "vehicle": None if identity is None else f"{identity.kind}, system {identity.system_id}",
         "mode": view.mode,

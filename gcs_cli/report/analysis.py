@@ -16,6 +16,7 @@ from flightstack.core.geodesy import GeoPoint
 from flightstack.core.geometry_bulk import euler_from_quaternions
 from gcs_cli.logs.ulog_parser import DAMAGE, ParsedLog, parse_ulog
 from gcs_cli.report.flight_data import (
+    REAL_TIME,
     Flight,
     LoopTiming,
     MissionProgress,
@@ -190,8 +191,9 @@ class _Reader:
         return next((place for place in places if all(map(math.isfinite, place))), None)
 
     def _overruns(self) -> int | None:
-        rows = self._rows("loop_timing", "overruns")
-        return int(rows[-1][1]) if rows else None
+        rows = self._rows("loop_timing", "overruns", "clock")
+        is_real_time = bool(rows) and rows[-1][2] == REAL_TIME
+        return int(rows[-1][1]) if is_real_time else None
 
 
 def _elements(name: str, count: int) -> list[str]:

@@ -19,7 +19,7 @@ _TOUCH_M = 0.05
 """A vehicle no higher than this above where it comes to rest touches the ground: leant by 10° it stands on one leg."""
 _BOUNCE_M = 0.3
 """A vehicle that rises less than this after it has touched the ground has not taken off again."""
-_REAL_TIME = 1  # clock of a loop timing
+REAL_TIME = 1  # clock of a loop timing
 
 
 class Series(NamedTuple):
@@ -74,7 +74,7 @@ def loop_timing(time_s: float, inner_hz: float, figures: Sequence[float], clock:
     """Return the loop timing of the figures of a message: execution, then lateness; mean, 99 %, largest."""
     period_us = 1e6 / inner_hz if inner_hz > 0.0 else math.nan
     mean, p99, largest, late_mean, late_p99, late_most = figures
-    real_time = clock == _REAL_TIME
+    real_time = clock == REAL_TIME
     return LoopTiming(time_s, period_us, mean, p99, largest, late_mean, late_p99, late_most, real_time)
 
 

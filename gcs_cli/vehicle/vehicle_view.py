@@ -326,8 +326,9 @@ def _esc_telemetry(view: VehicleView, message: Any, _now_s: float) -> Changes:
 def _loop_timing(view: VehicleView, message: Any, _now_s: float) -> Changes:
     names = LoopTiming._fields[4:-1]
     measured = (_number(getattr(message, name)) for name in names)
-    counts = (message.time_us / 1e6, message.ticks, message.overruns, message.missed)
-    timing = LoopTiming._make((*counts, *measured, message.clock == 0))
+    lockstep = message.clock == 0
+    late = (None, None) if lockstep else (message.overruns, message.missed)
+    timing = LoopTiming._make((message.time_us / 1e6, message.ticks, *late, *measured, lockstep))
     return {"timing": timing}
 
 

@@ -206,12 +206,12 @@ class AvailableMode(NamedTuple):
 
 
 class LoopTiming(NamedTuple):
-    """One FS_LOOP_TIMING: times over the last 4096 ticks, counts since start."""
+    """One FS_LOOP_TIMING: times over the last 4096 ticks, counts since start; in lockstep no tick can be late."""
 
     time_s: float
     ticks: int
-    overruns: int
-    missed: int
+    overruns: int | None
+    missed: int | None
     inner_hz: float | None
     outer_hz: float | None
     real_time_factor: float | None

@@ -24,7 +24,7 @@ from gcs_cli.vehicle.view_types import (
 )
 
 NOW_S = 10.0
-TIMING = LoopTiming(41, 20500, 3, 2, 500, 100, 52.3, 13.2, 25.5, 130, 4, 5, 6, True)
+TIMING = LoopTiming(41, 20500, None, None, 500, 100, 52.3, 13.2, 25.5, 130, 4, 5, 6, True)
 BARE = VehicleView(identity=Identity(1, 1, 2, 12), last_heartbeat_s=9.5)
 FULL = BARE._replace(
     mode="MISSION",

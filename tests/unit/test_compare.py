@@ -71,6 +71,14 @@ def test_figures_show_their_change_relative_to_the_first_run() -> None:
     assert row.changes == ["", "+50.0%", "", "×15"]
 
 
+def test_overruns_are_compared_if_a_run_has_them() -> None:
+    def keys(*overruns: int | None) -> list[str]:
+        return [row.key for row in figure_rows([{"overruns": value} for value in overruns])]
+
+    assert "overruns" in keys(None, 2)
+    assert "overruns" not in keys(None, None)  # in lockstep
+
+
 def test_plan_is_shown_by_its_name() -> None:
     def texts(*plans: str | None) -> list[str]:
         return next(

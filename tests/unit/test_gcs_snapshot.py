@@ -19,7 +19,7 @@ from gcs_cli.vehicle.view_types import (
 )
 
 OURS = VehicleView(identity=Identity(7, 1, mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4))
-TIMING = LoopTiming(0.0, 0, 0, 0, *[None] * 9, lockstep=True)
+TIMING = LoopTiming(0.0, 0, None, None, *[None] * 9, lockstep=True)
 REQUEST = mavlink.MAV_CMD_REQUEST_MESSAGE
 OWN, VEHICLE = Address(255, 190), Address(7, 1)
 

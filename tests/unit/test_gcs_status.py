@@ -11,6 +11,7 @@ from gcs_cli.tui.fly.health_panels import health_panel
 from gcs_cli.tui.palette import DARK
 from gcs_cli.vehicle.view_types import VehicleView
 from tests.support.folded_vehicle import Vehicle, heartbeat
+from tests.support.watch_states import TIMING
 
 GOOD = 0b1100111111
 
@@ -83,3 +84,10 @@ def test_status_tells_the_current_item_from_the_items_of_the_mission() -> None:
         "current item 2 (items 0 to 5), last reached 1"
     )
     assert lines(vehicle.send(mavlink.MAVLink_mission_current_message(0, 0)))["mission"] == "none"
+
+
+def test_loops_in_lockstep_have_no_overruns() -> None:
+    view = seen()._replace(timing=TIMING)
+    assert lines(view)["inner loop"] == "500 Hz, lockstep"
+    late = TIMING._replace(lockstep=False, overruns=3, missed=0)
+    assert lines(view._replace(timing=late))["inner loop"] == "500 Hz, 3 overruns"

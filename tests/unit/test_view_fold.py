@@ -193,6 +193,12 @@ def test_loop_timing_turns_nan_into_unknown(vehicle: Vehicle) -> None:
     assert (timing.inner_hz, timing.lateness_max_us) == (500.0, 3.0)
 
 
+def test_loop_timing_in_lockstep_has_no_overruns(vehicle: Vehicle) -> None:
+    timing = vehicle.send(FsLoopTiming(2_500_000, 1250, 3, 4, 500.0, 100.0, *[1.0] * 7, 0)).timing
+    assert timing is not None
+    assert (timing.lockstep, timing.ticks, timing.overruns, timing.missed) == (True, 1250, None, None)
+
+
 def test_status_texts_are_kept_numbered_and_bounded(vehicle: Vehicle) -> None:
     for index in range(TEXTS_KEPT + 20):
         vehicle.send(mavlink.MAVLink_statustext_message(6, f"text {index}".encode()))

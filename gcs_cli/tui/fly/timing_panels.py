@@ -61,11 +61,13 @@ def _rates(timing: LoopTiming, colours: Palette) -> Text:
 
 
 def _counts(timing: LoopTiming, colours: Palette) -> Text:
-    text = Text("overruns ", colours.muted, no_wrap=True, overflow="crop")
+    text = Text(no_wrap=True, overflow="crop")
+    if timing.lockstep:
+        return text.append("ticks ", colours.muted).append(f"{timing.ticks}", f"bold {colours.text}")
+    text.append("overruns ", colours.muted)
     text.append(f"{timing.overruns}", f"bold {colours.warning if timing.overruns else colours.text}")
-    if not timing.lockstep:
-        text.append(" missed ", colours.muted)
-        text.append(f"{timing.missed}", f"bold {colours.bad if timing.missed else colours.text}")
+    text.append(" missed ", colours.muted)
+    text.append(f"{timing.missed}", f"bold {colours.bad if timing.missed else colours.text}")
     return text.append(f" of {timing.ticks}", colours.muted)
 
 
