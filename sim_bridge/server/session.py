@@ -17,7 +17,7 @@ from sim_bridge.server.endpoint import FlightStackEndpoint
 if TYPE_CHECKING:
     from sim_bridge.server.quiet_exchanges import QuietExchanges
 
-_BINS = 100_000  # of 1 µs; the last one also counts longer delays
+_BINS = 100_000  # of 1 µs; one more counts longer delays
 _SLIP_NS = 500_000_000
 _LONGEST_SLEEP_S = 0.1
 LEAD_NS = 10_000_000
@@ -32,14 +32,14 @@ class Lateness:
     """Distribution of the delays after deadlines, in bins of 1 µs."""
 
     def __init__(self) -> None:
-        self._bins = [0] * _BINS
+        self._bins = [0] * (_BINS + 1)
         self._sum_ns = 0
         self.count = 0
         self.max_us = 0.0
 
     def add(self, late_ns: int) -> None:
         """Count one delay."""
-        self._bins[min(late_ns // 1000, _BINS - 1)] += 1
+        self._bins[min(late_ns // 1000, _BINS)] += 1
         self._sum_ns += late_ns
         self.count += 1
         self.max_us = max(self.max_us, late_ns / 1000.0)
@@ -48,14 +48,14 @@ class Lateness:
         """Return the mean delay."""
         return self._sum_ns / 1000.0 / max(1, self.count)
 
-    def percentile_us(self, percent: float) -> float:
-        """Return a percentile of the delays, to 1 µs."""
+    def percentile_text(self, percent: float) -> str:
+        """Return a percentile of the delays with its unit, to 1 µs; above the bins, their end."""
         wanted, seen = self.count * percent / 100.0, 0
         for us, number in enumerate(self._bins):
             seen += number
-            if seen >= wanted:
-                return us + 1.0
-        return float(_BINS)
+            if seen >= wanted and us < _BINS:
+                return f"{us + 1} µs"
+        return f"> {_BINS // 1000} ms"
 
 
 class Pacer:
@@ -212,7 +212,7 @@ class Session:
         if self.pacer is not None and self.pacer.lateness.count:
             late = self.pacer.lateness
             lines.append(
-                f"lateness mean {late.mean_us():.0f} µs, 99 % {late.percentile_us(99.0):.0f} µs, "
+                f"lateness mean {late.mean_us():.0f} µs, 99 % {late.percentile_text(99.0)}, "
                 f"max {late.max_us:.0f} µs; {self.pacer.slips} slips"
             )
         return lines

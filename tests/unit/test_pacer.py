@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from sim_bridge.server import session
-from sim_bridge.server.session import LEAD_NS, Pacer
+from sim_bridge.server.session import LEAD_NS, Lateness, Pacer
 
 TICK_US = 2000
 
@@ -62,3 +62,13 @@ def test_late_pacer_counts_lateness_and_does_not_sleep(clock: Clock) -> None:
     clock.now_ns = 3_000_000
     pacer.wait_until(TICK_US, LEAD_NS)
     assert (clock.sleeps_ms, pacer.lateness.max_us) == ([], 1000.0)
+
+
+def test_lateness_above_the_bins_is_not_printed_as_their_end() -> None:
+    late = Lateness()
+    late.add(99_999_000)
+    assert late.percentile_text(99.0) == "100000 µs"
+    for _ in range(99):
+        late.add(250_000_000)
+    assert late.percentile_text(99.0) == "> 100 ms"
+    assert late.max_us == 250_000.0
