@@ -124,18 +124,10 @@ def turn_between(before: Quaternion, after: Quaternion) -> float:
 
 
 @compiled
-def corrected(n: Nominal, error: ErrorVector) -> Nominal:
-    """Add an error state, shape (27,), to the nominal state."""
-    return Nominal(
-        turned(n.attitude, read_vector(error, ATTITUDE)),
-        sum_of(n.velocity_ned_m_s, read_vector(error, VELOCITY)),
-        sum_of(n.position_ned_m, read_vector(error, POSITION)),
-        sum_of(n.gyro_bias_rad_s, read_vector(error, GYRO_BIAS)),
-        sum_of(n.accel_bias_m_s2, read_vector(error, ACCEL_BIAS)),
-        sum_of(n.earth_field_ned_gauss, read_vector(error, EARTH_FIELD)),
-        sum_of(n.body_field_frd_gauss, read_vector(error, BODY_FIELD)),
-        n.wind_north_m_s + error[WIND],
-        n.wind_east_m_s + error[WIND + 1],
-        n.baro_bias_m + error[BARO_BIAS],
-        sum_of(n.gnss_bias_ned_m, read_vector(error, GNSS_BIAS)),
-    )
+def correct(x: FloatArray, error: ErrorVector, share: float) -> None:
+    """Add ``share`` of an error state, shape (27,), to the array form of the nominal state, shape (28,)."""
+    turn = scaled(read_vector(error, ATTITUDE), share)
+    q = turned(Quaternion(x[0], x[1], x[2], x[3]), turn)
+    x[0], x[1], x[2], x[3] = q.w, q.x, q.y, q.z
+    for i in range(VELOCITY, ERROR_STATES):
+        x[i + 1] += share * error[i]

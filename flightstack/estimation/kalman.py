@@ -13,9 +13,7 @@ from flightstack.estimation.error_state import (
     ERROR_STATES,
     Covariance,
     ErrorVector,
-    corrected,
-    read_nominal,
-    write_nominal,
+    correct,
 )
 
 OBSERVATIONS = 25
@@ -111,16 +109,15 @@ def symmetric(p: Covariance) -> Covariance:
 def _project(f: Filter) -> float:
     """Write P hᵀ to ``ph`` and return h P hᵀ."""
     clear(f.ph)
+    total = 0.0
     for k in range(ERROR_STATES):
         slope = f.h[k]
         if slope != 0.0:
+            total += slope * (2.0 * f.ph[k] + slope * f.covariance[k, k])
             for i in range(k):
                 f.ph[i] += slope * f.covariance[i, k]
             for i in range(k, ERROR_STATES):
                 f.ph[i] += slope * f.covariance[k, i]
-    total = 0.0
-    for i in range(ERROR_STATES):
-        total += f.h[i] * f.ph[i]
     return total
 
 
@@ -141,10 +138,8 @@ def _correct(f: Filter, innovation: float) -> None:
             share = ph[i]
             for j in range(i, ERROR_STATES):
                 p[i, j] -= share * gain[j]
-    for i in range(ERROR_STATES):
         p[i, i] = max(p[i, i], 1e-12)
-        gain[i] *= innovation
-    write_nominal(f.nominal, corrected(read_nominal(f.nominal), gain))
+    correct(f.nominal, gain, innovation)
 
 
 @compiled

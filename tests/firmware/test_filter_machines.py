@@ -14,7 +14,7 @@ from tests.support.tools import NIGHTLY
 FLIGHT = "square" if NIGHTLY else "hop"
 AVR_EVENTS = 3000 if NIGHTLY else 500
 """From the start to behind the alignment; a simulated AVR takes 100 events in a second."""
-MEAN_INSTRUCTIONS = {"hop": 3970, "square": 4220}
+MEAN_INSTRUCTIONS = {"hop": 3890, "square": 4000}
 MOST_INSTRUCTIONS, OUTPUT_INSTRUCTIONS = 14_130, 940
 MOST_OF_PART = {
     "predict": 395, "predict errors": 3860, "predict yaw models": 1500, "drift of GNSS": 435,

@@ -27,7 +27,7 @@ from tools import derive_estimator
 ANGLE, VELOCITY, DT_S, GRAVITY = Vector3(0.004, -0.007, 0.003), Vector3(0.02, -0.03, -0.08), 0.008, 9.80665
 STEP = 1e-6
 read_nominal, write_nominal = in_python(error_state.read_nominal), in_python(error_state.write_nominal)
-corrected, less_bias = in_python(error_state.corrected), in_python(prediction.less_bias)
+correct, less_bias = in_python(error_state.correct), in_python(prediction.less_bias)
 motion_of, with_motion = in_python(prediction.motion_of), in_python(prediction.with_motion)
 moved = in_python(prediction.moved)
 predict_covariance = in_python(derived.predict_covariance)
@@ -54,9 +54,11 @@ def propagated(n: Nominal) -> Nominal:
 
 
 def perturbed(n: Nominal, index: int, size: float) -> Nominal:
-    error = np.zeros(ERROR_STATES)
-    error[index] = size
-    return corrected(n, error)
+    x, error = np.zeros(NOMINAL_SIZE), np.zeros(ERROR_STATES)
+    write_nominal(x, n)
+    error[index] = 1.0
+    correct(x, error, size)
+    return read_nominal(x)
 
 
 def test_covariance_prediction_is_that_of_the_propagated_state() -> None:

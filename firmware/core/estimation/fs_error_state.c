@@ -10,15 +10,6 @@
 #include "fs_math.h"
 
 #define FS_ATTITUDE 0
-#define FS_VELOCITY 3
-#define FS_POSITION 6
-#define FS_GYRO_BIAS 9
-#define FS_ACCEL_BIAS 12
-#define FS_EARTH_FIELD 15
-#define FS_BODY_FIELD 18
-#define FS_WIND 21
-#define FS_BARO_BIAS 23
-#define FS_GNSS_BIAS 24
 
 /* error_state.py:58 */
 fs_vector3 fs_read_vector(const fs_real x[], int32_t at)
@@ -66,6 +57,28 @@ void fs_write_vector(fs_real x[], int32_t at, const fs_vector3 *v)
     x[at + 2] = v->z;
 }
 
+/* error_state.py:127 */
+void fs_correct(fs_real x[], const fs_real error[27], fs_real share)
+{
+    const fs_vector3 read_vector = fs_read_vector(error, FS_ATTITUDE);
+    const fs_vector3 turn = fs_scaled(&read_vector, share);
+    const fs_quaternion q_2 = {x[0], x[1], x[2], x[3]};
+    const fs_quaternion q = fs_turned(&q_2, &turn);
+    x[0] = q.w;
+    x[1] = q.x;
+    x[2] = q.y;
+    x[3] = q.z;
+    for (int32_t i = 3; i < 27; i++) {
+        x[i + 1] += share * error[i];
+    }
+}
+
+/* error_state.py:70 */
+fs_vector3 fs_sum_of(const fs_vector3 *a, const fs_vector3 *b)
+{
+    return (fs_vector3){a->x + b->x, a->y + b->y, a->z + b->z};
+}
+
 /* error_state.py:100 */
 void fs_write_nominal(fs_real x[], const fs_nominal *n)
 {
@@ -83,38 +96,6 @@ void fs_write_nominal(fs_real x[], const fs_nominal *n)
     x[23] = n->wind_east_m_s;
     x[24] = n->baro_bias_m;
     fs_write_vector(x, 25, &n->gnss_bias_ned_m);
-}
-
-/* error_state.py:70 */
-fs_vector3 fs_sum_of(const fs_vector3 *a, const fs_vector3 *b)
-{
-    return (fs_vector3){a->x + b->x, a->y + b->y, a->z + b->z};
-}
-
-/* error_state.py:127 */
-fs_nominal fs_corrected(const fs_nominal *n, const fs_real error[27])
-{
-    const fs_vector3 read_vector = fs_read_vector(error, FS_ATTITUDE);
-    const fs_vector3 read_vector_2 = fs_read_vector(error, FS_VELOCITY);
-    const fs_vector3 read_vector_3 = fs_read_vector(error, FS_POSITION);
-    const fs_vector3 read_vector_4 = fs_read_vector(error, FS_GYRO_BIAS);
-    const fs_vector3 read_vector_5 = fs_read_vector(error, FS_ACCEL_BIAS);
-    const fs_vector3 read_vector_6 = fs_read_vector(error, FS_EARTH_FIELD);
-    const fs_vector3 read_vector_7 = fs_read_vector(error, FS_BODY_FIELD);
-    const fs_vector3 read_vector_8 = fs_read_vector(error, FS_GNSS_BIAS);
-    return (fs_nominal){
-        .attitude = fs_turned(&n->attitude, &read_vector),
-        .velocity_ned_m_s = fs_sum_of(&n->velocity_ned_m_s, &read_vector_2),
-        .position_ned_m = fs_sum_of(&n->position_ned_m, &read_vector_3),
-        .gyro_bias_rad_s = fs_sum_of(&n->gyro_bias_rad_s, &read_vector_4),
-        .accel_bias_m_s2 = fs_sum_of(&n->accel_bias_m_s2, &read_vector_5),
-        .earth_field_ned_gauss = fs_sum_of(&n->earth_field_ned_gauss, &read_vector_6),
-        .body_field_frd_gauss = fs_sum_of(&n->body_field_frd_gauss, &read_vector_7),
-        .wind_north_m_s = n->wind_north_m_s + error[FS_WIND],
-        .wind_east_m_s = n->wind_east_m_s + error[FS_WIND + 1],
-        .baro_bias_m = n->baro_bias_m + error[FS_BARO_BIAS],
-        .gnss_bias_ned_m = fs_sum_of(&n->gnss_bias_ned_m, &read_vector_8),
-    };
 }
 
 /* error_state.py:120 */

@@ -37,14 +37,16 @@ fs_quaternion fs_turned(const fs_quaternion *q, const fs_vector3 *world_rotation
 /* Write three floats to index at. error_state.py:64 */
 void fs_write_vector(fs_real x[], int32_t at, const fs_vector3 *v);
 
-/* Write a Nominal in its array form, shape (28,). error_state.py:100 */
-void fs_write_nominal(fs_real x[], const fs_nominal *n);
+/*
+ * Add share of an error state, shape (27,), to the array form of the nominal state, shape (28,). error_state.py:127
+ */
+void fs_correct(fs_real x[], const fs_real error[27], fs_real share);
 
 /* Vector sum. error_state.py:70 */
 fs_vector3 fs_sum_of(const fs_vector3 *a, const fs_vector3 *b);
 
-/* Add an error state, shape (27,), to the nominal state. error_state.py:127 */
-fs_nominal fs_corrected(const fs_nominal *n, const fs_real error[27]);
+/* Write a Nominal in its array form, shape (28,). error_state.py:100 */
+void fs_write_nominal(fs_real x[], const fs_nominal *n);
 
 /* Return the angle [rad] about the vertical from one attitude to another. error_state.py:120 */
 fs_real fs_turn_between(const fs_quaternion *before, const fs_quaternion *after);

@@ -14,7 +14,7 @@
 #define FS_HOLDS_HORIZONTAL FS_LIT(2.0)
 #define FS_HOLDS_TILT_AND_GYRO FS_LIT(3.0)
 
-/* kalman.py:223 */
+/* kalman.py:218 */
 void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
 {
     for (int32_t i = at; i < at + count; i++) {
@@ -28,7 +28,7 @@ void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real var
     }
 }
 
-/* kalman.py:98 */
+/* kalman.py:96 */
 void fs_clear(fs_real x[27])
 {
     for (int32_t i = 0; i < 27; i++) {
@@ -36,13 +36,15 @@ void fs_clear(fs_real x[27])
     }
 }
 
-/* Write P h' to ph and return h P h'. kalman.py:111 */
+/* Write P h' to ph and return h P h'. kalman.py:109 */
 static fs_real project(fs_filter *f)
 {
     fs_clear(f->ph);
+    fs_real total = FS_LIT(0.0);
     for (int32_t k = 0; k < 27; k++) {
         const fs_real slope = f->h[k];
         if (slope != FS_LIT(0.0)) {
+            total += slope * (FS_LIT(2.0) * f->ph[k] + slope * f->covariance[k][k]);
             for (int32_t i = 0; i < k; i++) {
                 f->ph[i] += slope * f->covariance[i][k];
             }
@@ -50,10 +52,6 @@ static fs_real project(fs_filter *f)
                 f->ph[i] += slope * f->covariance[k][i];
             }
         }
-    }
-    fs_real total = FS_LIT(0.0);
-    for (int32_t i = 0; i < 27; i++) {
-        total += f->h[i] * f->ph[i];
     }
     return total;
 }
@@ -65,7 +63,7 @@ static fs_real project(fs_filter *f)
  * Half the squared difference of two successive innovations has the variance of white noise, and an error of the
  * model, which both have, does not count. A slow sensor has the whole variance, as its correlation is counted apart.
  *
- * kalman.py:151
+ * kalman.py:146
  */
 static void adapt_noise(fs_observed *o, fs_real r, fs_real projected, fs_real last, const fs_noise *noise)
 {
@@ -83,7 +81,7 @@ static void adapt_noise(fs_observed *o, fs_real r, fs_real projected, fs_real la
     o->noise = fs_min(fs_max(r + share * (estimate - r), least), largest);
 }
 
-/* Make the gains of the states that are held zero. kalman.py:170 */
+/* Make the gains of the states that are held zero. kalman.py:165 */
 static void hold(fs_real gain[27], fs_real holds)
 {
     if (holds == FS_HOLDS_HORIZONTAL) {
@@ -115,7 +113,7 @@ static void hold(fs_real gain[27], fs_real holds)
  * Joseph's form with such a gain subtracts P h' h P / variance from the covariance, except between two states that
  * both keep their values: one product for each element instead of two.
  *
- * kalman.py:128
+ * kalman.py:125
  */
 static void correct(fs_filter *f, fs_real innovation)
 {
@@ -134,17 +132,12 @@ static void correct(fs_filter *f, fs_real innovation)
                 }
             }
         }
-    }
-    for (int32_t i = 0; i < 27; i++) {
         f->covariance[i][i] = fs_max(f->covariance[i][i], FS_LIT(1e-12));
-        f->gain[i] *= innovation;
     }
-    const fs_nominal read_nominal = fs_read_nominal(f->nominal);
-    const fs_nominal corrected = fs_corrected(&read_nominal, f->gain);
-    fs_write_nominal(f->nominal, &corrected);
+    fs_correct(f->nominal, f->gain, innovation);
 }
 
-/* kalman.py:186 */
+/* kalman.py:181 */
 bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *noise, fs_real holds)
 {
     fs_observed *o = &f->observations[row];
@@ -182,7 +175,7 @@ bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *nois
     return true;
 }
 
-/* kalman.py:234 */
+/* kalman.py:229 */
 fs_real fs_deviation(const fs_filter *f, int32_t at, int32_t count)
 {
     fs_real total = FS_LIT(0.0);

@@ -42,10 +42,10 @@ typedef struct {
     fs_real is_slow;
 } fs_noise;
 
-/* Make count states from at independent of all others, each with variance. kalman.py:223 */
+/* Make count states from at independent of all others, each with variance. kalman.py:218 */
 void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real variance);
 
-/* Set every item to zero. kalman.py:98 */
+/* Set every item to zero. kalman.py:96 */
 void fs_clear(fs_real x[27]);
 
 /*
@@ -56,11 +56,11 @@ void fs_clear(fs_real x[27]);
  *
  * With holds other than zero, these states keep their values and their uncertainty: a Schmidt-Kalman update.
  *
- * kalman.py:186
+ * kalman.py:181
  */
 bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *noise, fs_real holds);
 
-/* Return the root of the summed variances of count states from at. kalman.py:234 */
+/* Return the root of the summed variances of count states from at. kalman.py:229 */
 fs_real fs_deviation(const fs_filter *f, int32_t at, int32_t count);
 
 #endif

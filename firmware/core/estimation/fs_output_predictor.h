@@ -10,10 +10,22 @@
 #include "fs_rings.h"
 #include "fs_types.h"
 
-/* Write a row of the track. output_predictor.py:20 */
+/* Change of the filter's state that a row of the track follows. */
+typedef struct {
+    fs_quaternion turn;
+    fs_vector3 north;
+    fs_vector3 east;
+    fs_vector3 down;
+    fs_vector3 speed_m_s;
+    fs_vector3 before_m;
+    fs_vector3 after_m;
+    fs_real start_s;
+} fs__change;
+
+/* Write a row of the track. output_predictor.py:29 */
 void fs_write_motion(fs_real row[], fs_real time_s, const fs_motion *motion);
 
-/* Read a row of the track, shape (11,): time, attitude, velocity, position. output_predictor.py:14 */
+/* Read a row of the track, shape (11,): time, attitude, velocity, position. output_predictor.py:23 */
 fs_motion fs_read_motion(const fs_real row[]);
 
 /*
@@ -22,7 +34,7 @@ fs_motion fs_read_motion(const fs_real row[]);
  * target is the filter's state at the time of that row. Times after it are corrected for the effect of the difference
  * until then.
  *
- * output_predictor.py:51
+ * output_predictor.py:103
  */
 void fs_follow(fs_rings *rings, fs_real output[], const fs_motion *target, fs_real share, fs_real gravity);
 
