@@ -24,5 +24,5 @@ def table_console() -> Console:
     """Return the console of stdout, wide enough for a table if stdout is no terminal."""
     from rich.console import Console
 
-    console = Console()
-    return console if console.is_terminal else Console(width=_WIDE)
+    console = Console(emoji=False)
+    return console if console.is_terminal else Console(width=_WIDE, emoji=False)

@@ -26,6 +26,10 @@ _WITH_BAR, _WITH_PLACE = 60, 90  # columns of the terminal
 class FlyConsole(Console):
     """A console that stops printing after a broken pipe or on a full disk, so that the flight continues."""
 
+    def __init__(self, **settings: Any) -> None:
+        """Words between colons, as in the notation of faults, are no names of pictures."""
+        super().__init__(emoji=False, **settings)
+
     def print(self, *objects: Any, **options: Any) -> None:
         """Print; stop printing after an error."""
         try:

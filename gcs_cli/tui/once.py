@@ -39,6 +39,6 @@ def print_once(
         app.exit()
 
     app.run(headless=True, size=size, auto_pilot=take)
-    console = Console(width=size[0])
+    console = Console(width=size[0], emoji=False)
     for line in lines:
         console.print(Segments([*line, Segment.line()]), end="")

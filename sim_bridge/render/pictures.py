@@ -85,7 +85,7 @@ class Pictures:
         ]
         title = path.poses.title or vehicle.name
         self._overlay = Overlay(title, fastest, style.width, style.height, labels)
-        console = Console(stderr=True)
+        console = Console(stderr=True, emoji=False)
         self._progress = Progress(
             TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
             console=console, transient=True, disable=not console.is_terminal or console.is_dumb_terminal,

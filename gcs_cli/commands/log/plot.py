@@ -106,6 +106,6 @@ def _print(out: Output, recording: Recording, fields: list[Field], limits: tuple
         return
     from rich.console import Console
 
-    console = Console(highlight=False)
+    console = Console(highlight=False, emoji=False)
     for panel in field_figure(recording, fields, *limits).panels:
         console.print(terminal_panel(panel, console.width, _PANEL_ROWS), soft_wrap=True)

@@ -25,7 +25,7 @@ class TransferBar:
         self, name: str, console: Console | None = None, columns: Sequence[ProgressColumn] = ()
     ) -> None:
         """Show ``columns`` after the bar; by default bytes and their rate."""
-        console = console or Console(stderr=True)
+        console = console or Console(stderr=True, emoji=False)
         draws = console.is_terminal and not console.is_dumb_terminal
         self._progress = Progress(
             TextColumn("{task.description}"),
