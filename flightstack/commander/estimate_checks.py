@@ -65,12 +65,16 @@ def estimate_refusals(health: EstimateHealth | None, behaviour: Behaviour) -> tu
 
 
 class EstimateLimits(NamedTuple):
-    """Limits of the estimate in flight [1σ]; zero or less is none, but for the velocity."""
+    """Limits of the estimate in flight."""
 
     position_m: float
+    """Deviation [1σ] of the horizontal position; zero or less for none."""
     dead_reckoning_s: float
+    """Time without an accepted horizontal position or velocity."""
     tilt_rad: float
+    """Deviation [1σ]; zero or less for none."""
     velocity_m_s: float
+    """Deviation [1σ] of the horizontal velocity."""
 
 
 LIMITS = dtype_of(EstimateLimits)
@@ -86,56 +90,68 @@ def limits_of(behaviour: Behaviour) -> EstimateLimits:
     )
 
 
-_FAILSAFES = (
-    Failsafe.IMU_FAULT,
-    Failsafe.ATTITUDE_DOUBTFUL,
-    Failsafe.POSITION_LOST,
-    Failsafe.GNSS_REFUSED,
-)
-"""Failsafes of the first bits of ``facts_of``."""
+IMU_FAULT, ATTITUDE_DOUBTFUL, POSITION_LOST, GNSS_REFUSED = 1, 2, 4, 8
+VELOCITY_UNKNOWN, MAG_FAULT, BARO_FAULT = 16, 32, 64
+"""Bits of ``conditions_of``."""
+_FAILSAFES = {
+    IMU_FAULT: Failsafe.IMU_FAULT,
+    ATTITUDE_DOUBTFUL: Failsafe.ATTITUDE_DOUBTFUL,
+    POSITION_LOST: Failsafe.POSITION_LOST,
+    GNSS_REFUSED: Failsafe.GNSS_REFUSED,
+}
 
 
 @compiled
-def facts_of(h: Any, limits: Any, mag_fault: int) -> int:
-    """Return a bit for each fact of a health that the vehicle acts on.
+def conditions_of(h: Any, limits: Any, mag_fault: int, flying: bool) -> int:
+    """Return the bits of the conditions of a health that commander, guidance or reports follow.
 
-    These are the conditions of ``_FAILSAFES``, an unknown velocity, a fault of the magnetometer and of the barometer.
+    A fault of the barometer counts only while the vehicle is ``flying``.
     """
     bits: int = 0
     if h.imu_age_s > IMU_MISSING_S or h.imu_is_stuck:
-        bits |= 1
+        bits |= IMU_FAULT
     if h.tilt_rad > limits.tilt_rad > 0.0:
-        bits |= 2
+        bits |= ATTITUDE_DOUBTFUL
     if h.unaided_s > limits.dead_reckoning_s or h.is_inaccurate or h.lag_s > LATE_S:
-        bits |= 4
+        bits |= POSITION_LOST
     if h.refused_s > REFUSED_S:
-        bits |= 8
-    if h.velocity_m_s > limits.velocity_m_s:
-        bits |= 16
+        bits |= GNSS_REFUSED
+    if not h.velocity_m_s <= limits.velocity_m_s:  # also of NaN
+        bits |= VELOCITY_UNKNOWN
     if mag_fault != 0:
-        bits |= 32
-    if h.baro_is_stuck or h.baro_age_s > MISSING_S:
-        bits |= 64
+        bits |= MAG_FAULT
+    if flying and (h.baro_is_stuck or h.baro_age_s > MISSING_S):
+        bits |= BARO_FAULT
     return bits
 
 
 @compiled
 def watch_estimate(
-    memory: MemoryArray, watch: WatchArray, track: TrackArray, limits: Any, has_origin: bool, time_s: float
+    memory: MemoryArray,
+    watch: WatchArray,
+    track: TrackArray,
+    limits: Any,
+    has_origin: bool,
+    flying: bool,
+    time_s: float,
 ) -> int:
-    """Update the health after a sample of the inertial sensor at ``time_s``; return the facts of it.
+    """Update the health after a sample of the inertial sensor at ``time_s``; return its ``conditions_of``.
 
     ``track`` has the sample; ``limits`` is an array of one ``EstimateLimits``.
     """
     newest = watch[0]["newest"]
     newest["imu_s"], newest["repeats"] = time_s, track[0]["repeats"]
     update_health(memory, watch, has_origin, limits[0]["position_m"], time_s)
-    return facts_of(watch[0]["health"], limits[0], memory[0]["flags"]["mag_fault"])
+    return conditions_of(watch[0]["health"], limits[0], memory[0]["flags"]["mag_fault"], flying)
 
 
 def estimate_failsafes(health: EstimateHealth | None, behaviour: Behaviour) -> frozenset[Failsafe]:
     """Return the conditions of failsafes in flight."""
     if health is None:
         return frozenset()
-    bits = plain(facts_of)(health, limits_of(behaviour), 0)
-    return frozenset(failsafe for at, failsafe in enumerate(_FAILSAFES) if bits >> at & 1)
+    return failsafes_of(plain(conditions_of)(health, limits_of(behaviour), 0, False))
+
+
+def failsafes_of(conditions: int) -> frozenset[Failsafe]:
+    """Return the failsafes of the bits of ``conditions_of``."""
+    return frozenset(failsafe for bit, failsafe in _FAILSAFES.items() if conditions & bit)

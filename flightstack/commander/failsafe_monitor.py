@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from flightstack.commander.arming_checks import ArmingFacts
-from flightstack.commander.estimate_checks import estimate_failsafes
+from flightstack.commander.estimate_checks import VELOCITY_UNKNOWN, failsafes_of
 from flightstack.commander.failsafe import Action, Decision, Failsafe, Phase, action_of
 from flightstack.commander.failsafe_step import (
     IDLE,
@@ -109,7 +109,8 @@ class FailsafeMonitor:
         """True if the vehicle is landed, or in ground contact before the land detector reports landed."""
         self.battery_level = 0
         self._health: EstimateHealth | None = None
-        self._estimate: frozenset[Failsafe] = frozenset()  # conditions of the estimate
+        self._conditions_of_estimate = 0
+        self._estimate: frozenset[Failsafe] = frozenset()  # of these conditions
         self._reading: BatteryReading | None = None
         self._source = source
         self._state = state
@@ -186,13 +187,14 @@ class FailsafeMonitor:
     @property
     def velocity_is_known(self) -> bool:
         """True unless the estimate of the velocity is too uncertain to brake by."""
-        return self._health is None or self._health.velocity_m_s <= self._behaviour.velocity_accuracy_m_s
+        return not self._conditions_of_estimate & VELOCITY_UNKNOWN
 
     # ------------------------------------------------------------------ inputs
 
-    def take_health(self, health: EstimateHealth) -> None:
-        """Take the health of the estimate; only of a vehicle that flies on its sensors."""
-        self._health, self._estimate = health, estimate_failsafes(health, self._behaviour)
+    def take_health(self, health: EstimateHealth, conditions: int) -> None:
+        """Take the health of the estimate and its conditions; only of a vehicle that flies on its sensors."""
+        self._health, self._conditions_of_estimate = health, conditions
+        self._estimate = failsafes_of(conditions)
 
     def set_behaviour(self, behaviour: Behaviour) -> None:
         """Set new parameters, from the next outer tick on."""

@@ -141,7 +141,7 @@ def _summarise(m: MemoryRecord, s: SummaryRecord) -> None:
 
 @compiled
 def health_kernel(memory: MemoryArray, summary: SummaryArray) -> None:
-    """Write the summary of an estimator's memory, as the target does."""
+    """Write the summary of an estimator's memory."""
     _summarise(memory[0], summary[0])
 
 
@@ -242,8 +242,8 @@ WatchArray: TypeAlias = Annotated[RecordArray, HealthWatch]
 
 
 @compiled
-def _baro_is_stuck(m: MemoryRecord, w: WatchRecord, time_s: float) -> bool:
-    """Compare the newest pressure with the last one, which the health may be newer than."""
+def _update_pressure(m: MemoryRecord, w: WatchRecord, time_s: float) -> bool:
+    """Compare the newest pressure, if it is new, with the last one; return True if the barometer is stuck."""
     newest, p = w["newest"], w["pressure"]
     if newest["baro_s"] == -math.inf:
         return False
@@ -283,7 +283,7 @@ def update_health(
         time_s - newest["baro_s"],
         fix_age_s,
     )
-    h["baro_is_stuck"] = _baro_is_stuck(m, w, time_s)
+    h["baro_is_stuck"] = _update_pressure(m, w, time_s)
     h["unaided_s"] = s["unaided_s"] if has_origin else math.inf
     h["refused_s"] = s["refused_s"] if has_origin and fix_age_s < MISSING_FIX_S else 0.0
     h["is_inaccurate"] = accuracy.is_inaccurate

@@ -63,8 +63,8 @@ class App:
     def __init__(self, config: StackConfig, process: ProcessConfig) -> None:
         self._process = process
         self._config = config
-        self._files = ProcessFiles(process)
-        self.stack = self._files.build(config, self._prepare_reboot)
+        self._files = ProcessFiles(process, self._prepare_reboot)
+        self.stack = self._files.build(config)
         self._files.adopt(self.stack, config)
         if config.lockstep:
             compile_kernels(self.stack)
@@ -145,7 +145,7 @@ class App:
         )  # a serial port opens once: test with other loops
         try:
             tested = replace(config, loops=PYTHON) if is_exclusive else config
-            stack = self._files.build(tested, self._prepare_reboot)
+            stack = self._files.build(tested)
         except (ConfigError, TargetError) as error:
             complain(f"not rebooted: {error}")
             return f"not rebooted: {error}"
@@ -163,7 +163,7 @@ class App:
         self._ground.detach(time.monotonic())  # sends the acknowledgement of the command
         self._files.close_loops()
         config = reboot_config(old, self._config)
-        new, config = self._next or (self._files.build(config, self._prepare_reboot), config)
+        new, config = self._next or (self._files.build(config), config)
         self._next = None
         self._files.adopt(new, config)
         self.stack = new

@@ -137,7 +137,7 @@ def compile_estimator() -> None:
     """Compile the kernels of the estimator besides that of the IMU, which takes longer than all others."""
     memory = np.zeros(1, MEMORY)
     watch = HealthMonitor(memory).watch
-    direct(watch_estimate, memory, watch, ImuTrack().memory, np.zeros(1, LIMITS), False, 0.0)
+    direct(watch_estimate, memory, watch, ImuTrack().memory, np.zeros(1, LIMITS), False, False, 0.0)
     direct(push_kernel, memory, MAG_RING, np.zeros(4))
     direct(field_kernel, memory)
 

@@ -17,28 +17,29 @@ from flightstack.process.log_library import LogLibrary
 from flightstack.process.process_config import ProcessConfig, complain
 from flightstack.process.signing_file import create_key, open_signing, replace_key
 from flightstack.process.state_directory import PLANS_NAME, FileSaver, PlanFile
-from flightstack.services.commands.context import PrepareReboot, always_reboots
+from flightstack.services.commands.context import PrepareReboot
 from flightstack.services.logs.log_store import NO_LOGS
 
 
 class ProcessFiles:
     """Connects the current stack to its files, and the next stack after a reboot."""
 
-    def __init__(self, process: ProcessConfig) -> None:
-        self._process = process
+    def __init__(self, process: ProcessConfig, prepare_reboot: PrepareReboot) -> None:
+        """``prepare_reboot`` is for each stack that is built."""
+        self._process, self._prepare_reboot = process, prepare_reboot
         self._logs = LogFiles(process.log, process.overwrite_log)
         self._stack: Stack | None = None
         self._params: FileSaver | None = None
         self._plans = None if process.state is None else PlanFile(process.state / PLANS_NAME)
         self._signing: Signing | None = None
 
-    def build(self, config: StackConfig, prepare_reboot: PrepareReboot = always_reboots) -> Stack:
+    def build(self, config: StackConfig) -> Stack:
         """Build a stack for ``adopt``; raise ConfigError, TargetError."""
         if self._params is not None:
             self._params.flush()  # the new stack reads the file
         log = self._process.log
         logs = NO_LOGS if log is None else LogLibrary(log.parent, self._own_log, self._open_tail)
-        stack = build(config, self._open_log, logs, prepare_reboot)
+        stack = build(config, self._open_log, logs, self._prepare_reboot)
         self._use_signing(stack)
         return stack
 

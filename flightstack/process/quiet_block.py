@@ -141,7 +141,7 @@ class QuietSensors:
             memory, track = estimation.estimators[0].memory, estimation.feed.lanes[0].newest.imu_track
             watch, limits = estimation.watch, estimation.limits
             self.push = address_of(push_kernel, memory, MAG_RING, np.zeros(4))
-            self.watch = address_of(watch_estimate, memory, watch, track.memory, limits, False, 0.0)
+            self.watch = address_of(watch_estimate, memory, watch, track.memory, limits, False, False, 0.0)
             offset_m, place = estimation.recorder.offset_m, estimation.recorder.place
         scratch = np.zeros(4), np.zeros(4), np.zeros(2), np.zeros(2)
         truth = stack.simulator.truth, offset_m, place, TRUTH_INTERVAL_US, GLOBAL_INTERVAL_US
@@ -155,15 +155,16 @@ class QuietSensors:
 
     def following(self) -> tuple[Any, ...]:
         """Return the argument ``following`` of the kernel; call once before each of its calls."""
-        marks, estimation, delays_s, facts = self._marks, self._estimation, (0.0, 0.0), (0, False)
+        marks, estimation, delays_s = self._marks, self._estimation, (0.0, 0.0)
+        conditions = 0, False, False
         if estimation is not None:
             params = estimation.estimators[0].params
             delays_s = float(params.mag_delay_s), float(params.baro_delay_s)
             marks[0] = 0
             marks["truth_us"], marks["global_us"] = estimation.recorder.truth_due_us
-            marks["health_us"], facts = estimation.begin_watch()
+            marks["health_us"], conditions = estimation.begin_watch()
         logs = tuple((trace.rows, trace.times_us, trace.n) for trace in self._open_traces())
-        return delays_s, logs, facts
+        return delays_s, logs, conditions
 
     def _open_traces(self) -> list[Trace]:
         """Return the traces of the open log; without one, traces that are not recorded."""

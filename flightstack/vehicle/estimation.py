@@ -9,10 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from flightstack.commander.estimate_checks import (
+    BARO_FAULT,
     LIMITS,
-    MISSING_S,
+    MAG_FAULT,
+    conditions_of,
     estimate_refusals,
-    facts_of,
     limits_of,
 )
 from flightstack.commander.failsafe_monitor import FailsafeMonitor
@@ -105,7 +106,7 @@ class Estimation:
         self.watch, self.limits = self._lanes.watch, np.zeros(1, LIMITS)
         """Memory and limits of the health, for a kernel that updates it."""
         self._landed = False
-        self._health_due_us, self._facts = 0, -1
+        self._health_due_us, self._conditions = 0, 0
         self._time_us = 0  # of the newest message of the sensors
         self._read_selected()
         self._seen, self._counts = sum_of_resets(self.estimator.memory), (0.0, 0.0, 0.0)
@@ -193,16 +194,17 @@ class Estimation:
         recorder_us = self.recorder.due_us(with_truth=not measures)
         return recorder_us if measures and self._lanes.is_alone else min(self._health_due_us, recorder_us)
 
-    def begin_watch(self) -> tuple[int, tuple[int, bool]]:
-        """Return the time from which a kernel updates the health, and its facts now with True if there is an origin.
+    def begin_watch(self) -> tuple[int, tuple[int, bool, bool]]:
+        """Return the time from which a kernel updates the health, and what it is given.
 
-        The kernel stops when the facts change. The health of several inertial sensors is left to ``update``.
+        That is the conditions of the health now, and True if there is an origin, and if the vehicle is flying. The
+        kernel stops when the conditions change. The health of several inertial sensors is left to ``update``.
         """
         if not self._lanes.is_alone:
-            return NEVER_US, (0, False)
+            return NEVER_US, (0, False, False)
         self._lanes.begin_watch()
         self.limits[0] = limits_of(self._now.behaviour)
-        return self._health_due_us, (self._facts, self._now.has_state)
+        return self._health_due_us, (self._conditions, self._now.has_state, self._now.flying)
 
     def pass_by(
         self, time_us: int, step_us: int, mag: MagSample | None, baro: BaroSample | None, health_due_us: int
@@ -305,9 +307,11 @@ class Estimation:
     def _use_health(self) -> None:
         """Act on the newest health."""
         now, users = self._now, self._users
-        self._facts = plain(facts_of)(self.health, limits_of(now.behaviour), self._mag_fault[0])
-        users.failsafes.take_health(self.health)
-        if self._mag_fault[0] and not self._mag_has_failed:
+        self._conditions = plain(conditions_of)(
+            self.health, limits_of(now.behaviour), self._mag_fault[0], now.flying
+        )
+        users.failsafes.take_health(self.health, self._conditions)
+        if self._conditions & MAG_FAULT and not self._mag_has_failed:
             self._mag_has_failed = True
             users.journal.say(Severity.WARNING, "Compass disagrees with GNSS and is no longer used")
         self._tell_of_barometer()
@@ -319,7 +323,7 @@ class Estimation:
 
     def _tell_of_barometer(self) -> None:
         """Report a barometer that fails in flight, and its return."""
-        has_failed = self._now.flying and (self.health.baro_is_stuck or self.health.baro_age_s > MISSING_S)
+        has_failed = bool(self._conditions & BARO_FAULT)
         if has_failed is self._baro_has_failed:
             return
         self._baro_has_failed = has_failed

@@ -144,9 +144,9 @@ def fly_quiet_ticks(
 
     The state of the first tick ``is_taken``, or the simulator advances to it with ``commands``; its time is that of
     the vehicle and ``boot_us``. The first outer tick is that after ``outer_in`` ticks. It stops without a step of the
-    simulator, when its result is larger than ``LARGEST_RESULT``, after a reset of the estimate or other facts of its
-    health, and at an outer tick that is not nominal: then the tick waits. Records are bytes. ``sensing`` has an element
-    for each inertial sensor, none on the true state. ``slow`` and ``following`` are those of ``slow_kernel``.
+    simulator, when its result is larger than ``LARGEST_RESULT``, after a reset of the estimate, when the conditions of
+    its health change, and at an outer tick that is not nominal: then the tick waits. Records are bytes. ``sensing`` has
+    an element for each inertial sensor, none on the true state. ``slow`` and ``following`` are as in ``slow_kernel``.
     """
     rows, row_times, row_at = log
     calls, outer_calls = calls_of[0][0], calls_of[1][0]

@@ -23,9 +23,9 @@ class SlowMarks(NamedTuple):
     """Time of the newest sample, or 0; the next one too."""
     baro_us: int
     field_gauss: Annotated[FloatArray, 3]
-    """That sample."""
+    """Magnetic field of that sample, FRD."""
     pressure_hpa: float
-    """That sample; the next two too."""
+    """Of that sample, as pressure altitude and temperature."""
     altitude_m: float
     temperature_c: float
     mag_rows: int
@@ -56,11 +56,12 @@ def _push(push: int, filters: Any, ring: int, values: FloatArray, row: FloatArra
 def take_slow(push: int, slow: Any, time_us: int, filters: Any, following: Any) -> None:
     """Give new measurements at ``time_us``, the vehicle's time, to the filters and the log.
 
-    Those that are not finite are none. ``push`` is the address of the kernel. ``following`` has delays and logs.
+    Those that are not finite are none. ``push`` is the address of the kernel. ``following`` has delays, logs, and what
+    the health is given.
     """
     marks_array, news_array, parts, rows, _truth, _health = slow
     marks, news, values = marks_array[0], news_array[0], parts[0]
-    delays_s, (mag_log, baro_log, _truth_log, _global_log), _health = following
+    delays_s, (mag_log, baro_log, _truth_log, _global_log), _conditions = following
     mag_sample, mag_copy, baro_sample, baro_copy = rows
     mag_delay_s, baro_delay_s = delays_s
     if news["has_mag"] != 0:
@@ -114,7 +115,7 @@ def log_truth(slow: Any, time_us: int, following: Any) -> None:
 
 @compiled
 def watch_health(watch: int, slow: Any, time_us: int, memory: Any, track: Any, following: Any) -> bool:
-    """Update the health if it is due; return False if it has other facts than before, which Python acts on.
+    """Update the health if it is due; return False if its conditions have changed: the tick is then run in Python.
 
     ``watch`` is the address of the kernel; ``memory`` and ``track`` are those of the estimator.
     """
@@ -122,12 +123,12 @@ def watch_health(watch: int, slow: Any, time_us: int, memory: Any, track: Any, f
     if time_us < marks["health_us"]:
         return True
     health, limits, interval_us = slow[5]
-    facts, has_origin = following[2]
+    conditions, has_origin, flying = following[2]
     marks["health_us"] = (time_us // interval_us + 1) * interval_us
     newest = health[0]["newest"]
     if marks["mag_us"] != 0:
         newest["mag_s"] = marks["mag_us"] * 1e-6
     if marks["baro_us"] != 0:
         newest["baro_s"], newest["pressure_hpa"] = marks["baro_us"] * 1e-6, marks["pressure_hpa"]
-    found: int = call_kernel_int(watch, (memory, health, track, limits, has_origin, time_us * 1e-6))
-    return bool(found == facts)
+    found: int = call_kernel_int(watch, (memory, health, track, limits, has_origin, flying, time_us * 1e-6))
+    return bool(found == conditions)

@@ -82,6 +82,11 @@ def test_flight_on_sensors_gives_the_same_log_in_three_processes_and_in_one(tmp_
         ("--state", "truth", "--fault", "clock:jump=1.5@8.3"),
         ("--state", "estimated", "--fault", "clock:jump=0.5@8.5"),
         ("--vehicle", "two imus", "--fault", "sensor:imu:off@8.301-9"),
+        ("--seed", "1", "--fault", "sensor:imu:freeze@5-5.3"),
+        ("--seed", "1", "--fault", "sensor:mag:turn=170@3.3-9"),
+        ("--outer-hz", "62.5", "--fault", "sensor:baro:off@3.5"),
+        ("--outer-hz", "62.5", "--fault", "sensor:baro:freeze@4.1-7"),
+        ("--param", "COM_VEL_FS_EVH=0.2", "--fault", "sensor:gnss:off@4-20"),
     ],
     ids=lambda options: options[3].partition("@")[0],
 )
@@ -92,13 +97,34 @@ def test_what_the_simulator_does_to_a_flight_has_the_same_log_at_any_speed(
     words = [x_quad_with_imus(tmp_path) if word == "two imus" else word for word in options]
     common = (MISSIONS / "square.plan", "--instance", free_instance(), *words)
     logs = []
-    for number, speed in enumerate(("max", "20", "max")):
+    for number, speed in enumerate(("max", "8", "max")):
         out = tmp_path / str(number)
         with warm_children():
             run = gcs("fly", *common, "--out", out, "--speed", speed)
         logs.append((out / "flight.ulg").read_bytes())
         assert f" {options[3]}" in run.stdout
     assert logs[0] == logs[1] == logs[2]
+
+
+def test_a_barometer_that_fails_before_takeoff_is_reported_at_the_same_time_at_any_speed(
+    tmp_path: Path,
+) -> None:
+    """The fault counts from takeoff on, between two outer ticks, while the health stays as it is."""
+    content = json.loads((MISSIONS / "hop.plan").read_text())
+    items = content["mission"]["items"]
+    wait = {"autoContinue": True, "command": 93, "frame": 2, "params": [4.0, -1, -1, -1, 0, 0, 0]}
+    items.insert(0, {"type": "SimpleItem", **wait})
+    for number, item in enumerate(items, start=1):
+        item["doJumpId"] = number
+    plan, instance, logs = tmp_path / "wait.plan", free_instance(), []
+    plan.write_text(json.dumps(content))
+    for speed in ("max", "1"):
+        options = ("--outer-hz", "62.5", "--fault", "sensor:baro:off@3.5", "--speed", speed, "--limit", 40)
+        with warm_children():
+            gcs("fly", plan, "--out", tmp_path / speed, "--instance", instance, *options)
+        logs.append((tmp_path / speed / "flight.ulg").read_bytes())
+    assert logs[0] == logs[1]
+    assert b"Barometer is stuck or missing" in logs[0]
 
 
 GCS_LOSS_S = 5

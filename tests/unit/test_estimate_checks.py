@@ -3,11 +3,26 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 
-from flightstack.commander.estimate_checks import PREFLIGHT, estimate_failsafes, estimate_refusals
+from flightstack.commander.estimate_checks import (
+    ATTITUDE_DOUBTFUL,
+    BARO_FAULT,
+    GNSS_REFUSED,
+    IMU_FAULT,
+    MAG_FAULT,
+    POSITION_LOST,
+    PREFLIGHT,
+    VELOCITY_UNKNOWN,
+    conditions_of,
+    estimate_failsafes,
+    estimate_refusals,
+    limits_of,
+)
 from flightstack.commander.failsafe import Failsafe
+from flightstack.core.compiled import plain
 from flightstack.estimation.health import (
     NO_HEALTH,
     NOISY,
@@ -93,6 +108,31 @@ def test_each_fault_of_the_estimate_is_a_condition_in_flight(
     change: dict, failsafe: Failsafe, _: str
 ) -> None:
     assert estimate_failsafes(GOOD._replace(**change), Behaviour()) == {failsafe}
+
+
+@pytest.mark.parametrize(
+    ("changed", "mag_fault", "flying", "bit"),
+    [
+        ({"imu_is_stuck": True}, 0, False, IMU_FAULT),
+        ({"imu_age_s": 0.1}, 0, False, IMU_FAULT),
+        ({"tilt_rad": 0.5}, 0, False, ATTITUDE_DOUBTFUL),
+        ({"is_inaccurate": True}, 0, False, POSITION_LOST),
+        ({"lag_s": 1.0}, 0, False, POSITION_LOST),
+        ({"refused_s": 2.0}, 0, False, GNSS_REFUSED),
+        ({"velocity_m_s": 2.0}, 0, False, VELOCITY_UNKNOWN),
+        ({"velocity_m_s": math.nan}, 0, False, VELOCITY_UNKNOWN),
+        ({}, 1, False, MAG_FAULT),
+        ({"baro_is_stuck": True}, 0, True, BARO_FAULT),
+        ({"baro_age_s": 2.0}, 0, True, BARO_FAULT),
+        ({"baro_age_s": 2.0}, 0, False, 0),
+    ],
+)
+@pytest.mark.parametrize("function", [conditions_of, plain(conditions_of)], ids=["compiled", "plain"])
+def test_each_condition_has_a_bit(
+    function: Any, changed: dict[str, Any], mag_fault: int, flying: bool, bit: int
+) -> None:
+    health = GOOD._replace(**changed)
+    assert function(health, limits_of(Behaviour()), mag_fault, flying) == bit
 
 
 def test_limits_of_the_estimate_are_parameters() -> None:

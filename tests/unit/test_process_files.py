@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from flightstack.commander.transitions import Status
+from flightstack.core.enums import Mode
 from flightstack.core.errors import ConfigError
 from flightstack.core.port_numbers import GROUND
 from flightstack.mavlink.dialect import mavlink
@@ -22,13 +24,16 @@ from flightstack.simulator_link.hot_frames import PlantStateFrame
 from flightstack.transports.vehicle_ports import PortsConfig
 
 PEER = PeerAddress(GROUND, "127.0.0.1", 5000)
+START_LOGGING = mavlink.MAVLink_command_long_message(1, 1, mavlink.MAV_CMD_LOGGING_START, 0, *[0] * 7)
 REBOOT = mavlink.MAVLink_command_long_message(1, 1, 246, 0, 1, 0, 0, 0, 0, 0, 0)
 
 
-def process_files(folder: Path, signs: bool = True) -> ProcessFiles:
+def process_files(
+    folder: Path, signs: bool = True, log: Path | None = None, refusal: str | None = None
+) -> ProcessFiles:
     ports = PortsConfig(0, (), ("127.0.0.1", 1), "127.0.0.1", 0)
     key = folder / "key" if signs else None
-    return ProcessFiles(ProcessConfig("127.0.0.1", 1, 1.0, ports, None, False, None, key))
+    return ProcessFiles(ProcessConfig("127.0.0.1", 1, 1.0, ports, log, False, None, key), lambda: refusal)
 
 
 def test_a_recorded_signed_reboot_is_a_replay_after_the_reboot(tmp_path: Path) -> None:
@@ -88,8 +93,11 @@ def test_failed_build_keeps_current_stack(tmp_path: Path) -> None:
 
 
 def test_a_reboot_that_cannot_be_prepared_is_refused_with_the_reason(tmp_path: Path) -> None:
-    files, config = process_files(tmp_path, signs=False), StackConfig()
-    stack = files.build(config, lambda: "the parameter file cannot be read")
+    files, config = (
+        process_files(tmp_path, signs=False, refusal="the parameter file cannot be read"),
+        StackConfig(),
+    )
+    stack = files.build(config)
     station = Link(255, 190)
     stack.ground.receive(PEER, station.encode(REBOOT), 0.0)
     answers = [m for _, data in stack.ground.poll(0.0) for m in station.decode(data)]
@@ -98,3 +106,22 @@ def test_a_reboot_that_cannot_be_prepared_is_refused_with_the_reason(tmp_path: P
     texts = "".join(m.text for m in answers if m.get_type() == "STATUSTEXT")
     assert "the parameter file cannot be read" in texts
     assert not stack.ground.vehicle.reboot_requested
+
+
+def test_the_log_in_progress_is_streamed_before_and_after_a_reboot(tmp_path: Path) -> None:
+    files, config = (
+        process_files(tmp_path, signs=False, log=tmp_path / "flight.ulg"),
+        StackConfig(state=TRUTH),
+    )
+    for _ in range(2):
+        stack, station = files.build(config), Link(255, 190)
+        files.adopt(stack, config)
+        assert stack.ground.vehicle.logs.open_tail() is None
+        stack.recorder.status(0, Status(True, Mode.HOLD))
+        stack.ground.receive(PEER, station.encode(START_LOGGING), 0.0)
+        messages = [
+            m for k in range(3) for _, data in stack.ground.poll(0.1 * k) for m in station.decode(data)
+        ]
+        pieces = [m for m in messages if m.get_type() == "LOGGING_DATA_ACKED"]
+        assert bytes(pieces[0].data[:4]) == b"ULog"
+        stack.recorder.close()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -48,3 +50,15 @@ def test_the_true_place_is_that_of_the_local_frame(origin: GeoPoint) -> None:
         for store in (store_global, plain(store_global)):
             store(row, state, np.array((*origin, *frame.scales)))
             assert tuple(row.tolist()) == frame.to_geo(Vector3(*state[:3].tolist()))
+
+
+def test_a_health_that_is_due_in_a_tick_with_a_reset_is_updated_in_it() -> None:
+    """The kernel ends at the reset, before the health."""
+    stack = build(StackConfig(), lambda: None)
+    estimation = stack.estimation
+    assert estimation is not None
+    assert not math.isfinite(estimation.health.imu_age_s)
+    estimation.estimator.memory["resets"][0]["position"]["number"] = 1.0
+    due_us = estimation.begin_watch()[0]
+    estimation.pass_by(120_000, 2000, None, None, due_us)
+    assert estimation.begin_watch()[0] == 150_000

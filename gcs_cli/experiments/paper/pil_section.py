@@ -171,7 +171,7 @@ def _fly(
             path, controller, GAINS, plant, inner_hz=INNER_HZ, outer_hz=OUTER_HZ, state=TRUTH,
             instance=_free_instance() if instance is None else instance,
         )  # fmt: skip
-        console = Console(file=io.StringIO(), emoji=False)
+        console = Console(emoji=False, file=io.StringIO())
         finished = run_pil(options, checked_plan(options), target, Path(workshop) / "flights", console)
         outcomes = [flight["outcome"] for flight in finished.outcome.result["flights"].values()]
         if Code.INTERRUPTED in outcomes:
