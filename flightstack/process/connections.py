@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import select
 import time
 from collections.abc import Callable, Iterator
 
 from flightstack.core.enums import Severity
+from flightstack.core.errors import TargetError
 from flightstack.process.assembly import Stack
 from flightstack.process.process_config import (
     EXIT_LOST,
@@ -102,8 +104,9 @@ class GroundConnection:
 
     def announce_shutdown(self) -> None:
         """Send the final messages of the process."""
-        for (channel, host, port), data in self._hub.farewell():
-            self._ports.send(channel, (host, port), data)
+        with contextlib.suppress(TargetError):  # the status of a lost target may be unknown
+            for (channel, host, port), data in self._hub.farewell():
+                self._ports.send(channel, (host, port), data)
         self._ports.flush()
 
     def close(self) -> None:

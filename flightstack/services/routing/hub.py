@@ -341,9 +341,11 @@ class GroundHub:
             self._collect(service.poll(0.0))
         self._send_texts()
         for address, peer in self._peers.items():
-            for message in [*peer.outbox, self._telemetry.farewell()]:
+            for message in peer.outbox:
                 yield address, peer.link.encode(message)
             peer.outbox.clear()
+        for address, peer in self._peers.items():
+            yield address, peer.link.encode(self._telemetry.farewell())
 
 
 def _kept_texts(peer: Peer) -> list[Message]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Set
 
+from flightstack.core.errors import TargetError
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
 from flightstack.mavlink.link import Message
 from flightstack.services.telemetry import modes, motion, vehicle
@@ -234,9 +235,15 @@ class Telemetry:
         return self.messages(message_id)
 
     def farewell(self) -> Message:
-        """Return the final HEARTBEAT with MAV_STATE_POWEROFF."""
+        """Return the final HEARTBEAT with MAV_STATE_POWEROFF, of the last status if the target is lost."""
+        last = self._status
         self.begin_poll()
-        return vehicle.heartbeat(self.status, leaving=True)
+        try:
+            last = self.status
+        except TargetError:
+            if last is None:
+                raise
+        return vehicle.heartbeat(last, leaving=True)
 
     def _make(self, message_id: int) -> tuple[Message, ...]:
         sensed = self.status.sensed
