@@ -9,12 +9,24 @@ INSTALL_MULTIBODY = "pip install mujoco pillow imageio-ffmpeg"
 INSTALL_FIRMWARE = "pip install ziglang unicorn pyelftools"
 
 
+_PREDICATES = frozenset({"is", "has", "does", "must", "needs", "cannot"})
+
+
+def clause(subject: str, problem: str) -> str:
+    """Return the problem of a value as one clause: a predicate follows its subject, a sentence follows a colon."""
+    if not subject:
+        return problem
+    return f"{subject} {problem}" if problem.partition(" ")[0] in _PREDICATES else f"{subject}: {problem}"
+
+
 class ConfigError(Exception):
-    """Invalid option or configuration file."""
+    """Invalid option, with its value as ``key``, or configuration file."""
 
     def __init__(self, file: object, key: str, problem: str) -> None:
-        where = f"{file}: {key}: " if key else f"{file}: "
-        super().__init__(where + problem)
+        if str(file).startswith("--"):
+            super().__init__(f"{file}: {clause(key, problem)}" if key else clause(str(file), problem))
+        else:
+            super().__init__(f"{file}: {key}: {problem}" if key else f"{file}: {problem}")
         self._parts = (str(file), key, problem)
 
     def as_keyword(self, keys: Mapping[str, str]) -> ConfigError:
@@ -25,7 +37,7 @@ class ConfigError(Exception):
         option, value, problem = self._parts
         if not option.startswith("--"):
             return self
-        return ConfigError(_key(option, keys), value, problem)
+        return ConfigError(_key(option, keys), "", clause(value, problem))
 
     def within(self, file: object, keys: Mapping[str, str]) -> ConfigError:
         """Return the error of an option that ``file`` gives: ``--inner-hz`` is its key ``inner_hz``.
@@ -35,7 +47,7 @@ class ConfigError(Exception):
         option, value, problem = self._parts
         if not option.startswith("--"):
             return ConfigError(file, "", str(self))
-        return ConfigError(file, _key(option, keys), f"{value}: {problem}")
+        return ConfigError(file, _key(option, keys), clause(value, problem))
 
     def __reduce__(self) -> tuple[type[ConfigError], tuple[str, str, str]]:
         """Support pickling: the default passes the text alone to a constructor with three arguments."""

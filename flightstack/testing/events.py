@@ -46,5 +46,5 @@ def check_event(name: str, *, is_live: bool = False) -> None:
     if not any(re.fullmatch(event.pattern, name) for event in allowed):
         forms = ", ".join(event.form for event in allowed)
         raise ConfigError(
-            "event", name, f"is no event{' that is known in flight' if is_live else ''}: {forms}"
+            "event", "", f"{name} is no event{' that is known in flight' if is_live else ''}: {forms}"
         )

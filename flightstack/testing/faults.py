@@ -106,7 +106,7 @@ def check_link(text: str) -> tuple[tuple[str, ...], str, Callable[[Channel], Non
     directions = (words.pop(0),) if words[:1] and words[0] in DIRECTIONS else DIRECTIONS
     fault = LINK_FAULTS.get(words[0]) if words else None
     if fault is None or len(words) != (2 if fault.largest else 1):
-        raise ConfigError("link", text, f"is no change of a link, which is {_LINK_FORM}")
+        raise ConfigError("link", "", f"{text} is no change of a link, which is {_LINK_FORM}")
     return directions, words[0], _change(text, words, fault)
 
 

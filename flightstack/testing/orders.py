@@ -113,7 +113,7 @@ def check_command(text: str) -> None:
     except ValueError:
         numbers = [math.nan]
     if not fewest <= len(numbers) <= most or not all(map(math.isfinite, numbers)):
-        raise ConfigError("command", text, f"is none of {', '.join(forms)}, silence, hold, mode NAME")
+        raise ConfigError("command", "", f"{text} is none of {', '.join(forms)}, silence, hold, mode NAME")
 
 
 def _counts(word: str) -> tuple[float, float]:

@@ -65,7 +65,7 @@ class ClusterPool:
             self._place: tuple[str, int] = distributed.comm.get_address_host_port(address, strict=True)
         except ValueError:
             problem = "is no address of a scheduler, such as tcp://10.0.0.1:8786"
-            raise CliError(f"--scheduler {address}: {problem}", USAGE) from None
+            raise CliError(f"--scheduler: {address} {problem}", USAGE) from None
         self._session = secrets.token_hex(8)
         self._files = Files()
         self._client: Any = None

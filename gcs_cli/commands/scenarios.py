@@ -91,6 +91,6 @@ def _check(context: typer.Context, options: CampaignOptions) -> None:
             "--workers is for this machine: leave it out, the cluster has workers of its own", USAGE
         )
     if options.seek not in (None, *SEEKS):
-        raise CliError(f"--seek {options.seek}: is not one of {', '.join(SEEKS)}", USAGE)
+        raise CliError(f"--seek: {options.seek} is not one of {', '.join(SEEKS)}", USAGE)
     if options.flights is not None and options.seek is None:
         raise CliError("--flights is for --seek: a campaign's number of flights is in its file", USAGE)

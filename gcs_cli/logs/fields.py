@@ -51,13 +51,13 @@ def find_fields(recording: Recording, wanted: str) -> list[Field]:
         if len(of_topic) <= MOST_FIELDS:
             return of_topic
         names = ", ".join(field.name for field in of_topic)
-        raise CliError(f"{wanted}: has {len(of_topic)} fields, give some of them: {names}", USAGE)
+        raise CliError(f"{wanted} has {len(of_topic)} fields, give some of them: {names}", USAGE)
     for found in _matches(fields, text):
         is_unique = len({_base(field) for field in found}) == 1 or bool(_WILDCARDS & set(text))
         if is_unique and len(found) <= MOST_FIELDS:
             return found
         problem = "names too many fields" if is_unique else "is not unique"
-        raise CliError(f"{wanted}: {problem}: {_listed([field.label for field in found])}", USAGE)
+        raise CliError(f"{wanted} {problem}: {_listed([field.label for field in found])}", USAGE)
     labels = {field.label.lower(): field.label for field in fields}
     close = difflib.get_close_matches(text, labels, n=4, cutoff=0.5)
     hint = f"; did you mean {', '.join(labels[name] for name in close)}?" if close else ""

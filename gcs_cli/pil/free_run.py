@@ -23,7 +23,7 @@ def run_free(options: FlyOptions, chosen: RunOptions, target: str, out: Path | N
     """Fly the mission in real time and print the target's timing; raise CliError, ConfigError."""
     choice = checked_target(target)
     if choice.kind == EMULATED:
-        raise CliError(f"--target {target}: has no time of its own: use host or serial:DEVICE[:BAUD]", USAGE)
+        raise CliError(f"--target: {target} has no time of its own: use host or serial:DEVICE[:BAUD]", USAGE)
     options = dataclasses.replace(options, loops=f"{target},{FREE}", speed="1")
     plan = checked_plan(options)
     check_there(choice, options.controller)

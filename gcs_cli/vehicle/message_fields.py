@@ -82,7 +82,7 @@ def made_message(name: str, words: Iterable[str], target: tuple[int, int]) -> tu
     for word in words:
         field, equals, text = word.partition("=")
         if not equals:
-            raise FieldError(f"{word}: is not FIELD=VALUE")
+            raise FieldError(f"{word} is not FIELD=VALUE")
         given[field] = text
     check_fields(kind, given)
     values = {field: _value(kind, field, text) for field, text in given.items()}

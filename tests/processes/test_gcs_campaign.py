@@ -134,7 +134,7 @@ def test_a_killed_worker_leaves_its_flight_to_the_next_run(folder: Path) -> None
     ("arguments", "sentence"),
     [
         (["none.toml"], "gcs: none.toml: cannot be read: No such file or directory"),
-        (["c.toml", "--seek", "best"], "gcs: --seek best: is not one of worst"),
+        (["c.toml", "--seek", "best"], "gcs: --seek: best is not one of worst"),
         (["c.toml", "--flights", "50"], "gcs: --flights is for --seek: "),
         (["c.toml", "--workers", "0"], "gcs: --workers: 0 is outside the allowed range 1 to 256"),
     ],

@@ -49,9 +49,9 @@ def test_assignments_are_read_in_order_and_in_any_case() -> None:
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("MPC_XY_CRUISE", "--param: MPC_XY_CRUISE: must be NAME=VALUE with a number"),
-        ("MPC_XY_CRUISE=fast", "--param: MPC_XY_CRUISE=fast: must be NAME=VALUE with a number"),
-        ("=3", "--param: =3: must be NAME=VALUE with a number"),
+        ("MPC_XY_CRUISE", "--param: MPC_XY_CRUISE must be NAME=VALUE with a number"),
+        ("MPC_XY_CRUISE=fast", "--param: MPC_XY_CRUISE=fast must be NAME=VALUE with a number"),
+        ("=3", "--param: =3 must be NAME=VALUE with a number"),
         ("NO_SUCH=3", "parameter: NO_SUCH: is not known"),
         ("MPC_XY_CRUISE=99", "parameter: MPC_XY_CRUISE: 99 is outside 0.1 to 20 m/s"),
         ("MPC_XY_CRUISE=nan", "parameter: MPC_XY_CRUISE: nan is outside 0.1 to 20 m/s"),

@@ -107,11 +107,11 @@ CAMPAIGN = (
         ),
         (
             ["--scheduler", "127.0.0.1:1"],
-            "--scheduler 127.0.0.1:1: is no address of a scheduler, such as tcp://10.0.0.1:8786",
+            "--scheduler: 127.0.0.1:1 is no address of a scheduler, such as tcp://10.0.0.1:8786",
         ),
         (
             ["--scheduler", "http://127.0.0.1:1"],
-            "--scheduler http://127.0.0.1:1: is no address of a scheduler, such as tcp://10.0.0.1:8786",
+            "--scheduler: http://127.0.0.1:1 is no address of a scheduler, such as tcp://10.0.0.1:8786",
         ),
     ],
     ids=["workers", "no scheme", "other scheme"],

@@ -51,7 +51,7 @@ def test_field_has_the_value(text: str, field: str, value: object) -> None:
         ("60000", "60000: the dialect has no such message"),
         ("COMMAND_LONG comand=1", "comand: COMMAND_LONG has no such field; did you mean command?"),
         ("SYSTEM_TIME x=1", "x: SYSTEM_TIME has no such field; its fields are time_unix_usec, time_boot_ms"),
-        ("COMMAND_LONG command", "command: is not FIELD=VALUE"),
+        ("COMMAND_LONG command", "command is not FIELD=VALUE"),
         ("COMMAND_LONG command=FLY", "command: 'FLY' is not a whole number or a name of MAV_CMD"),
         ("COMMAND_LONG command=70000", "command: 70000 is outside the allowed range 0 to 65535"),
         ("COMMAND_LONG param1=fast", "param1: 'fast' is not a number"),

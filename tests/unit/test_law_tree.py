@@ -103,7 +103,7 @@ def test_controller_that_needs_its_own_gains_file_starts_with_zeros(lqr: Attitud
 
 def test_law_outside_the_subset_is_refused_with_line_and_advice(lqr: AttitudeController) -> None:
     stranger = lqr._replace(step=example_module().lqr_gains)
-    with pytest.raises(ConfigError, match=r"lqr: has no C: lqr_controller.py:\d+: power: write `x \* x`"):
+    with pytest.raises(ConfigError, match=r"lqr has no C: lqr_controller.py:\d+: power: write `x \* x`"):
         law_tree(stranger)
 
 

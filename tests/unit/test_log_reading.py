@@ -171,7 +171,7 @@ def test_topic_stands_for_all_its_fields(ulog: Recording, monkeypatch: pytest.Mo
     assert [field.name for field in found][-4:] == [f"q[{index}]" for index in range(4)]
     monkeypatch.setattr("gcs_cli.logs.fields.MOST_FIELDS", 3)
     with pytest.raises(
-        CliError, match=r"vehicle_attitude: has \d+ fields, give some of them: .*q\[0\], q\[1\]"
+        CliError, match=r"vehicle_attitude has \d+ fields, give some of them: .*q\[0\], q\[1\]"
     ):
         find_fields(ulog, "vehicle_attitude")
 
@@ -180,7 +180,7 @@ def test_topic_stands_for_all_its_fields(ulog: Recording, monkeypatch: pytest.Mo
     ("wanted", "said"),
     [
         ("vehicle_local_positon.x", "did you mean vehicle_local_position.x"),
-        ("valid", "valid: is not unique: "),
+        ("valid", "valid is not unique: "),
         ("zzz", "has no such field"),
     ],
 )

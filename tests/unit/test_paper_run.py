@@ -100,7 +100,7 @@ def test_a_process_that_was_ended_from_outside_is_one_sentence(monkeypatch: pyte
     ("port", "said"),
     [
         ("foo", "gcs: --port foo: expected emulated, host or serial:DEVICE[:BAUD]\n"),
-        ("serial:", "gcs: --port: serial:: has no device: use for example serial:/dev/ttyACM0\n"),
+        ("serial:", "gcs: --port: serial: has no device: use for example serial:/dev/ttyACM0\n"),
     ],
 )
 def test_a_bad_port_is_named_as_the_user_wrote_it(

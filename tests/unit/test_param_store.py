@@ -131,7 +131,7 @@ def test_assignments_that_cannot_be() -> None:
     for text, sentence in (
         ("COUNT=1.5", "--param: COUNT=1.5: 1.5 is not a whole number"),
         ("NONE=1", "--param: NONE: the vehicle has no such parameter; `gcs param list` shows them"),
-        ("ANY=x", "--param: ANY=x: must be NAME=VALUE with a number"),
+        ("ANY=x", "--param: ANY=x must be NAME=VALUE with a number"),
     ):
         with pytest.raises(ConfigError) as error:
             apply_assignments(ParamStore(ALL), [text])

@@ -65,7 +65,7 @@ def test_a_second_vehicle_is_refused_a_state_directory(tmp_path: Path) -> None:
     (tmp_path / "other").symlink_to("state")
     for name in ("state", "other"):
         done = flightstack_command("--log", "none", "--instance", "3", "--state-dir", name)
-        assert (done.returncode, done.stderr) == (2, f"flightstack: --state-dir: {name}: {IN_USE}\n")
+        assert (done.returncode, done.stderr) == (2, f"flightstack: --state-dir: {name} {IN_USE}\n")
     first.close()
     second = StateDirectory(Path("state"), 1)
     assert second.open() is None

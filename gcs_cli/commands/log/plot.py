@@ -65,7 +65,7 @@ def plot(
     if png is not None and png.suffix.lower() not in _PRINTED:
         raise CliError(f"--png {png}: expected {', '.join(_PRINTED)}", USAGE)
     if end is not None and end <= begin:
-        raise CliError(f"--to {end:g}: must be after --from {begin:g}", USAGE)
+        raise CliError(f"--to: {end:g} must be after --from {begin:g}", USAGE)
     for file in (html, png):
         if file is not None:
             check_new(file, overwrite)
