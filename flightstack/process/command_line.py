@@ -62,7 +62,12 @@ def usage_sentence(error: Any) -> str:
 
 
 def _plain(error: Any) -> str:
-    return str(error.format_message()).replace("Value error, ", "")  # of Pydantic
+    sentence = str(error.format_message()).replace("Value error, ", "")  # of Pydantic
+    about = getattr(getattr(error, "param", None), "help", None)
+    if type(error).__name__ != "MissingParameter" or not about:
+        return sentence
+    begin = about[0] if about[1:2].isupper() else about[0].lower()  # an abbreviation keeps its capitals
+    return f"{sentence.rstrip('.')}: {begin}{about[1:].rstrip('.')}"
 
 
 class _Panels:

@@ -18,7 +18,11 @@ from gcs_cli.settings import JsonOption, OpenOption
 SEEKS = ("worst",)
 File = Annotated[
     Path,
-    typer.Argument(metavar="FILE", help="A scenario file with [campaign] and [vary].", show_default=False),
+    typer.Argument(
+        metavar="FILE",
+        help="A scenario file with [campaign] and [vary], such as examples/campaigns/hop_in_gusts.toml.",
+        show_default=False,
+    ),
 ]
 Workers = Annotated[
     int | None,

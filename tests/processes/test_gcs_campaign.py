@@ -133,6 +133,11 @@ def test_a_killed_worker_leaves_its_flight_to_the_next_run(folder: Path) -> None
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
+        (
+            [],
+            "gcs: Missing argument 'FILE': a scenario file with [campaign] and [vary], such as "
+            "examples/campaigns/hop_in_gusts.toml\n",
+        ),
         (["none.toml"], "gcs: none.toml: cannot be read: No such file or directory"),
         (["c.toml", "--seek", "best"], "gcs: --seek: best is not one of worst"),
         (["c.toml", "--flights", "50"], "gcs: --flights is for --seek: "),
