@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from flightstack.core.errors import ConfigError
 from flightstack.testing.link import Channel
 from sim_bridge.errors import UsageProblemError
+from sim_bridge.plant.faults.checks import Flight, check_faults
 from sim_bridge.plant.faults.schedule import parse_fault
 from sim_bridge.plant.faults.table import STATE_KINDS, Fault, Kind
 
@@ -54,13 +56,41 @@ def apply_fault(world: World, text: str, for_s: float | None) -> None:
         _simulator_fault(world, text, for_s)
 
 
-def check_fault(text: str, rotors: int) -> None:
-    """Raise ConfigError for a fault that a vehicle with ``rotors`` rotors cannot have."""
-    words = text.split()
-    if words[:1] == ["link"]:
-        check_link(text.removeprefix("link "))
-    elif words != ["power", "cycle"]:
-        _parsed(text, rotors)
+class FaultCheck:
+    """Checks the faults of a scenario before it is flown."""
+
+    def __init__(self, flight: Flight, texts: Sequence[str], has_sensors: bool) -> None:
+        """``texts``: all faults of the scenario, on which others may depend, as a cut on a payload."""
+        self._has_sensors = has_sensors
+        self._rotors = len(flight.vehicle.rotors)
+        known = []
+        for text in texts:
+            with contextlib.suppress(UsageProblemError):
+                known.append(parse_fault(text, self._rotors))
+        self._flight = flight._replace(faults=known)
+
+    def check(self, text: str, for_s: float | None, *, may_act: bool = True) -> None:
+        """Raise ConfigError for a fault that the vehicle cannot have or, with ``may_act``, that cannot act."""
+        words = text.split()
+        if words[:1] == ["link"]:
+            check_link(text.removeprefix("link "))
+        elif words != ["power", "cycle"]:
+            fault = _parsed(text, self._rotors)
+            if not may_act:
+                return
+            _check_state(fault, text, self._has_sensors)
+            if for_s is not None:
+                fault = fault._replace(end_us=fault.begin_us + round(for_s * 1e6))
+            try:
+                check_faults((fault,), self._flight)
+            except UsageProblemError as error:
+                raise ConfigError("fault", text, _reason(error)) from None
+
+
+def _reason(error: UsageProblemError) -> str:
+    """Return why a fault cannot act, with the keys of a scenario for the options of a remedy."""
+    reason = str(error).partition(": ")[2]
+    return reason.replace("add --drag", "set drag").replace("--plant", "plant")
 
 
 def _parsed(text: str, rotors: int) -> Fault:
@@ -70,10 +100,9 @@ def _parsed(text: str, rotors: int) -> Fault:
         raise ConfigError("fault", text, str(error).partition(": ")[2]) from None
 
 
-def _simulator_fault(world: World, text: str, for_s: float | None) -> None:
-    simulator = world.engine.simulator
-    fault = _parsed(text, len(world.engine.stack.vehicle.rotors))
-    if fault.kind in STATE_KINDS and simulator.sensors is not None:
+def _check_state(fault: Fault, text: str, has_sensors: bool) -> None:
+    """Raise ConfigError for a fault of a state or sensor on which the vehicle does not fly."""
+    if fault.kind in STATE_KINDS and has_sensors:
         raise ConfigError(
             "fault",
             text,
@@ -81,10 +110,16 @@ def _simulator_fault(world: World, text: str, for_s: float | None) -> None:
         )
     if fault.kind is Kind.STATE_DROP:
         raise ConfigError("fault", text, "is impossible in lockstep: both sides would wait for each other")
-    if fault.sensor and simulator.sensors is None:
+    if fault.sensor and not has_sensors:
         raise ConfigError(
             "fault", text, 'cannot act: the vehicle flies on the true state; set state to "estimated"'
         )
+
+
+def _simulator_fault(world: World, text: str, for_s: float | None) -> None:
+    simulator = world.engine.simulator
+    fault = _parsed(text, len(world.engine.stack.vehicle.rotors))
+    _check_state(fault, text, simulator.sensors is not None)
     begin_us = simulator.time_us + fault.begin_us
     end_us = None if fault.end_us is None else simulator.time_us + fault.end_us
     if for_s is not None:
@@ -92,7 +127,7 @@ def _simulator_fault(world: World, text: str, for_s: float | None) -> None:
     try:
         simulator.inject(fault._replace(begin_us=begin_us, end_us=end_us))
     except UsageProblemError as error:
-        raise ConfigError("fault", text, str(error).rpartition(": ")[2]) from None
+        raise ConfigError("fault", text, _reason(error)) from None
     begin_s = (begin_us - simulator.time_us) * 1e-6
     if begin_s > 0.0:
         world.after(begin_s, partial(world.happened, "fault"))

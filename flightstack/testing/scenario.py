@@ -7,6 +7,7 @@ import sys
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import invalidate_caches
 from pathlib import Path
 from typing import Any
@@ -15,20 +16,28 @@ from flightstack.commander.failsafe import Failsafe
 from flightstack.control.controller_loading import entry_points_of_controllers, load_controller
 from flightstack.core.enums import Mode
 from flightstack.core.errors import ConfigError
-from flightstack.params.config import DEFAULT_CONTROLLER, DEFAULT_HOME, DEFAULT_STATE, STATES, parse_home
+from flightstack.params.config import (
+    DEFAULT_CONTROLLER,
+    DEFAULT_HOME,
+    DEFAULT_STATE,
+    ESTIMATED,
+    STATES,
+    parse_home,
+)
 from flightstack.params.gains_file import DEFAULT_GAINS
 from flightstack.params.store import read_assignment
 from flightstack.params.toml_file import read_toml
 from flightstack.params.vehicle import DEFAULT_VEHICLE
 from flightstack.testing.events import check_event
 from flightstack.testing.expression import Expression
-from flightstack.testing.faults import DIRECTIONS, LINK_FAULTS, check_fault, check_link
+from flightstack.testing.faults import DIRECTIONS, LINK_FAULTS, FaultCheck, check_link
 from flightstack.testing.orders import check_command
 from flightstack.testing.properties import parse_window
 from flightstack.testing.setup import OPTION_KEYS, Setup
 from flightstack.testing.toml_record import key, read_record
 from gcs_cli.report.flight_outcome import Code
 from gcs_cli.transfers.plan_files import example_plans
+from sim_bridge.plant.faults.checks import Flight
 
 SEVERITIES = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
 OUTCOMES = ("any", *Code, *Mode.__members__, *Failsafe.__members__)
@@ -288,9 +297,11 @@ def _check_texts(scenario: Scenario) -> None:
     """Check everything that can be checked before a flight: plan, conditions, expressions, requests, faults."""
     try:
         setup = scenario.setup(scenario.seed)
-        vehicle = setup.check()
+        flown, options = setup.plant_options(setup.check())
     except ConfigError as error:
         raise error.within(scenario.path, OPTION_KEYS) from None
+    texts = [event.fault for event in scenario.event if event.fault is not None]
+    faults = FaultCheck(Flight(flown, setup.plant, options), texts, setup.state == ESTIMATED)
     expect = scenario.expect
     checks: list[tuple[str, str, Callable[[str], object]]] = [
         (f"expect.{name}[{index}]", text, check)
@@ -305,12 +316,14 @@ def _check_texts(scenario: Scenario) -> None:
         "when": Expression,
         "after": lambda text: check_event(text, is_live=True),
         "command": check_command,
-        "fault": lambda text: check_fault(text, len(vehicle.rotors)),
         "link": check_link,
         "param": read_assignment,
         "upload": setup.load_plan,
     }
     for index, event in enumerate(scenario.event):
+        if event.fault is not None:
+            fault_check = partial(faults.check, for_s=event.for_s, may_act=event.refused is None)
+            checks.append((f"event[{index}].fault", event.fault, fault_check))
         given = ((name, getattr(event, name)) for name in by_key)
         checks += [(f"event[{index}].{name}", text, by_key[name]) for name, text in given if text is not None]
     for name, text, check in checks:

@@ -49,6 +49,10 @@ ERRORS = {
     "event = [{fault = 'rotor:1:off'}]": "event[0]: needs one trigger of at_s, at_item, when, after, and has none",
     "event = [{at_s = 1, when = 'armed', link = 'cut'}]": "has at_s and when",
     "event = [{at_s = 1, fault = 'rotor:9:off'}]": "event[0].fault: ",
+    "event = [{at_s = 1, fault = 'wind:step=1,2,0'}]": (
+        "event[0].fault: wind:step=1,2,0: wind cannot act: the vehicle paper_quad has no drag; set drag"
+    ),
+    "state = 'truth'\nevent = [{at_s = 1, fault = 'sensor:gnss:off'}]": "event[0].fault: sensor:gnss:off: cannot act",
     "event = [{at_s = 1, link = 'slow'}]": "event[0].link: slow is no change of a link",
     "event = [{at_s = 1, link = 'loss 2'}]": "event[0].link: loss 2: loss must be 0 to 1",
     "event = [{at_s = 1, command = 'jump'}]": "event[0].command: jump is none of arm, disarm, kill, takeoff [ALT_M]",
