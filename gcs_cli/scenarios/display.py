@@ -162,6 +162,10 @@ class LiveDisplay:
         self._live.stop()
 
 
+_MOST_EVENTS = 10
+"""Newest events and status texts of a failed flight; its report has all."""
+
+
 def print_failures(console: Console, rows: Sequence[Row]) -> None:
     """Print each flight that failed: its expectations, the values around, and the command that repeats it."""
     for row in (row for row in rows if not row.result.passed):
@@ -173,6 +177,8 @@ def print_failures(console: Console, rows: Sequence[Row]) -> None:
             _print(console, Text(f"  {first}"))
             for line in others:
                 _print(console, Text(f"    {line}", "bold" if line.startswith(">") else "bright_black"))
+        for time_s, text in row.result.texts[-_MOST_EVENTS:]:
+            _print(console, Text(f"  {time_s:7.2f} s  {text}", "bright_black"))
         if row.kept is not None:
             _print(console, Text(f"  log and report: {row.kept}"))
         _print(console, Text(f"  repeat: {row.case.command}"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -180,6 +181,15 @@ def test_without_a_terminal_each_flight_is_a_plain_line() -> None:
     ]
     assert "\x1b" not in "".join(lines)
     assert lines[-1] == "1 failed, 2 passed in 3.0 s on 2 processes"
+
+
+def test_a_failure_shows_the_last_events_with_their_times() -> None:
+    failed = next(row for row in ROWS if not row.result.passed)
+    texts = tuple((float(second), f"event {second}") for second in range(12))
+    lines = printed([replace(failed, result=replace(failed.result, texts=texts))]).splitlines()
+    assert [line for line in lines if "event" in line] == [
+        f"  {second:4d}.00 s  event {second}" for second in range(2, 12)
+    ]
 
 
 def test_a_failure_shows_values_and_the_command_that_repeats_it() -> None:
