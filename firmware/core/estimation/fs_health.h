@@ -30,7 +30,7 @@ typedef struct {
     fs_real heading_ratio;
 } fs_health_summary;
 
-/* Write the summary of an estimator's memory, as the target does. health.py:143 */
+/* Write the summary of an estimator's memory. health.py:143 */
 void fs_health_kernel(const fs_estimator_memory *memory, fs_health_summary *summary);
 
 #endif
