@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import importlib
 import io
 import subprocess
 import sys
@@ -90,7 +91,7 @@ def test_an_interrupted_start_of_the_flight_stack_is_an_orderly_end(
     program: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """While it imports, compiles or loads kernels it ended with 130, and without a sentence."""
-    monkeypatch.setitem(sys.modules, program, Interrupting())
+    interrupt_use(program, monkeypatch)
     assert flightstack_command("--state-dir", "none") == ("", "flightstack: stopped\n", 0)
 
 
@@ -102,7 +103,7 @@ def test_an_interrupted_start_of_the_flight_stack_is_an_orderly_end(
 def test_an_interrupted_start_of_the_simulator_is_reported(
     program: str, words: tuple[str, ...], said: str, code: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(sys.modules, program, Interrupting())
+    interrupt_use(program, monkeypatch)
     assert sim_bridge_command(*words) == ("", f"sim-bridge: {said}\n", code)
 
 
@@ -114,6 +115,13 @@ def test_an_interrupted_exec_does_not_replace_the_exit_code() -> None:
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert (done.stderr, done.returncode) == ("stopped\n", 0)
+
+
+def interrupt_use(module: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the use of a module, which another test may have imported, raise KeyboardInterrupt."""
+    package, _, name = module.rpartition(".")
+    monkeypatch.setitem(sys.modules, module, Interrupting())
+    monkeypatch.delattr(importlib.import_module(package), name, raising=False)
 
 
 class Interrupting:
