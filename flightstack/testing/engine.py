@@ -79,6 +79,8 @@ class Engine:
         """True once the vehicle was ready to fly on its state since its boot."""
         self.loses_states = False
         """If True, ticks go on without states, as in real time when a simulator hangs."""
+        self.owes_step = False
+        """True if the simulator has yet to advance after the newest tick, which ``run`` and ``settle`` make up for."""
         self._changes_bytes = any(getattr(type(self), name) is not getattr(Engine, name) for name in _BYTES)
         self._begin()
 
@@ -161,10 +163,15 @@ class Engine:
         """Run a tick and the quiet ones that follow it, ``most`` at most, up to the end of the outer period.
 
         If nothing happens, run on up to the end of the period at ``until_s``. Return their number, and True after an
-        outer tick. As after ``tick``, the newest answer is not applied yet.
+        outer tick. As after ``tick``, the newest answer is not applied yet: the caller sets ``owes_step``.
         """
-        exchanges = self._changes_bytes or self.loses_states or self._missed_us > 0
-        done = 0 if exchanges else self._run_from_outer(most, until_s)
+        if self._changes_bytes or self.loses_states or self._missed_us > 0:
+            self.settle()
+            return 1, self.tick()
+        done = self._run_quiet(self._most(most, until_s))
+        if not done:
+            self.settle()
+            done = self._run_from_outer(self._most(most, until_s))
         if done and not self._left:
             return done, self._ends_period() and not (
                 self._quiet.is_idle and self.time_s < until_s - _MARGIN_S
@@ -173,11 +180,7 @@ class Engine:
             if self.tick():
                 return 1, True
             done = 1
-        count = (
-            0
-            if exchanges
-            else min(most - done, self._left, self._quiet.count(self.simulator, self.actuators))
-        )
+        count = min(most - done, self._left, self._quiet.count(self.simulator, self.actuators))
         if count > 0:
             count = self._quiet.run(self.simulator, self.actuators, count)
             self._count(count, count)
@@ -189,15 +192,33 @@ class Engine:
         """Ticks up to the end of the outer period."""
         return -self._ticks % self._divisor
 
-    def _run_from_outer(self, most: int, until_s: float) -> int:
-        """Run an outer tick that exchanges no bytes, with the quiet ones that follow it; return their number, or 0."""
-        if self._left or not self._endpoint.answers_exactly:
-            return 0
+    def _most(self, most: int, until_s: float) -> int:
+        """Return how many ticks may run without an exchange of messages at ``until_s``, ``most`` at most."""
+        if self._left:
+            return min(most, self._left)
         period_s = self._divisor * self._interval_us * 1e-6
         until_timing_s = (self._next_timing_us - self._now.time_us) * 1e-6
         idle_s = min(until_s - self.time_s, until_timing_s)
         periods = 1 + math.floor((idle_s - _MARGIN_S) / period_s) if idle_s > period_s else 1
-        done = self._quiet.run_periods(self.simulator, self.actuators, min(most, periods * self._divisor))
+        return min(most, periods * self._divisor)
+
+    def _run_quiet(self, most: int) -> int:
+        """Run the owed step and the ticks that follow it while nothing happens; return their number, or 0."""
+        if not (self.owes_step and self._endpoint.answers_exactly):
+            return 0
+        self.owes_step = False
+        done = self._quiet.run_on(self.simulator, self.actuators, most)
+        if done:
+            self._count(done, done)
+        else:
+            self.owes_step = True
+        return done
+
+    def _run_from_outer(self, most: int) -> int:
+        """Run an outer tick that exchanges no bytes, with the quiet ones that follow it; return their number, or 0."""
+        if self._left or not self._endpoint.answers_exactly:
+            return 0
+        done = self._quiet.run_periods(self.simulator, self.actuators, most)
         if done:
             self._count(done, done - 1)
         return done
@@ -212,8 +233,14 @@ class Engine:
         fields = self.stack.report.log_fields(time_us // self._interval_us)
         self.stack.recorder.timing(time_us, **fields)
 
+    def settle(self) -> None:
+        """Make the step of the simulator that is owed."""
+        if self.owes_step:
+            self.advance()
+
     def advance(self) -> None:
         """Advance the simulator by one interval with the newest actuators, and send the stack its state."""
+        self.owes_step = False
         self.simulator.apply(self.actuators)
         self.machine_ns += self._interval_us * 1000
         if self.loses_states:

@@ -132,6 +132,7 @@ class EngineRunner:
         while ticks > 0:
             ticks -= self._run_period(ticks, until_s)
             until_s = self._idle_until_s() if ticks > 0 else until_s
+        self._engine.settle()
 
     def run_on(self, most_s: float) -> None:
         """Run one period, and on until messages are due or something happens, for ``most_s`` at most.
@@ -156,7 +157,7 @@ class EngineRunner:
                 engine.pass_requests()
                 self._network.exchange(engine.stack.ground, engine.time_s)
                 self._call_due()
-            engine.advance()
+            engine.owes_step = True
             if is_outer:
                 break
         return most - left

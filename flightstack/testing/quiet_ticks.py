@@ -37,7 +37,7 @@ class QuietTicks:
         self._inbox = stack.simulator.sensors
         self._now, self._interval_us = stack.now, stack.rates.interval_us
         self.is_idle = False
-        """True if all ticks of the last call of ``run_periods`` were compiled ones: the vehicle had no event."""
+        """True if all ticks of the last ``run_periods`` or ``run_on`` were compiled: the vehicle had no event."""
         self._steps, self._block = None, None
         if compiles(stack) and quiet_steps.compiles(simulator) and _have_equal_sensors(stack, simulator):
             self._steps = QuietSteps(simulator, actuators.rotor_speed_rad_s, stack.simulator.plant.frame)
@@ -79,6 +79,25 @@ class QuietTicks:
         self.is_idle = done > 0 and not block.waited
         self._answer(simulator, actuators, done - 1)
         return done or 1
+
+    def run_on(self, simulator: Simulator, actuators: ActuatorsFrame, most: int) -> int:
+        """Step the simulator, and run the next tick and those that follow while nothing happens, ``most`` at most.
+
+        Return their number; 0, with nothing done, if the first one is not quiet or not compiled, or if the newest
+        answer is that of a vehicle whose status has changed since.
+        """
+        block = self._fitting(simulator, actuators)
+        if block is None or not (self._is_in_step(simulator) and self._lockstep.is_quiet):
+            return 0
+        if actuators.flags != self._link.flags(self._now.status.armed) | VALID_FLAG:
+            return 0
+        count = min(most, block.count(runs_on=True), simulator.quiet_intervals(measures=True))
+        if count <= 0:
+            return 0
+        done = block.run(count)
+        self.is_idle = not block.waited
+        self._answer(simulator, actuators, done)
+        return done
 
     def run(self, simulator: Simulator, actuators: ActuatorsFrame, count: int) -> int:
         """Run ``count`` ticks, as many as ``count`` returned at most, and return how many; set ``actuators``.

@@ -1,5 +1,6 @@
 """The quiet ticks of a world, which exchange no bytes, fly and record what ticks with bytes do."""
 
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -9,8 +10,10 @@ from flightstack.commander.failsafe import Failsafe
 from flightstack.core.contract import FloatArray
 from flightstack.estimation.health import EstimateHealth
 from flightstack.process.quiet_block import QuietBlock
+from flightstack.services.routing.hub import GroundHub
 from flightstack.testing import World
 from flightstack.testing.engine import Engine
+from flightstack.testing.network import Network
 from flightstack.vehicle.autopilot import Autopilot
 from sim_bridge.errors import PlantDivergedError
 from tests.support.bytes_engine import BytesEngine
@@ -171,3 +174,38 @@ def test_most_ticks_in_flight_are_quiet(state: str, monkeypatch: pytest.MonkeyPa
         monkeypatch.setattr(Autopilot, "tick", counted)
         world.run_for(1.0)
     assert len(calls) <= 0.02 * 500  # that records the battery, and few more
+
+
+def test_the_simulator_advances_in_compiled_calls_after_telemetry(monkeypatch: pytest.MonkeyPatch) -> None:
+    with World(telemetry=True, state="truth") as world:
+        world.wait_until_ready()
+        world.takeoff(2.0)
+        world.run_for(2.0)
+        advance, exchanges, calls = Engine.advance, Network.exchange, Counter[str]()
+
+        def advanced(engine: Engine) -> None:
+            calls["advance"] += 1
+            advance(engine)
+
+        def exchanged(network: Network, hub: GroundHub, now_s: float) -> bool:
+            calls["exchange"] += 1
+            return exchanges(network, hub, now_s)
+
+        monkeypatch.setattr(Engine, "advance", advanced)
+        monkeypatch.setattr(Network, "exchange", exchanged)
+        world.run_for(1.0)
+    assert calls["exchange"] >= 50
+    assert calls["advance"] <= 15  # measured 11: the battery is reported ten times a second
+
+
+def test_what_is_read_after_run_on_is_that_of_the_simulator_after_the_newest_tick() -> None:
+    seen = []
+    for run in (World.run_on, lambda world, seconds: world.run_for(seconds)):
+        with World(state="truth") as world:
+            world.takeoff(2.0)
+            world.run_for(2.0)
+            end_s = world.time_s + 0.5
+            while world.time_s < end_s - 1e-6:
+                run(world, end_s - world.time_s)
+            seen.append((world.engine.simulator.time_us, world.engine.stack.simulator.state.tobytes()))
+    assert seen[0] == seen[1]
