@@ -215,6 +215,19 @@ def test_silence_a_closed_connection_and_a_deadline_are_left_to_python(sockets: 
         assert vehicle.steps.socket.received == b""
 
 
+def test_a_wait_for_a_state_ends_at_its_limit() -> None:
+    ours, others = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)  # no limit of their own
+    others.setblocking(False)
+    with World(make_engine=BytesEngine, state="truth") as world, ours, others:
+        vehicle = Vehicle(world, ours)
+        vehicle.steps.begin(time.monotonic_ns(), LATER_NS, 1_000_000)
+        assert vehicle.exchange() == -1
+        assert (vehicle.steps.socket.sent, vehicle.steps.socket.received) == (len(messages(others)[0]), None)
+        vehicle.steps.begin(time.monotonic_ns(), LATER_NS, 10_000_000_000)
+        others.send(vehicle.next_state())
+        assert vehicle.exchange() == 0
+
+
 def test_the_rest_of_an_answer_that_is_not_accepted_is_left_to_python() -> None:
     ours, others = socket.socketpair()
     wait_in_kernel(ours)
