@@ -91,7 +91,7 @@ def limits_of(behaviour: Behaviour) -> EstimateLimits:
 
 
 IMU_FAULT, ATTITUDE_DOUBTFUL, POSITION_LOST, GNSS_REFUSED = 1, 2, 4, 8
-VELOCITY_UNKNOWN, MAG_FAULT, BARO_FAULT = 16, 32, 64
+VELOCITY_UNKNOWN, MAG_FAULT, BARO_FAULT, MAG_MISSING = 16, 32, 64, 128
 """Bits of ``conditions_of``."""
 _FAILSAFES = {
     IMU_FAULT: Failsafe.IMU_FAULT,
@@ -105,7 +105,7 @@ _FAILSAFES = {
 def conditions_of(h: Any, limits: Any, mag_fault: int, flying: bool) -> int:
     """Return the bits of the conditions of a health that commander, guidance or reports follow.
 
-    A fault of the barometer counts only while the vehicle is ``flying``.
+    A fault of the barometer, and a magnetometer that has gone silent, count only while the vehicle is ``flying``.
     """
     bits: int = 0
     if h.imu_age_s > IMU_MISSING_S or h.imu_is_stuck:
@@ -122,6 +122,8 @@ def conditions_of(h: Any, limits: Any, mag_fault: int, flying: bool) -> int:
         bits |= MAG_FAULT
     if flying and (h.baro_is_stuck or h.baro_age_s > MISSING_S):
         bits |= BARO_FAULT
+    if flying and MISSING_S < h.mag_age_s < math.inf:
+        bits |= MAG_MISSING
     return bits
 
 

@@ -12,6 +12,7 @@ from flightstack.commander.estimate_checks import (
     BARO_FAULT,
     LIMITS,
     MAG_FAULT,
+    MAG_MISSING,
     conditions_of,
     estimate_refusals,
     limits_of,
@@ -56,6 +57,21 @@ def _tuning(values: Mapping[str, float]) -> tuple[EstimatorParams, GnssLimits]:
     """Return the filter's parameters, with the gravity of the vehicle's model, which the simulator flies."""
     params, limits = tuning_of(values)
     return params._replace(gravity_m_s2=GRAVITY_M_S2), limits
+
+
+class _SensorFault(NamedTuple):
+    """A condition of a sensor, with the texts at its begin and end."""
+
+    bit: int
+    begins: str
+    ends: str
+
+
+_SENSOR_FAULTS = (
+    _SensorFault(MAG_FAULT, "Compass disagrees with GNSS and is no longer used", ""),
+    _SensorFault(MAG_MISSING, "Compass is missing and not used", "Compass is back"),
+    _SensorFault(BARO_FAULT, "Barometer is stuck or missing and not used", "Barometer is used again"),
+)
 
 
 class Users(NamedTuple):
@@ -110,7 +126,7 @@ class Estimation:
         self._time_us = 0  # of the newest message of the sensors
         self._read_selected()
         self._seen, self._counts = sum_of_resets(self.estimator.memory), (0.0, 0.0, 0.0)
-        self._mag_has_failed = self._baro_has_failed = self._spare_has_failed = False
+        self._told, self._spare_has_failed = 0, False
 
     def _read_selected(self) -> None:
         """Read resets and the fault of the magnetometer of the selected estimator from now on."""
@@ -311,26 +327,22 @@ class Estimation:
             self.health, limits_of(now.behaviour), self._mag_fault[0], now.flying
         )
         users.failsafes.take_health(self.health, self._conditions)
-        if self._conditions & MAG_FAULT and not self._mag_has_failed:
-            self._mag_has_failed = True
-            users.journal.say(Severity.WARNING, "Compass disagrees with GNSS and is no longer used")
-        self._tell_of_barometer()
+        self._tell_of_sensors()
         failsafes = users.failsafes
         changed = users.navigator.set_known(failsafes.position_is_known, failsafes.velocity_is_known)
         if changed and now.flying:  # reference and integrators hold what followed from the position
             users.navigator.reset_reference(now.state)
             self._reset_loops()
 
-    def _tell_of_barometer(self) -> None:
-        """Report a barometer that fails in flight, and its return."""
-        has_failed = bool(self._conditions & BARO_FAULT)
-        if has_failed is self._baro_has_failed:
-            return
-        self._baro_has_failed = has_failed
-        if has_failed:
-            self._users.journal.say(Severity.WARNING, "Barometer is stuck or missing and not used")
-        elif self._now.flying:
-            self._users.journal.say(Severity.NOTICE, "Barometer is used again")
+    def _tell_of_sensors(self) -> None:
+        """Report sensors that fail, and, in flight, their return."""
+        began, ended = self._conditions & ~self._told, self._told & ~self._conditions
+        self._told = self._conditions
+        for fault in _SENSOR_FAULTS:
+            if began & fault.bit:
+                self._users.journal.say(Severity.WARNING, fault.begins)
+            elif ended & fault.bit and fault.ends and self._now.flying:
+                self._users.journal.say(Severity.NOTICE, fault.ends)
 
 
 def _difference(new: Vector3, old: Vector3) -> Vector3:

@@ -135,6 +135,18 @@ def test_barometer_that_freezes_in_the_air_is_reported_and_so_is_its_return() ->
         assert "Barometer is used again" in world.texts
 
 
+def test_magnetometer_that_goes_silent_in_the_air_is_reported_and_so_is_its_return() -> None:
+    with World(vehicle="x_quad", state="estimated") as world:
+        world.wait_until_ready()
+        world.takeoff(4.0)
+        world.run_for(6.0)
+        world.fault("sensor:mag:off", for_s=3.0)
+        world.run_for(2.0)
+        assert world.texts.count("Compass is missing and not used") == 1
+        world.run_for(3.0)
+        assert world.texts[-1] == "Compass is back"
+
+
 @pytest.mark.parametrize(
     ("conditions", "text"),
     [({"state": "guessed"}, "is not one of estimated, truth")],

@@ -13,6 +13,7 @@ from flightstack.commander.estimate_checks import (
     GNSS_REFUSED,
     IMU_FAULT,
     MAG_FAULT,
+    MAG_MISSING,
     POSITION_LOST,
     PREFLIGHT,
     VELOCITY_UNKNOWN,
@@ -125,6 +126,9 @@ def test_each_fault_of_the_estimate_is_a_condition_in_flight(
         ({"baro_is_stuck": True}, 0, True, BARO_FAULT),
         ({"baro_age_s": 2.0}, 0, True, BARO_FAULT),
         ({"baro_age_s": 2.0}, 0, False, 0),
+        ({"mag_age_s": 2.0}, 0, True, MAG_MISSING),
+        ({"mag_age_s": 2.0}, 0, False, 0),
+        ({"mag_age_s": math.inf}, 0, True, 0),  # never there
     ],
 )
 @pytest.mark.parametrize("function", [conditions_of, plain(conditions_of)], ids=["compiled", "plain"])
