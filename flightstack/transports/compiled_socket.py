@@ -1,7 +1,7 @@
 """A connected socket and the clock for compiled code: system calls without Python between them.
 
-Compiled code calls the C library at its addresses. It waits for ``RECEIVE_TIMEOUT_S`` of ``tcp``, or a shorter time, and
-leaves to Python what it cannot do: a message that is not accepted whole, a timeout, a signal, a closed connection.
+Compiled code calls the C library at its addresses. It waits for ``RECEIVE_TIMEOUT_S`` of ``tcp``, or a shorter time,
+and leaves to Python what it cannot do: a message that is not accepted whole, a timeout, a signal, a closed connection.
 """
 
 from __future__ import annotations
