@@ -5,12 +5,10 @@
 
 from __future__ import annotations
 
-import json
 import os
-import signal
 import sys
 
-from flightstack.process.console import report_interrupt, say
+from flightstack.process import interrupts
 from gcs_cli.help_generated import HELP, WIDTH
 
 _INTERRUPTED = 130
@@ -19,22 +17,28 @@ _INTERRUPTED = 130
 
 def main(argv: list[str] | None = None) -> int:
     """Run the command line; return the exit code."""
+    signals = interrupts.Interrupts()
     words = sys.argv[1:] if argv is None else argv
     if len(words) == 1 and words[0] in ("-h", "--help") and _columns() >= WIDTH and _prints(HELP):
         return 0
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: the terminal is restored
     try:
         from gcs_cli.program import run
 
-        return run(words)
-    except KeyboardInterrupt:  # during the imports: `run` reports those of the command
-        return _report_interrupt("--json" in words)
+        code = run(words)
+    except KeyboardInterrupt:  # outside the command: `run` reports those of the command
+        signals.reported = True
+        code = _report_interrupt("--json" in words)
+    return interrupts.end_with(code)
 
 
 def _report_interrupt(as_json: bool) -> int:
     """Report an interrupt as ``gcs_cli.output.run_command`` does, without its imports."""
-    report_interrupt("gcs: interrupted")
+    interrupts.report("gcs: interrupted")
     if as_json:
+        import json  # noqa: PLC0415  # signals are caught before these imports
+
+        from flightstack.process.console import say  # noqa: PLC0415
+
         say(json.dumps({"event": "error", "message": "interrupted", "exit_code": _INTERRUPTED}))
     return _INTERRUPTED
 

@@ -5,10 +5,9 @@ A module of its own: an interrupt of the imports that the command line needs is 
 
 from __future__ import annotations
 
-import signal
 import sys
 
-from flightstack.process.console import report_interrupt
+from flightstack.process import interrupts
 
 _ON_FILES = {"open-loop", "export-mjcf", "render"}
 _INTERRUPTED = 130
@@ -17,16 +16,17 @@ _INTERRUPTED = 130
 def main(argv: list[str] | None = None) -> int:
     """Run the command; return the exit code."""
     words = sys.argv[1:] if argv is None else argv
-    for number in (signal.SIGINT, signal.SIGTERM):  # the server has its own handlers
-        signal.signal(number, signal.default_int_handler)
+    signals = interrupts.Interrupts()  # the server has its own handlers
     try:
         from sim_bridge.command import run_command  # noqa: PLC0415  # an interrupt of it ends in order
 
-        return run_command(words)
+        code = run_command(words)
     except KeyboardInterrupt:
+        signals.reported = True
         is_unfinished = not _ON_FILES.isdisjoint(words)
-        report_interrupt("sim-bridge: interrupted" if is_unfinished else "sim-bridge: stopped")
-        return _INTERRUPTED if is_unfinished else 0
+        interrupts.report("sim-bridge: interrupted" if is_unfinished else "sim-bridge: stopped")
+        code = _INTERRUPTED if is_unfinished else 0
+    return interrupts.end_with(code)
 
 
 if __name__ == "__main__":

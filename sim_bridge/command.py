@@ -48,8 +48,8 @@ def run(
 
 
 def check_arguments(given: Sequence[str]) -> None:
-    """Check a command line of the simulator; raise UsageError, UsageProblemError or ConfigError."""
-    app([*given, "--check"], prog_name="sim-bridge", standalone_mode=False)
+    """Check a command line of the simulator; raise UsageError, UsageProblemError, ConfigError, KeyboardInterrupt."""
+    run_app(app, "sim-bridge", [*given, "--check"])
 
 
 @app.command("open-loop", cls=PanelCommand)

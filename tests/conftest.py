@@ -7,6 +7,7 @@ import gc
 import itertools
 import os
 import signal
+import sys
 from collections.abc import Generator, Iterator
 from pathlib import Path
 
@@ -106,3 +107,14 @@ def _never_hangs() -> Iterator[None]:
     faulthandler.dump_traceback_later(HANGS_AFTER_S, exit=True)
     yield
     faulthandler.cancel_dump_traceback_later()
+
+
+@pytest.fixture(autouse=True)
+def _keeps_the_signals() -> Iterator[None]:
+    """Restore what a program that ran in the test process does on a signal."""
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    handlers, hook = [signal.getsignal(number) for number in numbers], sys.unraisablehook
+    yield
+    for number, handler in zip(numbers, handlers, strict=True):
+        signal.signal(number, handler)
+    sys.unraisablehook = hook

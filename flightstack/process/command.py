@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+import typer
 
 from flightstack.process import collection, console, options
 from flightstack.process.command_line import (
@@ -23,7 +23,7 @@ def run(given: options.RunOptions) -> None:
     """Connect to a simulator, run the control loops, and serve ground stations over MAVLink."""
     from flightstack.process import program
 
-    sys.exit(program.run(given))
+    raise typer.Exit(program.run(given) or 0)
 
 
 def run_command() -> int:

@@ -29,15 +29,6 @@ def complain(line: object) -> None:
     _print(line, sys.stderr)
 
 
-def report_interrupt(line: object) -> None:
-    """Print the line of a KeyboardInterrupt to stderr, and end with the program's exit code after it.
-
-    If it interrupted an ``exec``, such as that of a dataclass, Python would end with the signal instead.
-    """
-    exec("")  # the next one resets that
-    complain(line)
-
-
 def _print(line: object, stream: IO[str] | None) -> Exception | None:
     if stream is None:  # closed before the start
         return None

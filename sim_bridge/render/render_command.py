@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import re
-import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -92,7 +91,6 @@ _INTERRUPTED = 130
 def _errors_reported(caller: str) -> Iterator[None]:
     """Report an error as one sentence of the called program; an unfinished file is removed."""
     program = caller.split(maxsplit=1)[0]
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         yield
     except KeyboardInterrupt:

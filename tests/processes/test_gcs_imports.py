@@ -30,6 +30,7 @@ LIGHT = (
     "flightstack.process",
     "flightstack.process.command_line",
     "flightstack.process.console",
+    "flightstack.process.interrupts",
     "flightstack.process.options",
     "flightstack.core.port_numbers",
 )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import importlib
 import io
-import subprocess
 import sys
 
 import pytest
@@ -107,14 +106,11 @@ def test_an_interrupted_start_of_the_simulator_is_reported(
     assert sim_bridge_command(*words) == ("", f"sim-bridge: {said}\n", code)
 
 
-def test_an_interrupted_exec_does_not_replace_the_exit_code() -> None:
-    program = (
-        "import sys; from flightstack.process.console import report_interrupt\n"
-        "try: exec('raise KeyboardInterrupt')\n"
-        "except KeyboardInterrupt: report_interrupt('stopped'); sys.exit(0)"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
-    assert (done.stderr, done.returncode) == ("stopped\n", 0)
+def test_an_interrupted_check_of_the_simulator_is_not_a_passed_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`gcs sim` and `gcs fly` went on and ignored a Ctrl-C during it."""
+    interrupt_use("sim_bridge.program", monkeypatch)
+    with pytest.raises(KeyboardInterrupt):
+        sim_bridge.check_arguments([])
 
 
 def interrupt_use(module: str, monkeypatch: pytest.MonkeyPatch) -> None:
