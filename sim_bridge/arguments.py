@@ -8,10 +8,11 @@ from importlib.util import find_spec
 from flightstack.core.contract import Vector3
 from flightstack.core.errors import INSTALL_MULTIBODY
 from flightstack.core.geodesy import GeoPoint
+from flightstack.params.config import ESTIMATED, STATES
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.plant.battery import BatteryOptions
-from sim_bridge.plant.faults.checks import Flight, check_faults
+from sim_bridge.plant.faults.checks import Client, Flight, check_faults, client_refusal
 from sim_bridge.plant.faults.schedule import Fault, parse_fault, shortened
 from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.plants import MULTIBODY, NO_MUJOCO, PLANT_NAMES
@@ -168,3 +169,13 @@ def parse_faults(texts: list[str], vehicle: Vehicle, plant: str, options: PlantO
     faults = tuple(parse_fault(text, len(vehicle.rotors), "--fault") for text in texts)
     check_faults(faults, Flight(vehicle, plant, options), [f"--fault {shortened(text)}" for text in texts])
     return faults
+
+
+def check_client(faults: tuple[Fault, ...], state: str | None, clock: str | None) -> None:
+    """Check that each fault can act on the flight stack, if its state and clock are known."""
+    if state not in STATES or clock is None:
+        return
+    on_sensors = state == ESTIMATED
+    refusal = client_refusal(faults, Client(on_sensors, on_sensors, clock == "lockstep"))
+    if refusal is not None:
+        raise UsageProblemError(f"--fault: {refusal}")

@@ -55,6 +55,8 @@ Timeout = Annotated[
     ),
 ]
 Check = Annotated[bool, typer.Option("--check", help="Check the options and exit.")]
+State = Annotated[str | None, typer.Option(hidden=True, help="--state of the flight stack, if it is known.")]
+Clock = Annotated[str | None, typer.Option(hidden=True, help="--clock of the flight stack, if it is known.")]
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,8 @@ class SimulatorOptions:
     view: View = False
     timeout: Timeout = None
     check: Check = False
+    state: State = None
+    clock: Clock = None
 
 
 # of an open-loop flight

@@ -62,12 +62,14 @@ def server_options(given: SimulatorOptions) -> ServerOptions:
     plant_options = PlantOptions(
         disturbance, given.seed, battery=battery, slope_rad=slope_rad, boat_ned_m_s=boat
     )
+    faults = arguments.parse_faults(given.fault or [], vehicle, plant, plant_options)
+    arguments.check_client(faults, given.state, given.clock)
     default_port = simulator_port(given.instance)
     return ServerOptions(
         vehicle=vehicle,
         plant=plant,
         plant_options=plant_options,
-        faults=arguments.parse_faults(given.fault or [], vehicle, plant, plant_options),
+        faults=faults,
         home=arguments.parse_home(given.home),
         speed=arguments.parse_speed(given.speed),
         host=given.host,

@@ -119,7 +119,7 @@ class FlyOptions:
 TO_SIMULATOR = (
     "vehicle", "plant", "speed", "instance", "seed", "wind", "gust", "drag", "force", "torque", "torque_gust",
     "physics_hz", "slope", "boat", "battery_start", "battery_capacity", "battery_drain", "faults",
-    "ideal_rotors", "view",
+    "ideal_rotors", "view", "state",
 )  # fmt: skip
 TO_STACK = (
     "vehicle",

@@ -143,6 +143,7 @@ def simulator_arguments(options: FlyOptions, home: GeoPoint) -> list[str]:
         f"--port={options.simulator_port}",
         f"--home={home_text(home)}",
         f"--timeout={options.timeout_s:g}",
+        f"--clock={'realtime' if runs_freely(options) else 'lockstep'}",
     ]
 
 

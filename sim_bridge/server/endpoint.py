@@ -22,7 +22,7 @@ from flightstack.mavlink.link import Link, Message
 from flightstack.params.vehicle import Vehicle
 from flightstack.simulator_link.hot_frames import LOCKSTEP_FLAG, ActuatorsFrame
 from flightstack.simulator_link.sensor_frames import HIL_SENSOR_ID
-from sim_bridge.plant.faults.table import ROWS, STATE_KINDS, Kind
+from sim_bridge.plant.faults.checks import Client, client_refusal
 from sim_bridge.server.failure_command import inject_failure
 from sim_bridge.server.hil import HilControls, hil_state
 from sim_bridge.simulator import (
@@ -165,24 +165,8 @@ class FlightStackEndpoint:
     def _check_faults(self) -> None:
         """Set an error for a fault that cannot act on this flight stack; checked once."""
         self._faults_checked = True
-        faults = self.simulator.faults
-        if not self.free_running and any(fault.kind is Kind.STATE_DROP for fault in faults):
-            self.error = (
-                "state:drop needs a flight stack on its own clock (--clock realtime): in lockstep both sides "
-                "would wait for ever; use state:freeze or state:nan"
-            )
-        state = next((fault.kind for fault in faults if fault.kind in STATE_KINDS), None)
-        if state is not None and self._wants_sensors:
-            self.error = (
-                f"{ROWS[state].compact.partition('=')[0]} cannot act: the flight stack flies on its sensors; start it "
-                "with --state truth, or use a fault of a sensor, such as sensor:imu:freeze"
-            )
-        sensor = next((fault.sensor for fault in faults if fault.sensor), None)
-        if sensor is not None and not self._sends_sensors:
-            self.error = (
-                f"the fault of the sensor {sensor} cannot act: the flight stack flies on the true state; start it "
-                "with --state estimated"
-            )
+        client = Client(self._wants_sensors, self._sends_sensors, not self.free_running)
+        self.error = client_refusal(self.simulator.faults, client) or self.error
 
     def _handle(self, message: Message) -> None:
         kind, by = message.get_msgId(), message.get_srcSystem()

@@ -98,6 +98,15 @@ def test_bad_connection_strings_are_usage_errors(text: str) -> None:
         ("--physics-hz 1", "--physics-hz: 1 is outside the allowed range 100 to 100000"),
         ("--fault rotor:9:off", "--fault rotor:9:off: the vehicle has rotors 1 to 4"),
         ("--fault battery:level=2", "--fault battery:level=2: SHARE must be 0 to 1"),
+        (
+            "--fault state:freeze@2-3",
+            "--fault: state:freeze cannot act: the flight stack flies on its sensors",
+        ),
+        ("--fault state:drop --state truth", "--fault: state:drop needs a flight stack on its own clock"),
+        (
+            "--fault sensor:gyro:off --state truth",
+            "--fault: the fault of the sensor gyro cannot act: the flight",
+        ),
         ("--home 89.95,0,0", "--home latitude: 89.95 is outside"),
         ("--home 1,2", "--home: 1,2 must be LATITUDE,LONGITUDE,ALTITUDE"),
         (
@@ -272,7 +281,8 @@ def test_the_children_are_told_everything() -> None:
     home = GeoPoint(47.1, -8.2, 3.5)
     assert simulator_arguments(options, home) == [
         "--vehicle=x_quad", "--plant=paper", "--speed=4", "--instance=2", "--seed=9", "--wind=3,-1", "--gust=0.5",
-        "--torque-gust=0.02", "--ideal-rotors", "--port=4562", "--home=47.1,-8.2,3.5", "--timeout=12",
+        "--torque-gust=0.02", "--ideal-rotors", "--state=estimated", "--port=4562", "--home=47.1,-8.2,3.5", "--timeout=12",
+        "--clock=lockstep",
     ]  # fmt: skip
     assert stack_arguments(options, home, Path("runs/x"), 40_000) == [
         "--vehicle=x_quad", "--controller=backstepping", "--gains=paper", "--loops=c", "--state=estimated",

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from flightstack.core.contract import Vector3
 from flightstack.params.vehicle import NO_DRAG_PLANT, Vehicle
 from sim_bridge.errors import UsageProblemError
-from sim_bridge.plant.faults.table import NO_END, ROWS, Fault, Kind, Need
+from sim_bridge.plant.faults.table import NO_END, ROWS, STATE_KINDS, Fault, Kind, Need
 from sim_bridge.plant.plant import PlantOptions
 
 _STILL = Vector3(0.0, 0.0, 0.0)
@@ -23,6 +23,15 @@ class Flight(NamedTuple):
     plant: str
     options: PlantOptions
     faults: Sequence[Fault] = ()  # of the flight, before the checked ones
+
+
+class Client(NamedTuple):
+    """Messages that a flight stack flies on, and its clock."""
+
+    wants_sensors: bool
+    has_sensors: bool
+    """It also gets the sensors if it wants the standard state."""
+    in_lockstep: bool
 
 
 def _battery(flight: Flight) -> str | None:
@@ -112,3 +121,25 @@ def _refusal(fault: Fault, flight: Flight) -> str | None:
     if Need.SENSOR in row.needs:
         return _sensor(fault, flight)
     return next((reason for need in row.needs if (reason := _REASONS[need](flight)) is not None), None)
+
+
+def client_refusal(faults: Sequence[Fault], client: Client) -> str | None:
+    """Return why one of the faults cannot act on a flight stack, or None."""
+    sensor = next((fault.sensor for fault in faults if fault.sensor), None)
+    if sensor is not None and not client.has_sensors:
+        return (
+            f"the fault of the sensor {sensor} cannot act: the flight stack flies on the true state; start it "
+            "with --state estimated"
+        )
+    state = next((fault.kind for fault in faults if fault.kind in STATE_KINDS), None)
+    if state is not None and client.wants_sensors:
+        return (
+            f"{ROWS[state].compact.partition('=')[0]} cannot act: the flight stack flies on its sensors; start it "
+            "with --state truth, or use a fault of a sensor, such as sensor:imu:freeze"
+        )
+    if client.in_lockstep and any(fault.kind is Kind.STATE_DROP for fault in faults):
+        return (
+            "state:drop needs a flight stack on its own clock (--clock realtime): in lockstep both sides "
+            "would wait for ever; use state:freeze or state:nan"
+        )
+    return None
