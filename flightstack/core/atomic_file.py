@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import secrets
 from collections.abc import Iterator
@@ -20,6 +21,21 @@ def check_new(path: Path, overwrite: bool) -> None:
     """Raise ConfigError if the file exists and must not be overwritten."""
     if not overwrite and path.is_file():
         raise ConfigError(path, "", "exists already: name another file or give --overwrite")
+
+
+def check_creatable(path: Path, *, is_folder: bool = False) -> None:
+    """Raise ConfigError if a file, or a folder for files, in folders that may be missing, cannot be written."""
+    nearest = next(place for place in (path, *path.absolute().parents) if place.exists())
+    has_entries = nearest.is_dir()
+    if nearest == path and has_entries and not is_folder:
+        code = errno.EISDIR
+    elif not has_entries and (nearest != path or is_folder):
+        code = errno.ENOTDIR
+    elif not os.access(nearest, os.W_OK | os.X_OK if has_entries else os.W_OK):
+        code = errno.EACCES
+    else:
+        return
+    raise ConfigError(path, "", f"cannot be written: {os.strerror(code)}")
 
 
 def write_text_atomically(path: Path, text: str) -> None:

@@ -76,7 +76,7 @@ class ProcessFiles:
             return
         assert self._stack is not None
         self._stack.journal.say(Severity.CRITICAL, text or sentence[0].upper() + sentence[1:])
-        complain(sentence)
+        complain(f"warning: {sentence}")
 
     def close_parameters(self) -> None:
         """Save changes; a second call does nothing."""

@@ -9,7 +9,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-from flightstack.core.atomic_file import check_new
+from flightstack.core.atomic_file import check_creatable, check_new
 from flightstack.core.errors import ConfigError, TargetError
 from flightstack.core.port_numbers import simulator_port, system_id
 from flightstack.firmware.choice import PYTHON
@@ -171,6 +171,7 @@ def _open_files(
         config = replace(config, params_file=_param_file(given, directory))
     if given.log is not None and process.log is not None:
         check_new(process.log, given.overwrite)
+        check_creatable(process.log)
     file = given.named_params
     if file is not None and not file.exists():
         begin_param_file(file, config.system_id)

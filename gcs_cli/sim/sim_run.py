@@ -11,9 +11,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from flightstack.core.atomic_file import check_creatable, check_new
 from flightstack.core.port_numbers import system_id, vehicle_ground_port
 from flightstack.mavlink.dialect import mavlink
 from flightstack.process.console import complain
+from flightstack.process.ports import ports_config
 from flightstack.process.supervised import supervised
 from flightstack.transports.udp import UdpSocket
 from gcs_cli.errors import FAILED, NO_ANSWER, CliError
@@ -162,16 +164,25 @@ class Fleet:
         self._ends.close()
 
 
+def check_vehicle(vehicle: SimOptions) -> None:
+    """Check options, files and ports as simulator and flight stack do at their start; raise CliError, ConfigError."""
+    is_read = vehicle.params not in (None, Path(NONE))
+    check_options(vehicle if is_read else replace(vehicle, params=None), start_of(vehicle))
+    if vehicle.log not in (None, NONE):
+        log = Path(str(vehicle.log))
+        check_new(log, vehicle.overwrite)
+        check_creatable(log)
+    if vehicle.state_dir not in (None, NONE):
+        check_creatable(Path(str(vehicle.state_dir)), is_folder=True)
+    ports_config(vehicle.instance, vehicle.gcs or [], None, None, vehicle.listen, None)
+    check_ports(vehicle)
+
+
 def simulate(options: SimOptions, out: Output, watch: bool) -> None:
     """Run the vehicles until a signal, the end of the view, or the end of a process; raise CliError, ConfigError."""
     vehicles = vehicles_of(options)
     for vehicle in vehicles:
-        has_file = vehicle.params is not None and str(vehicle.params) != NONE and vehicle.params.exists()
-        checked = (
-            vehicle if has_file else replace(vehicle, params=None)
-        )  # the flight stack creates a missing one
-        check_options(checked, start_of(vehicle))
-        check_ports(vehicle)
+        check_vehicle(vehicle)
     first, *others = vehicles
     with Interruption() as interruption, Fleet() as fleet:
         due_s = time.monotonic() + options.timeout_s

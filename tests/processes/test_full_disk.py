@@ -38,7 +38,7 @@ def test_a_disk_full_in_flight_is_told_once_and_the_flight_goes_on(tmp_path: Pat
         _, errors = there.stack.communicate(timeout=LONG_S)
     assert there.stack.returncode == 0
     assert errors.splitlines() == [
-        "flightstack: the log flight.ulg ends early: File too large",
+        "flightstack: warning: the log flight.ulg ends early: File too large",
         "flightstack: stopped",
     ]
     assert watch.output.count("Logging stopped") == 1

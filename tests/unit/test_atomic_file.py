@@ -11,6 +11,7 @@ import pytest
 from flightstack.core import atomic_file
 from flightstack.core.atomic_file import (
     OWNER_ONLY,
+    check_creatable,
     check_new,
     replacing,
     write_bytes_atomically,
@@ -127,3 +128,30 @@ def test_an_existing_file_is_refused_unless_it_may_be_overwritten(tmp_path: Path
     check_new(path, overwrite=True)
     with pytest.raises(ConfigError, match=r"a.txt: exists already: name another file or give --overwrite$"):
         check_new(path, overwrite=False)
+
+
+@pytest.mark.parametrize(
+    ("name", "is_folder", "reason"),
+    [
+        ("folder", False, "Is a directory"),
+        ("file/a.txt", False, "Not a directory"),
+        ("file", True, "Not a directory"),
+        ("closed/new/a.txt", False, "Permission denied"),
+        ("closed", True, "Permission denied"),
+    ],
+)
+def test_a_file_that_cannot_be_created_is_refused(
+    name: str, is_folder: bool, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for folder in ("folder", "closed"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "file").touch()
+    monkeypatch.setattr(os, "access", lambda path, _mode: Path(path).name != "closed")  # root may write there
+    with pytest.raises(ConfigError, match=f"{name}: cannot be written: {reason}$"):
+        check_creatable(tmp_path / name, is_folder=is_folder)
+    for free, is_one in (("file", False), ("folder", True), ("new/a.txt", False), ("folder/new", True)):
+        check_creatable(tmp_path / free, is_folder=is_one)
+
+
+def test_a_device_can_be_written() -> None:
+    check_creatable(Path(os.devnull))

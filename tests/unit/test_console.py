@@ -6,6 +6,7 @@ import errno
 import importlib
 import io
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -111,6 +112,14 @@ def test_an_interrupted_check_of_the_simulator_is_not_a_passed_one(monkeypatch: 
     interrupt_use("sim_bridge.program", monkeypatch)
     with pytest.raises(KeyboardInterrupt):
         sim_bridge.check_arguments([])
+
+
+def test_a_log_that_cannot_be_written_is_refused_at_the_start(tmp_path: Path) -> None:
+    """The flight stack flew without it, and said so when it armed."""
+    (tmp_path / "file").touch()
+    log = tmp_path / "file" / "flight.ulg"
+    ended = flightstack_command("--log", log, "--state-dir", "none", "--params", "none")
+    assert ended == ("", f"flightstack: {log}: cannot be written: Not a directory\n", 2)
 
 
 def interrupt_use(module: str, monkeypatch: pytest.MonkeyPatch) -> None:

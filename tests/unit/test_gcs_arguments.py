@@ -281,8 +281,8 @@ def test_the_children_are_told_everything() -> None:
     home = GeoPoint(47.1, -8.2, 3.5)
     assert simulator_arguments(options, home) == [
         "--vehicle=x_quad", "--plant=paper", "--speed=4", "--instance=2", "--seed=9", "--wind=3,-1", "--gust=0.5",
-        "--torque-gust=0.02", "--ideal-rotors", "--state=estimated", "--port=4562", "--home=47.1,-8.2,3.5", "--timeout=12",
-        "--clock=lockstep",
+        "--torque-gust=0.02", "--ideal-rotors", "--state=estimated", "--port=4562", "--home=47.1,-8.2,3.5",
+        "--timeout=12", "--clock=lockstep",
     ]  # fmt: skip
     assert stack_arguments(options, home, Path("runs/x"), 40_000) == [
         "--vehicle=x_quad", "--controller=backstepping", "--gains=paper", "--loops=c", "--state=estimated",

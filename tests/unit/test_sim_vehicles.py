@@ -208,3 +208,30 @@ def test_notices_are_printed_after_the_view(
     monkeypatch.setattr(sim_run.VehicleProcesses, "poll", become_ready)
     sim_run.simulate(SimOptions(), Output(as_json=False), watch=True)
     assert capsys.readouterr().err == "view ended\nWARNING low battery\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("--log folder", "folder: cannot be written: Is a directory"),
+        ("--log file/flight.ulg", "file/flight.ulg: cannot be written: Not a directory"),
+        ("--log file", "file: exists already: name another file or give --overwrite"),
+        (
+            "--vehicles 2 --log file/flight.ulg",
+            "file/instance-0/flight.ulg: cannot be written: Not a directory",
+        ),
+        ("--state-dir file", "file: cannot be written: Not a directory"),
+        ("--params missing.params", "--params missing.params: no such file"),
+        ("--gcs station", "--gcs: station must be HOST:PORT"),
+        ("--gcs 127.0.0.1:99999", "--gcs: 99999 is outside 1 to 65535"),
+        ("--listen nowhere.invalid", "--listen: nowhere.invalid is not a host with an IPv4 address"),
+    ],
+)
+def test_bad_option_is_refused_before_a_process_starts(
+    words: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").touch()
+    monkeypatch.setattr(sim_run, "Fleet", lambda: pytest.fail("a vehicle is started"))
+    assert gcs("sim", *words.split()) == ("", f"gcs: {said}\n", 2)
