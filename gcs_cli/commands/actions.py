@@ -25,6 +25,11 @@ app = make_app(add_completion=False)
 _NUMBERS = {"ignore_unknown_options": True}
 """Settings of a command with arguments that may be negative."""
 
+_DEFAULT_SPEED = -2.0
+_SLOWEST_M_S, _FASTEST_M_S = 0.1, 100.0
+_PLACE = (("latitude", -90.0, 90.0), ("longitude", -180.0, 180.0), ("altitude", -20_000.0, 20_000.0))
+"""Names and ranges of the numbers of a place."""
+
 AltitudeOption = Annotated[
     float | None,
     typer.Option("--alt", metavar="METRES", min=0.1, max=10_000.0, help="Altitude above home."),
@@ -48,6 +53,14 @@ class ActionOptions:
             "--no-wait", help="End with the acknowledgement; do not wait for the effect.", **IN_OUTPUT
         ),
     ] = False
+
+
+def _check_range(name: str, value: float, low: float, high: float, otherwise: str = "") -> None:
+    """Raise CliError (usage) for a number outside its range, also for one that is not finite."""
+    if not low <= value <= high:
+        raise CliError(
+            f"{name}: {value:g} is outside the allowed range {low:g} to {high:g}{otherwise}", USAGE
+        )
 
 
 def run_action(context: typer.Context, link: LinkOptions, options: ActionOptions, action: Action) -> None:
@@ -156,7 +169,7 @@ def goto(
     run_action(context, link, options, in_flight.goto(latitude, longitude, alt))
 
 
-@app.command()
+@app.command(context_settings=_NUMBERS)
 @expand_options
 def yaw(
     context: typer.Context,
@@ -180,8 +193,12 @@ def speed(
 
     ArduPilot forgets it with the next mode change. No vehicle reports it: the command ends with the acknowledgement.
     """
-    wanted = None if metres_per_second < 0.0 else metres_per_second
-    run_action(context, link, options, in_flight.speed(wanted))
+    is_default = metres_per_second == _DEFAULT_SPEED
+    if not is_default:
+        _check_range(
+            "speed", metres_per_second, _SLOWEST_M_S, _FASTEST_M_S, f", {_DEFAULT_SPEED:g} is the default"
+        )
+    run_action(context, link, options, in_flight.speed(None if is_default else metres_per_second))
 
 
 @app.command()
@@ -247,6 +264,8 @@ def set_home(
         raise CliError(
             "set-home: give latitude, longitude and altitude, or nothing for the current position", USAGE
         )
+    for value, (name, low, high) in zip(place or (), _PLACE, strict=False):
+        _check_range(name, value, low, high)
     home = (place[0], place[1], place[2]) if place else None
     run_action(context, link, options, on_vehicle.set_home(home))
 

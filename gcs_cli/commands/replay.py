@@ -33,7 +33,7 @@ def replay(
     begin: Annotated[
         float,
         typer.Option(
-            "--from", "--seek", min=0.0, metavar="SECONDS", help="Start, from the start of the log."
+            "--from", "--seek", min=0.0, max=1e7, metavar="SECONDS", help="Start, from the start of the log."
         ),
     ] = 0.0,
     loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end.")] = False,

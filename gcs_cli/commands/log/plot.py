@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -26,6 +26,7 @@ app = make_app(add_completion=False)
 _TEMPLATES = Path(__file__).resolve().parents[2] / "logs" / "templates"
 _PANEL_ROWS = 12
 _PRINTED = (".png", ".svg", ".pdf")
+_TIMES: dict[str, Any] = {"min": 0.0, "max": 1e7}
 FieldsArgument = Annotated[
     list[str],
     typer.Argument(
@@ -50,10 +51,11 @@ def plot(
     html: PageOption = None,
     png: PictureOption = None,
     begin: Annotated[
-        float, typer.Option("--from", metavar="SECONDS", help="Start, from the start of the log.")
+        float,
+        typer.Option("--from", metavar="SECONDS", help="Start, from the start of the log.", **_TIMES),
     ] = 0.0,
     end: Annotated[
-        float | None, typer.Option("--to", metavar="SECONDS", help="End.", show_default=False)
+        float | None, typer.Option("--to", metavar="SECONDS", help="End.", show_default=False, **_TIMES)
     ] = None,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,

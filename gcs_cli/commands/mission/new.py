@@ -54,14 +54,19 @@ class ShapeOptions:
     size: Annotated[
         float,
         typer.Option(
-            metavar="METRES", min=0.1, help="Side, diameter, or width of the lemniscate or corridor."
+            metavar="METRES",
+            min=0.1,
+            max=100_000.0,
+            help="Side, diameter, or width of the lemniscate or corridor.",
         ),
     ] = 20.0
     spacing: Annotated[
-        float, typer.Option(metavar="METRES", min=0.1, help="Largest distance between lines.")
+        float,
+        typer.Option(metavar="METRES", min=0.1, max=100_000.0, help="Largest distance between lines."),
     ] = 10.0
     angle: Annotated[
-        float, typer.Option(metavar="DEGREES", help="Direction of survey lines, from north.")
+        float,
+        typer.Option(metavar="DEGREES", min=-360.0, max=360.0, help="Direction of survey lines, from north."),
     ] = 0.0
     points: Annotated[
         int, typer.Option(metavar="N", min=3, max=1000, help="Waypoints of a circle or lemniscate.")
