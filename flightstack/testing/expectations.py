@@ -38,6 +38,8 @@ class Check:
     margin: float | None = None
     """How far from failing, in the unit of the expectation; None without a number."""
     limit: float | None = None
+    time_s: float | None = None
+    """Time of a violation."""
 
     @property
     def share(self) -> float | None:
@@ -59,7 +61,8 @@ def _checks(expect: Expect, flight: Flight, last: State, events: Sequence[Event]
     yield _outcome(expect, flight, last, events)
     for event in events:
         if event.name.startswith(_UNEXPECTED):
-            yield Check("answers", False, f"{event.name} at t = {event.time_s:.2f} s")
+            found = f"{event.name} at t = {event.time_s:.2f} s"
+            yield Check("answers", False, found, time_s=event.time_s)
     if flight.log:
         yield from _of_flight(expect, flight)
     elif _needs_flight(expect):
@@ -101,7 +104,7 @@ def _outcome(expect: Expect, flight: Flight, last: State, events: Sequence[Event
         ending = f"ended in mode {last.mode} without a landing" if mode is None else f"landed in mode {mode}"
         return Check(name, mode == wanted, f"it {ending}")
     if wanted in tuple(Code):
-        return Check(name, flight.outcome == wanted, f"{flight.outcome}: {flight.outcome_text}")
+        return Check(name, flight.outcome == wanted, f"{flight.outcome}\n{flight.outcome_text}")
     failsafes = [
         event.name.removeprefix("failsafe_") for event in events if event.name.startswith("failsafe_")
     ]
@@ -122,8 +125,9 @@ def _limits(expect: Expect, flight: Flight) -> Iterator[Check]:
         if limit is not None:
             value = figure(flight)
             passed = value <= limit
-            where = "" if passed or name not in _DISTANCES else _farthest(flight, *_DISTANCES[name](flight))
-            yield Check(f"{name} ≤ {limit:g}", passed, f"{value:.3f} m{where}", limit - value, limit)
+            at_s = None if passed or name not in _DISTANCES else _farthest(flight, *_DISTANCES[name](flight))
+            where = "" if at_s is None else _place_at(flight, at_s)
+            yield Check(f"{name} ≤ {limit:g}", passed, f"{value:.3f} m{where}", limit - value, limit, at_s)
     if expect.duration_s is not None:
         low, high = expect.duration_s
         value = flight.duration_s
@@ -141,7 +145,8 @@ def _property(kind: str, text: str, flight: Flight) -> Check:
     found = f"{amount} at t = {margin.time_s:.2f} s"
     if not margin.holds:
         found = f"violated at t = {margin.time_s:.2f} s\n{margin.detail}"
-    return Check(margin.prop, margin.holds, found, margin.margin, margin.limit)
+    at_s = None if margin.holds else margin.time_s
+    return Check(margin.prop, margin.holds, found, margin.margin, margin.limit, at_s)
 
 
 def _texts(expect: Expect, flight: Flight) -> Iterator[Check]:
@@ -149,7 +154,8 @@ def _texts(expect: Expect, flight: Flight) -> Iterator[Check]:
         worse = flight.texts_above(SEVERITIES.index(expect.no_text_above))
         shown = (f"t = {text.time_s:.2f} s, {SEVERITIES[text.severity]}: {text.text}" for text in worse)
         found = "; ".join(list(shown)[:_SHOWN_EVENTS])
-        yield Check(f"no text above {expect.no_text_above}", not worse, found or "none")
+        at_s = worse[0].time_s if worse else None
+        yield Check(f"no text above {expect.no_text_above}", not worse, found or "none", time_s=at_s)
     for text in expect.texts:
         yield Check(f"text {text!r}", any(text in said for said in flight.texts), "; ".join(flight.texts))
 
@@ -181,12 +187,14 @@ def _off_setpoint(flight: Flight) -> tuple[FloatArray, FloatArray]:
     return error.time_s, error.values[:, 0]
 
 
-def _farthest(flight: Flight, time_s: FloatArray, distance_m: FloatArray) -> str:
-    """Return when a distance is largest, and the values around."""
-    if not len(time_s):
-        return ""
+def _farthest(flight: Flight, time_s: FloatArray, distance_m: FloatArray) -> float | None:
+    """Return when a distance is largest."""
+    return flight.data.start_s + float(time_s[np.argmax(distance_m)]) if len(time_s) else None
+
+
+def _place_at(flight: Flight, at_s: float) -> str:
+    """Return a time, and the values around it."""
     signals = flight.signals
-    at_s = flight.data.start_s + float(time_s[np.argmax(distance_m)])
     at = min(int(np.searchsorted(signals.time_s, at_s - 1e-9)), len(signals.time_s) - 1)
     return f" at t = {at_s:.2f} s\n{values_around(signals, _PLACE, at)}"
 

@@ -162,26 +162,37 @@ class LiveDisplay:
         self._live.stop()
 
 
-_MOST_EVENTS = 10
-"""Newest events and status texts of a failed flight; its report has all."""
-
-
 def print_failures(console: Console, rows: Sequence[Row]) -> None:
     """Print each flight that failed: its expectations, the values around, and the command that repeats it."""
     for row in (row for row in rows if not row.result.passed):
         _print(console, Text(f"\n{row.case.label}, seed {row.case.seed}", "bold red"))
-        if row.result.outcome_text and row.result.outcome != "error":
-            _print(console, Text(f"  {row.result.outcome}: {row.result.outcome_text}", "bright_black"))
+        _print_outcome(console, row.result)
         for check in row.result.failures:
             first, *others = str(check).splitlines()
             _print(console, Text(f"  {first}"))
             for line in others:
                 _print(console, Text(f"    {line}", "bold" if line.startswith(">") else "bright_black"))
-        for time_s, text in row.result.texts[-_MOST_EVENTS:]:
-            _print(console, Text(f"  {time_s:7.2f} s  {text}", "bright_black"))
+        _print_events(console, row.result)
         if row.kept is not None:
             _print(console, Text(f"  log and report: {row.kept}"))
         _print(console, Text(f"  repeat: {row.case.command}"))
+
+
+def _print_outcome(console: Console, result: Result) -> None:
+    """Print the outcome, unless a failure has it."""
+    is_told = any(result.outcome_text in check.found for check in result.failures)
+    if result.outcome_text and not is_told:
+        _print(console, Text(f"  {result.outcome}: {result.outcome_text}", "bright_black"))
+
+
+def _print_events(console: Console, result: Result) -> None:
+    """Print the events around the first violation, or the last ones."""
+    if not result.nearest:
+        return
+    at_s = result.violated_s
+    _print(console, Text("  last events:" if at_s is None else f"  events around t = {at_s:.2f} s:"))
+    for time_s, text in result.nearest:
+        _print(console, Text(f"  {time_s:7.2f} s  {text}", "bright_black"))
 
 
 def print_summary(console: Console, rows: Sequence[Row], jobs: int, wall_s: float) -> None:

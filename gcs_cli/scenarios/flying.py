@@ -8,6 +8,7 @@ import traceback
 
 from flightstack.core.errors import ConfigError, TargetError
 from flightstack.testing import Verdict, run_scenario
+from flightstack.testing.flight import Flight
 from gcs_cli.report.page import render_report
 from gcs_cli.report.summary import RunInfo, summarise
 from gcs_cli.scenarios.figures import figures_of, metrics_of
@@ -16,6 +17,10 @@ from gcs_cli.scenarios.selection import Case
 
 _EXPECTED = (AssertionError, ConfigError, TargetError, OSError)
 """Errors of a flight whose text is enough; of any other the place is shown too."""
+_DESCRIBED = ("takeoff", "landing", "item_", "mode_", "failsafe")
+"""Beginnings of the names of events that the vehicle describes in a status text."""
+_SAME_S = 0.011
+"""More than lies between an event and its text."""
 
 
 def fly_case(case: Case, wanted: Wanted) -> Result:
@@ -36,8 +41,6 @@ def _result(case: Case, verdict: Verdict, wanted: Wanted, began_s: float) -> Res
     flight = verdict.flight
     content = flight.log.content
     has_files = wanted.every_file or (wanted.files and not verdict.passed)
-    texts = [(event.time_s, event.name) for event in flight.events]
-    texts += [(text.time_s, text.text) for text in flight.log.texts]
     return Result(
         checks=verdict.checks,
         closest=verdict.closest,
@@ -46,12 +49,25 @@ def _result(case: Case, verdict: Verdict, wanted: Wanted, began_s: float) -> Res
         duration_s=flight.duration_s,
         wall_s=time.perf_counter() - began_s,
         log_sha256=hashlib.sha256(content).hexdigest() if content else None,
-        texts=tuple(sorted(texts, key=lambda text: text[0])),
+        texts=_facts(flight),
         figures=figures_of(flight) if wanted.figures else (),
         metrics=metrics_of(flight) if wanted.metrics else {},
         log=content if has_files else b"",
         report=_report(case, verdict) if has_files else "",
     )
+
+
+def _facts(flight: Flight) -> tuple[tuple[float, str], ...]:
+    """Return times and names of events and status texts; an event that a text describes is left out."""
+    texts = [(text.time_s, text.text) for text in flight.log.texts]
+    events = [
+        (event.time_s, event.name)
+        for event in flight.events
+        if not (
+            event.name.startswith(_DESCRIBED) and any(abs(event.time_s - at_s) < _SAME_S for at_s, _ in texts)
+        )
+    ]
+    return tuple(sorted(events + texts, key=lambda fact: round(fact[0], 3)))
 
 
 def _report(case: Case, verdict: Verdict) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import bisect
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -9,6 +11,9 @@ from typing import Any
 from flightstack.testing.expectations import Check
 from gcs_cli.charts.figure import Figure
 from gcs_cli.scenarios.selection import Case
+
+_MOST_EVENTS, _AFTER = 10, 4
+"""Events and status texts of a failed flight that are shown, and how many of them follow the violation."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +60,20 @@ class Result:
     def failures(self) -> list[Check]:
         """The expectations that do not hold."""
         return [check for check in self.checks if not check.passed]
+
+    @property
+    def violated_s(self) -> float | None:
+        """Time of the first violation; None if no failure has one."""
+        times = [check.time_s for check in self.failures if check.time_s is not None]
+        return min(times, default=None)
+
+    @property
+    def nearest(self) -> tuple[tuple[float, str], ...]:
+        """The events and status texts nearest to the first violation, oldest first; without one the newest."""
+        at_s = math.inf if self.violated_s is None else self.violated_s
+        last = bisect.bisect_right(self.texts, at_s, key=lambda fact: fact[0]) + _AFTER
+        last = min(max(last, _MOST_EVENTS), len(self.texts))
+        return self.texts[max(0, last - _MOST_EVENTS) : last]
 
 
 @dataclass(frozen=True)
@@ -116,11 +135,16 @@ def _flight(row: Row) -> dict[str, Any]:
         "duration_s": round(result.duration_s, 3),
         "closest": None if result.closest is None else _check(result.closest),
         "checks": [_check(check) for check in result.checks],
+        "events": [] if result.passed else [_event(*fact) for fact in result.nearest],
         "command": case.command,
         "log_sha256": result.log_sha256,
         "kept": row.kept,
         "wall_time_s": round(result.wall_s, 3),
     }
+
+
+def _event(at_s: float, text: str) -> dict[str, Any]:
+    return {"time_s": round(at_s, 3), "text": text}
 
 
 def _check(check: Check) -> dict[str, Any]:
@@ -129,6 +153,7 @@ def _check(check: Check) -> dict[str, Any]:
         "expectation": check.name,
         "passed": check.passed,
         "found": check.found,
+        "time_s": None if check.time_s is None else round(check.time_s, 3),
         "margin": check.margin if finite else None,
         "limit": check.limit if finite else None,
         "share": check.share,

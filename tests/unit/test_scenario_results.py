@@ -183,13 +183,44 @@ def test_without_a_terminal_each_flight_is_a_plain_line() -> None:
     assert lines[-1] == "1 failed, 2 passed in 3.0 s on 2 processes"
 
 
-def test_a_failure_shows_the_last_events_with_their_times() -> None:
-    failed = next(row for row in ROWS if not row.result.passed)
-    texts = tuple((float(second), f"event {second}") for second in range(12))
-    lines = printed([replace(failed, result=replace(failed.result, texts=texts))]).splitlines()
-    assert [line for line in lines if "event" in line] == [
-        f"  {second:4d}.00 s  event {second}" for second in range(2, 12)
+FACTS = tuple((float(second), f"event {second}") for second in range(20))
+
+
+def failed_with(check: Check) -> Row:
+    return replace(ROWS[1], result=replace(ROWS[1].result, checks=(check,), texts=FACTS))
+
+
+def test_a_failure_shows_the_events_around_the_first_violation() -> None:
+    violated = failed_with(replace(BAD, time_s=6.5))
+    lines = printed([violated]).splitlines()
+    shown = [f"  {second:4d}.00 s  event {second}" for second in range(1, 11)]
+    begin = lines.index("  events around t = 6.50 s:") + 1
+    assert lines[begin : begin + 11] == [*shown, "  log and report: runs/x"]
+    (flight,) = as_json([violated], 1.0, False)["flights"]
+    assert [event["text"] for event in flight["events"]] == [f"event {second}" for second in range(1, 11)]
+    assert flight["events"][0]["time_s"] == 1.0
+    assert flight["checks"][0]["time_s"] == 6.5
+
+
+@pytest.mark.parametrize(("at_s", "first"), [(0.5, 0), (18.5, 10), (None, 10)])
+def test_ten_events_are_shown_of_any_violation(at_s: float | None, first: int) -> None:
+    lines = printed([failed_with(replace(BAD, time_s=at_s))]).splitlines()
+    assert ("  last events:" in lines) is (at_s is None)
+    assert [line.split()[-1] for line in lines if " s  event" in line] == [
+        str(second) for second in range(first, first + 10)
     ]
+
+
+def test_a_passed_flight_has_no_events_in_the_document() -> None:
+    assert as_json([row("calm", GOOD)], 1.0, False)["flights"][0]["events"] == []
+
+
+def test_a_failed_outcome_is_told_once() -> None:
+    sentence = "the mission was flown"
+    wrong = Check("outcome failsafe", False, f"completed\n{sentence}")
+    text = printed([row("calm", wrong)])
+    assert text.count(sentence) == 1
+    assert "FAIL  calm  seed 1  outcome failsafe: completed  1.5 s" in text
 
 
 def test_a_failure_shows_values_and_the_command_that_repeats_it() -> None:
