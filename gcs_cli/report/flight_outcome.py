@@ -96,9 +96,13 @@ def _item(view: VehicleView, items: Sequence[MissionItem]) -> str:
 
 
 def _warnings(view: VehicleView) -> str:
-    """Return the newest warnings of the vehicle, to stand at the end of a sentence."""
-    warnings = [entry.text for entry in view.texts if entry.severity <= Severity.WARNING]
-    return f": {'; '.join(warnings[-_MOST_WARNINGS:])}" if warnings else ""
+    """Return the first critical text, which is the cause, and the newest warnings, to end a sentence."""
+    warnings = [entry for entry in view.texts if entry.severity <= Severity.WARNING]
+    cause = next((entry for entry in warnings if entry.severity <= Severity.CRITICAL), None)
+    shown = warnings[-_MOST_WARNINGS:]
+    if cause is not None and cause not in shown:
+        shown = [cause, *shown[1:]]
+    return f": {'; '.join(entry.text for entry in shown)}" if shown else ""
 
 
 def with_log(outcome: Outcome, flight: Flight, items: Sequence[MissionItem]) -> Outcome:

@@ -9,7 +9,8 @@ from gcs_cli.errors import DONE, FAILED, NO_ANSWER
 from gcs_cli.fly.flight import Phase
 from gcs_cli.fly.flight_watch import STALL_S
 from gcs_cli.fly.fly_display import phase_words
-from gcs_cli.report.flight_outcome import Code, Outcome
+from gcs_cli.report.flight_outcome import Code, Outcome, outcome_of
+from gcs_cli.vehicle.view_types import StatusText, VehicleView
 from tests.support.fake_vehicle import ARM, RETURN, SHUT_DOWN, START, FakeVehicle
 from tests.support.flight_story import STEP_S, TAKEOFF, WAYPOINT, Story
 
@@ -138,6 +139,25 @@ def test_no_single_message_is_needed_to_see_the_end(unsent: set[str]) -> None:
 def test_landing_at_the_last_item_counts_when_only_the_item_is_known() -> None:
     vehicle = FakeVehicle(stop_at_item=2, unsent={"MISSION_ITEM_REACHED"})
     assert Story(vehicle).run().outcome is Code.COMPLETED
+
+
+@pytest.mark.parametrize(
+    ("texts", "shown"),
+    [
+        ([(4, "a")], ": a"),
+        ([(2, "a"), (4, "b"), (4, "c"), (4, "d")], ": a; c; d"),
+        ([(4, "a"), (0, "b"), (2, "c"), (4, "d"), (6, "e")], ": b; c; d"),
+        ([(4, "a"), (4, "b"), (4, "c"), (4, "d")], ": b; c; d"),
+        ([(6, "a")], ""),
+    ],
+    ids=["one", "first critical", "emergency among the newest", "no critical", "none"],
+)
+def test_a_lost_flight_is_explained_by_its_first_critical_text(
+    texts: list[tuple[int, str]], shown: str
+) -> None:
+    said = tuple(StatusText(number, *text, 0.0, None) for number, text in enumerate(texts))
+    outcome = outcome_of(VehicleView(texts=said), ())
+    assert outcome.reason == f"the vehicle disarmed, before the mission was done{shown}"
 
 
 def test_disarming_on_the_way_is_a_failure_with_the_vehicles_last_warning() -> None:
