@@ -50,7 +50,7 @@ def compare(
 ) -> None:
     """Compare two or more flights.
 
-    Writes a page with their charts overlaid, and prints their figures side by side.
+    Prints their figures side by side, and writes a page with their charts overlaid.
     """
     if len(runs) < 2:
         raise CliError("give two flights or more to compare", USAGE)
@@ -60,18 +60,19 @@ def compare(
         raise CliError(f"--out {page}: give the page a name that ends in .html", USAGE)
     if not page.parent.is_dir():
         raise CliError(f"--out {page}: there is no directory {page.parent}", USAGE)
-    check_new(page, overwrite)
     read = read_runs(found)
     for run in read:
         if run.flight.damaged:
             complain(f"gcs: warning: {run.log}: the log is damaged; read up to {run.flight.duration_s:.1f} s")
-    write_text_atomically(page, render_comparison(read))
+    is_written = overwrite or not page.is_file()
     if as_json:
-        print(json.dumps(comparison(read, page), allow_nan=False), flush=True)
+        print(json.dumps(comparison(read, page if is_written else None), allow_nan=False), flush=True)
     else:
-        console = FlyConsole(highlight=False)
-        console.print(comparison_table(read))
-        console.print(f"page written to {page}", markup=False, soft_wrap=True)
+        FlyConsole(highlight=False).print(comparison_table(read))
+    check_new(page, overwrite)
+    write_text_atomically(page, render_comparison(read))
+    if not as_json:
+        print(f"page written to {page}", flush=True)
     if open_page:
         webbrowser.open(page.resolve().as_uri())
 

@@ -57,19 +57,21 @@ def estimate(
     _NSATS; a log of this flight stack gives all.
     """
     page = out if out is not None or not open_page else log_file(log).with_suffix(".html")
-    if page is not None:
-        if page.suffix.lower() not in (".html", ".htm"):
-            raise CliError(f"--out {page}: give the page a name that ends in .html", USAGE)
-        check_new(page, overwrite)
+    if page is not None and page.suffix.lower() not in (".html", ".htm"):
+        raise CliError(f"--out {page}: give the page a name that ends in .html", USAGE)
     given = _given(param or ())
     recording = read_log(log)
     result = estimate_log(recording, given)
-    if page is not None:
-        write_text_atomically(page, render(result, recording))
-    sentence = "\n".join(_lines(result, page))
-    file = None if page is None else str(page)
-    output_of(context, as_json).say("estimate", sentence, log=str(log), file=file, **result.summary)
-    if open_page and page is not None:
+    is_written = page is not None and (overwrite or not page.is_file())
+    output, file = output_of(context, as_json), str(page) if is_written else None
+    output.say("estimate", "\n".join(_lines(result)), log=str(log), file=file, **result.summary)
+    if page is None:
+        return
+    check_new(page, overwrite)
+    write_text_atomically(page, render(result, recording))
+    if not output.as_json:
+        print(f"report written to {page}", flush=True)
+    if open_page:
         webbrowser.open(page.resolve().as_uri())
 
 
@@ -94,7 +96,7 @@ def _given(assignments: Sequence[str]) -> dict[str, float]:
     return found
 
 
-def _lines(result: Result, page: Path | None) -> list[str]:
+def _lines(result: Result) -> list[str]:
     """Return the figures as lines: quantity, then root mean square (largest) of each comparison."""
     summary = result.summary
     rows = list(rows_of(summary))
@@ -109,6 +111,4 @@ def _lines(result: Result, page: Path | None) -> list[str]:
         lines.append(" " * 20 + "".join(f"{name:>26}" for name, _ in rows))
     for number, quantity in enumerate(quantities() if rows else ()):
         lines.append(f"{quantity:20}" + "".join(f"{cells[number]:>26}" for _, cells in rows))
-    if page is not None:
-        lines.append(f"report written to {page}")
     return lines

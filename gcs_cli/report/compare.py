@@ -219,8 +219,8 @@ def _change(first: Any, value: Any) -> str:
     return f"{percent:+.1f}%".replace("-", "−") if percent < _LARGEST_PERCENT else f"×{value / first:.3g}"
 
 
-def comparison(runs: Sequence[ComparedRun], page: Path) -> dict[str, Any]:
-    """Return what ``gcs compare --json`` prints."""
+def comparison(runs: Sequence[ComparedRun], page: Path | None) -> dict[str, Any]:
+    """Return what ``gcs compare --json`` prints; ``page`` is None if it is not written."""
     summaries = [run.summary for run in runs]
     return {
         "runs": [{"name": run.name, "log": str(run.log), "damaged": run.flight.damaged} for run in runs],
@@ -228,7 +228,7 @@ def comparison(runs: Sequence[ComparedRun], page: Path) -> dict[str, Any]:
             row.key: {"values": row.values, "differs": row.differs} for row in condition_rows(summaries)
         },
         "figures": {row.key: row.values for row in figure_rows(summaries)},
-        "page": str(page),
+        "page": None if page is None else str(page),
     }
 
 

@@ -151,8 +151,15 @@ def test_command_writes_the_page_once(
     assert told["page"] == str(page)
     assert page.exists()
     assert list(tmp_path.iterdir()) == []
+    before = page.read_bytes()
     assert gcs("compare", *runs) == USAGE
-    assert "compare.html: exists already" in capsys.readouterr().err
+    printed = capsys.readouterr()
+    assert "tracking error, rms" in printed.out
+    assert "page written" not in printed.out
+    assert "compare.html: exists already" in printed.err
+    assert page.read_bytes() == before
+    assert gcs("compare", *runs, "--json") == USAGE
+    assert json.loads(capsys.readouterr().out.splitlines()[0])["page"] is None
     assert gcs("compare", *runs, "--overwrite") == 0
     printed = capsys.readouterr().out
     assert f"page written to {page}" in printed

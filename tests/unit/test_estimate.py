@@ -62,7 +62,19 @@ def test_report_holds_states_differences_and_innovations(log: Path, tmp_path: Pa
         "innovations-magnetometer",
     ):
         assert f'data-chart="{name}"' in text
-    assert main(["estimate", str(log), "--out", str(page)]) == USAGE  # exists
+
+
+def test_result_is_printed_beside_a_report_that_is_not_replaced(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "page.html"
+    page.write_text("mine")
+    assert main(["estimate", str(log), "--out", str(page)]) == USAGE
+    printed = capsys.readouterr()
+    assert printed.out.startswith("difference ")
+    assert "report written" not in printed.out
+    assert "exists already" in printed.err
+    assert page.read_text() == "mine"
 
 
 def test_compressed_log_is_read_in_place(log: Path, tmp_path: Path) -> None:
