@@ -8,7 +8,7 @@ import inspect
 import sys
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, ClassVar, get_type_hints
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -70,20 +70,46 @@ def _plain(error: Any) -> str:
     return f"{sentence.rstrip('.')}: {begin}{about[1:].rstrip('.')}"
 
 
+def argument_form(argument: Any) -> str:
+    """Return an argument as usage and help show it, without Typer's braces and type.
+
+    A metavar with brackets or dots is complete.
+    """
+    name: str = argument.metavar or argument.name.upper()
+    if name.startswith("[") or name.endswith("..."):
+        return name
+    shown = name if argument.required else f"[{name}]"
+    return shown if argument.nargs == 1 else f"{shown}..."
+
+
 class _Panels:
-    """Lists the options of a command under the titles of their panels, those without one at the end.
+    """Lists the options of a command under the titles of ``panels``, those of no panel at the end.
 
     Typer does so with markup only.
     """
 
+    panels: ClassVar[tuple[str, ...]] = PANELS
+
+    def collect_usage_pieces(self: Any, ctx: Any) -> list[str]:
+        """Return the parts of the usage line after the name of the command."""
+        forms = {
+            piece: argument_form(param)
+            for param in self.get_params(ctx)
+            if param.param_type_name == "argument"
+            for piece in param.get_usage_pieces(ctx)
+        }
+        return [forms.get(piece, piece) for piece in super().collect_usage_pieces(ctx)]  # type: ignore[misc]
+
     def format_options(self: Any, ctx: Any, formatter: Any) -> None:
-        titles = ("Arguments", *PANELS, "Options")
+        titles = ("Arguments", *self.panels, "Options")
         sections: dict[str, list[tuple[str, str]]] = {title: [] for title in titles}
         for param in self.get_params(ctx):
-            title = "Arguments" if param.param_type_name == "argument" else param.rich_help_panel or "Options"
+            is_argument = param.param_type_name == "argument"
+            panel = getattr(param, "rich_help_panel", None) or "Options"
+            title = "Arguments" if is_argument else panel if panel in sections else "Options"
             record = param.get_help_record(ctx)
             if record is not None:
-                sections[title].append(record)
+                sections[title].append((argument_form(param), record[1]) if is_argument else record)
         for title, records in sections.items():
             if records:
                 with formatter.section(title):
@@ -92,6 +118,12 @@ class _Panels:
 
 class PanelCommand(_Panels, TyperCommand):
     """A command with many options."""
+
+
+class _Command(_Panels, TyperCommand):
+    """A command with few options."""
+
+    panels = ()
 
 
 class PanelGroup(_Panels, TyperGroup):
@@ -103,9 +135,17 @@ class PanelGroup(_Panels, TyperGroup):
         self.format_commands(ctx, formatter)
 
 
+class _App(typer.Typer):
+    """A command line whose commands show their arguments as ``argument_form`` does."""
+
+    def command(self, name: str | None = None, **settings: Any) -> Any:
+        """Add a command."""
+        return super().command(name, **{"cls": _Command, **settings})
+
+
 def make_app(**settings: Any) -> typer.Typer:
     """Return a command line with plain-text help: brackets in it are no markup."""
-    return typer.Typer(
+    return _App(
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": list(HELP_FLAGS)},

@@ -138,3 +138,15 @@ def test_missing_argument_of_a_group_of_options_is_named(command: str, words: st
     ended = COMMANDS[command](*words.split())
     assert ended.returncode == 2
     assert f"Missing {name}" in ended.stderr
+
+
+def test_an_argument_is_shown_without_braces_and_types() -> None:
+    assert "Usage: gcs compare [OPTIONS] RUN RUN...\n" in gcs("compare", "--help").stdout
+    assert "Usage: gcs test [OPTIONS] [PATH]...\n" in gcs("test", "--help").stdout
+    for words, command, context in found():
+        shown = command.get_help(context)
+        assert (
+            re.findall(r"[{}]|<(?:list|str|path|Path|float|int)\b.*>|\[\[", shown.split("\n\n")[0]) == []
+        ), words
+        if "Arguments:" in shown:
+            assert "<" not in shown.partition("Arguments:\n")[2].split()[1], words
