@@ -23,9 +23,12 @@ def example_plans() -> dict[str, Path]:
 def plan_file(given: str | Path) -> Path:
     """Return the file of a plan; a name without folder and suffix is an example. Raise CliError (usage)."""
     text = str(given)
-    if not text or set(text) & {"/", "\\", "."}:
-        return Path(text)
     examples = example_plans()
+    if not text or set(text) & {"/", "\\", "."}:
+        path = Path(text)
+        if path.stem in examples and not path.exists():
+            raise CliError(f"{text}: there is no such file; the example plan is named {path.stem}", USAGE)
+        return path
     if text not in examples:
         raise CliError(
             f"{text}: there is no example plan of that name; there are {', '.join(examples)}; "

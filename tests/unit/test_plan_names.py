@@ -26,8 +26,16 @@ def test_bare_name_is_an_example_even_beside_a_file_of_that_name(
     assert plan_file("square").samefile(ROOT / "missions" / "square.plan")
     assert plan_file("triangle").samefile(ROOT / "missions" / "triangle.waypoints")
     assert plan_file("./square") == Path("square")
-    assert plan_file("square.plan") == Path("square.plan")
-    assert plan_file("plans/square") == Path("plans/square")
+    assert plan_file("mine.plan") == Path("mine.plan")
+
+
+@pytest.mark.parametrize("name", ["./square", "square.plan", "plans/square.waypoints"])
+def test_a_missing_file_names_the_example_of_its_name(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(CliError, match=f"{name}: there is no such file; the example plan is named square$"):
+        plan_file(name)
 
 
 def test_unknown_name_lists_the_examples(capsys: Any) -> None:
