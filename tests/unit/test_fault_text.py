@@ -48,7 +48,8 @@ def test_fault_is_parsed(text: str, fault: Fault) -> None:
         ("rotor:1:off=3", "expected rotor:N:off"), ("rotor:1:weak", "expected rotor:N:weak=SHARE (SHARE 0 to 1)"),
         ("rotor:1:weak=2", "0 to 1"),
         ("rotor:1:weak=much", "not a number"), ("rotor:1:stuck=nan", "0 to 100000"), ("rotor:1:weak=1_0", "0 to 1"),
-        ("rotor:1:off@", "not a number"), ("rotor:1:off@-3", "not a number"), ("rotor:1:off@5-", "not a number"),
+        ("rotor:1:off@", "a time is missing after @"), ("rotor:1:off@-3", "the begin must be 0 to 1e+06 s"),
+        ("rotor:1:off@5-", "not a number"),
         ("rotor:1:off@5-5", "not after its begin"), ("rotor:1:off@5-4", "not after its begin"),
         ("rotor:1:off@inf", "0 to 1e+06"), ("battery:level=0.5@3-4", "give no end"), ("battery:level=-1", "0 to 1"),
         ("rotor 5 dead", "rotors 1 to 4"), ("rotor 1 delayed 3", "SECONDS must be 0.0001 to 2 s"),
@@ -58,6 +59,8 @@ def test_fault_is_parsed(text: str, fault: Fault) -> None:
         ("payload cut @3-4", "acts at one time: give no end"),
         ("wind step 5", "three numbers"), ("state late", "expected state late SECONDS (SECONDS 0.0001 to 10 s)"),
         ("ground effect maybe", "expected ground effect on or ground effect off"), ("gust -1", "M_S must be 0 to 100"),
+
+        ("rotor:2:off@2--3", "the end must be 0 to 1e+06 s"),
         ("wind:step=1,2,x", "D 'x' is not a number"), ("rotor=1=off", "the part is not one of rotor, payload"),
         ("battery  level 2", "0 to 1"),
         ("sensor:sonar:off", "'sonar' is not a sensor: imu, gyro, accel, mag, baro, gnss, range, flow; imu2, gyro2"),

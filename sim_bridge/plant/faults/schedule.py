@@ -33,7 +33,7 @@ from sim_bridge.plant.faults.table import (
 __all__ = ["Fault", "Kind", "Schedule", "parse_fault"]
 
 LONGEST_S = 1e6
-_SPEC = re.compile(r"(?P<what>[^@]*)(@(?P<begin>[^-]*)(-(?P<end>.*))?)?", re.DOTALL)
+_SPEC = re.compile(r"(?P<what>[^@]*)(@(?P<begin>-?[^-]*)(-(?P<end>.*))?)?", re.DOTALL)
 _LONGEST_QUOTE = 60
 
 
@@ -125,6 +125,8 @@ def _allowed(row: Row) -> str:
 def _with_times(fault: Fault, begin: str | None, end: str | None) -> Fault:
     """Return the fault with its begin and end [s]; raise ValueError."""
     span = Range(0.0, LONGEST_S, "s")
+    if begin == "":
+        raise ValueError("a time is missing after @")
     begin_s = 0.0 if begin is None else _parse_number(begin, "the begin", span)
     fault = fault._replace(begin_us=round(begin_s * 1e6))
     if end is None:
