@@ -17,10 +17,11 @@ FILM_NAME = "replay.mp4"
 COMPARISON_NAME = "compare.html"
 SIMULATOR, STACK = "sim-bridge", "flightstack"
 """The children of a flight; the output of each goes to ``<name>.log``."""
-_LEFT_OVER = (
+RESULTS = (
     LOG_NAME, TLOG_NAME, SUMMARY_NAME, REPORT_NAME, FILM_NAME, COMPARISON_NAME, LINK_FILE, STEPS_FILE,
     f"{SIMULATOR}.log", f"{STACK}.log",
 )  # fmt: skip
+"""The files of a flight."""
 
 
 def make_run_directory(plan: Path, out: Path | None, base: Path = RUNS, *, overwrite: bool = False) -> Path:
@@ -40,7 +41,7 @@ def make_run_directory(plan: Path, out: Path | None, base: Path = RUNS, *, overw
         out.mkdir(parents=True, exist_ok=True)
         if not os.access(out, os.W_OK | os.X_OK):
             raise CliError(f"--out {out}: nothing can be written there: permission denied", USAGE)
-        for name in _LEFT_OVER:
+        for name in RESULTS:
             (out / name).unlink(missing_ok=True)
     except OSError as error:
         raise CliError(f"{out or base}: the directory cannot be made: {error.strerror}", USAGE) from None

@@ -20,7 +20,7 @@ from gcs_cli.report.flight_data import Flight as FlightData
 from gcs_cli.report.flight_outcome import Code, Outcome, with_log
 from gcs_cli.report.page import write_report
 from gcs_cli.report.summary import RunInfo, max_overshoot_m, summarise, write_summary
-from gcs_cli.run_directory import LOG_NAME, REPORT_NAME, SUMMARY_NAME, TLOG_NAME
+from gcs_cli.run_directory import LOG_NAME, REPORT_NAME, RESULTS, SUMMARY_NAME, TLOG_NAME
 
 
 def _drag_of(options: FlyOptions) -> tuple[float, float, float]:
@@ -85,7 +85,6 @@ def _run_info(options: FlyOptions, flown: Flown, outcome: Outcome) -> RunInfo:
 def print_summary(console: Console, summary: dict[str, Any], folder: Path) -> None:
     """Print the main figures of a flight; the reason of a failure is left to the error of the command."""
     outcome = summary["outcome"]
-    files = " ".join(sorted(path.name for path in folder.iterdir() if path.suffix != ".log"))
     errors = summary["estimate_error"]
     lines = (
         ("outcome", f"{outcome}: {summary['outcome_text']}" if outcome == Code.COMPLETED else outcome),
@@ -95,11 +94,18 @@ def print_summary(console: Console, summary: dict[str, Any], folder: Path) -> No
         ("tracking", _tracking(summary)),
         ("effort", _effort(summary)),
         *(() if errors is None else (("estimate", _estimate(errors)),)),
-        ("files", f"{folder}/  {files}"),
+        ("files", f"{folder}/  {flight_files(folder)}"),
     )
     for name, value in lines:
         console.print(f"[bright_black]{name:<9}[/]", end="")
         console.print(value, markup=False, soft_wrap=True)
+
+
+def flight_files(folder: Path) -> str:
+    """Return the names of a flight's files in a directory that may hold others."""
+    return " ".join(
+        sorted(name for name in RESULTS if not name.endswith(".log") and (folder / name).exists())
+    )
 
 
 def _mission(summary: dict[str, Any]) -> str:

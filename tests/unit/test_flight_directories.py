@@ -15,6 +15,7 @@ from gcs_cli.__main__ import main
 from gcs_cli.errors import DONE, USAGE, CliError
 from gcs_cli.fly.flight import Phase
 from gcs_cli.fly.fly_display import LineDisplay, make_display, phase_words, progress, speed_words
+from gcs_cli.fly.fly_results import flight_files
 from gcs_cli.report.flight_outcome import Code, Outcome
 from gcs_cli.report.poses import Run
 from gcs_cli.run_directory import LOG_NAME, make_run_directory
@@ -49,6 +50,12 @@ def test_what_a_flight_that_never_began_has_left_does_not_stay_beside_the_next_o
         (tmp_path / name).write_text("")
     make_run_directory(HOP, tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["notes.txt", "old.ulg"]
+
+
+def test_only_the_files_of_the_flight_are_listed(tmp_path: Path) -> None:
+    for name in (LOG_NAME, "summary.json", "sim-bridge.log", "notes.txt"):
+        (tmp_path / name).touch()
+    assert flight_files(tmp_path) == f"{LOG_NAME} summary.json"
 
 
 def test_a_directory_without_permission_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
