@@ -93,10 +93,8 @@ def instances_text() -> str:
         return ""
     numbers = ", ".join(map(str, found[:_MOST_NAMED])) + (" …" if len(found) > _MOST_NAMED else "")
     if len(found) == 1:
-        return (
-            f"the port of instance {numbers} is in use on this machine: choose it with --instance {numbers}"
-        )
-    return f"the ports of instances {numbers} are in use on this machine: choose one with --instance"
+        return f"a vehicle of instance {numbers} seems to run on this machine: give --instance {numbers}"
+    return f"vehicles of instances {numbers} seem to run on this machine: choose one with --instance N"
 
 
 def _resolved(host: str) -> str:

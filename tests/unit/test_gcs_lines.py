@@ -119,12 +119,12 @@ def test_ports_in_use_are_those_of_the_table_of_the_system() -> None:
     ("used", "advice"),
     [
         ([], "start one with `gcs sim`, or give its address with --connect"),
-        ([3], "the port of instance 3 is in use on this machine: choose it with --instance 3"),
-        ([0, 7], "the ports of instances 0, 7 are in use on this machine: choose one with --instance"),
+        ([3], "a vehicle of instance 3 seems to run on this machine: give --instance 3"),
+        ([0, 7], "vehicles of instances 0, 7 seem to run on this machine: choose one with --instance N"),
         (
             list(range(1, 20)),
-            "the ports of instances 1, 2, 3, 4, 5, 6, 7, 8 … are in use on this machine: "
-            "choose one with --instance",
+            "vehicles of instances 1, 2, 3, 4, 5, 6, 7, 8 … seem to run on this machine: "
+            "choose one with --instance N",
         ),
     ],
     ids=["none", "one", "two", "many"],
