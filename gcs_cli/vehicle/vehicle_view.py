@@ -72,7 +72,7 @@ def update(view: VehicleView, message: Any, now_s: float) -> VehicleView:
     fold = FOLDS.get(message.get_type())
     changes: Changes = {} if fold is None else fold(view, message, now_s)
     if _is_restarted(view.time_s, changes.get("time_s")):
-        changes["restarts"] = view.restarts + 1
+        changes = {"timing": None, **changes, "restarts": view.restarts + 1}
     changes["link"] = counted(view.link, message.get_seq(), now_s)
     return view_with(view, changes)
 

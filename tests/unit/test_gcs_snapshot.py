@@ -17,6 +17,8 @@ from gcs_cli.vehicle.view_types import (
     Mission,
     VehicleView,
 )
+from tests.support.folded_vehicle import Vehicle, heartbeat
+from tests.support.telemetry_status import usual_timing
 
 OURS = VehicleView(identity=Identity(7, 1, mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4))
 TIMING = LoopTiming(0.0, 0, None, None, *[None] * 9, lockstep=True)
@@ -98,3 +100,16 @@ def test_snapshot_requests_no_messages_that_the_autopilot_lacks() -> None:
     snapshot = snapshot_of(VehicleView(identity=identity))
     reached = mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED  # the answer may be of a former mission
     assert not {EscStatus.id, FS_LOOP_TIMING_ID, reached} & set(requested(snapshot))
+
+
+def test_figures_of_loops_end_with_a_restart() -> None:
+    """They stayed until the vehicle sent new ones."""
+    vehicle = Vehicle()
+    vehicle.send(heartbeat())
+    vehicle.send(mavlink.MAVLink_attitude_message(60_000, 0, 0, 0, 0, 0, 0))
+    assert vehicle.send(usual_timing()).timing is not None
+    vehicle.send(mavlink.MAVLink_attitude_message(60_100, 0, 0, 0, 0, 0, 0))
+    assert vehicle.view.timing is not None
+    view = vehicle.send(mavlink.MAVLink_attitude_message(500, 0, 0, 0, 0, 0, 0))
+    assert (view.timing, view.restarts) == (None, 1)
+    assert vehicle.send(usual_timing()).timing is not None
