@@ -11,6 +11,8 @@ from gcs_cli.vehicle.param_info import UNKNOWN, ParamInfo
 
 _SIMILAR = 0.75
 """Ratio of equal letters at which a misspelt word still matches."""
+_SHORTEST_WORD = 3
+"""Letters of a word that a suggestion must have."""
 _WORD = re.compile(r"[a-z0-9]+")
 
 
@@ -32,13 +34,21 @@ def search_parameters(
 
 
 def near_names(name: str, names: Sequence[str]) -> list[str]:
-    """Return those of ``names`` that are spelt like ``name``, the best first; else those that ``search`` finds."""
+    """Return those of ``names`` that are spelt like ``name``, the best first; else those that have its words."""
     near = get_close_matches(name.upper(), names, cutoff=_SIMILAR)
     if near:
         return near
-    wanted = name.lower().split("_")
-    scored = [(_score(each, UNKNOWN, wanted), each) for each in names]
-    return [each for score, each in sorted(scored, key=lambda entry: -entry[0]) if score > 0.0]
+    wanted = [word for word in name.lower().split("_") if len(word) >= _SHORTEST_WORD]
+    scored = [(_score(each, UNKNOWN, wanted), each) for each in names if _has_words(each, wanted)]
+    return [each for _, each in sorted(scored, key=lambda entry: -entry[0])]
+
+
+def _has_words(name: str, wanted: Sequence[str]) -> bool:
+    """Return True if each word stands in the name, perhaps misspelt."""
+    parts = name.lower().split("_")
+    return bool(wanted) and all(
+        word in name.lower() or any(_similarity(word, part) >= _SIMILAR for part in parts) for word in wanted
+    )
 
 
 def _score(name: str, info: ParamInfo, wanted: Sequence[str]) -> float:

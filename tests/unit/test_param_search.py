@@ -6,7 +6,7 @@ import pytest
 
 from flightstack.mavlink.param_values import Parameter
 from gcs_cli.vehicle.param_info import ParamInfo
-from gcs_cli.vehicle.param_search import search_parameters
+from gcs_cli.vehicle.param_search import near_names, search_parameters
 from gcs_cli.vehicle.param_table import description
 
 INFOS = {
@@ -42,6 +42,21 @@ def test_search_prefers_names_to_descriptions() -> None:
     found = search_parameters(PARAMETERS, INFOS, ["max"])
     assert [each.name for each in found] == ["MPC_XY_VEL_MAX", "GF_MAX_HOR_DIST"]
     assert search_parameters(PARAMETERS, {}, ["nav"])[0].name == "NAV_ACC_RAD"
+
+
+@pytest.mark.parametrize(
+    ("name", "near"),
+    [
+        ("CRUSE", ["MPC_XY_CRUISE"]),
+        ("mpc_vel", ["MPC_XY_VEL_MAX"]),
+        ("ACTION", ["GF_ACTION"]),
+        ("FOO", []),  # letters of no name
+        ("NCD", []),  # letters of NAV_ACC_RAD in their order
+        ("A", []),
+    ],
+)
+def test_only_names_with_the_words_of_another_are_near(name: str, near: list[str]) -> None:
+    assert near_names(name, list(INFOS)) == near
 
 
 def test_description_prints_a_repeated_text_once() -> None:
