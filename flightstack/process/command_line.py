@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import inspect
+import re
 import sys
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
@@ -37,6 +38,7 @@ PANELS = (
 """Titles of the groups of options, in the order of the help."""
 _IN_PANEL: Any = [{"rich_help_panel": title} for title in PANELS]
 IN_VEHICLE, IN_LOOPS, IN_SIMULATION, IN_DISTURBANCES, IN_LINKS, IN_OUTPUT = _IN_PANEL
+_EXTRA = re.compile(r"Got unexpected extra arguments?(?:\(s\))? \((.*)\)", re.DOTALL)
 _ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -63,6 +65,9 @@ def usage_sentence(error: Any) -> str:
 
 def _plain(error: Any) -> str:
     sentence = str(error.format_message()).replace("Value error, ", "")  # of Pydantic
+    extra = _EXTRA.fullmatch(sentence)
+    if extra is not None and error.ctx is not None:
+        return _about_extra(extra[1], error.ctx)
     about = getattr(getattr(error, "param", None), "help", None)
     if type(error).__name__ != "MissingParameter" or not about:
         return sentence
@@ -80,6 +85,18 @@ def argument_form(argument: Any) -> str:
         return name
     shown = name if argument.required else f"[{name}]"
     return shown if argument.nargs == 1 else f"{shown}..."
+
+
+def _about_extra(words: str, context: Any) -> str:
+    """Return the sentence about arguments that a command does not take; a recording is the value of an option."""
+    path = context.command_path
+    sentence = f"{path.partition(' ')[2] or path} takes no argument {words}"
+    takes_link = any("--connect" in param.opts for param in context.command.params)
+    return (
+        f"{sentence}: give a recording as --connect {words}"
+        if takes_link and words.endswith(".tlog")
+        else sentence
+    )
 
 
 class _Panels:

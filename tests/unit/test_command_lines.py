@@ -140,6 +140,18 @@ def test_missing_argument_of_a_group_of_options_is_named(command: str, words: st
     assert f"Missing {name}" in ended.stderr
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("perf a.tlog", "perf takes no argument a.tlog: give a recording as --connect a.tlog"),
+        ("param set A 1 2", "param set takes no argument 2"),
+        ("sim x", "sim takes no argument x"),
+    ],
+)
+def test_an_argument_too_many_is_named(words: str, said: str) -> None:
+    assert gcs(*words.split()) == ("", f"gcs: {said}\n", 2)
+
+
 def test_an_argument_is_shown_without_braces_and_types() -> None:
     assert "Usage: gcs compare [OPTIONS] RUN RUN...\n" in gcs("compare", "--help").stdout
     assert "Usage: gcs test [OPTIONS] [PATH]...\n" in gcs("test", "--help").stdout
