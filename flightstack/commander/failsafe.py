@@ -197,6 +197,8 @@ DOES_ALREADY: Mapping[Phase, Action] = {
 
 STEERS = frozenset({Action.POSITION, Action.ALTITUDE, Action.HOLD, Action.RETURN, Action.LAND})
 """Actions that change the flight mode."""
+BATTERY_FAILSAFES = (Failsafe.BATTERY_LOW, Failsafe.BATTERY_CRITICAL, Failsafe.BATTERY_EMERGENCY)
+"""Each level has those before it."""
 LINK_FAILSAFES = frozenset({Failsafe.MANUAL_LOST, Failsafe.OFFBOARD_LOST, Failsafe.GCS_LOST})
 
 BEYOND_REACH: Mapping[Failsafe, frozenset[Action]] = {

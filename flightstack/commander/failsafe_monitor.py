@@ -12,7 +12,7 @@ import numpy as np
 
 from flightstack.commander.arming_checks import ArmingFacts
 from flightstack.commander.estimate_checks import VELOCITY_UNKNOWN, failsafes_of
-from flightstack.commander.failsafe import Action, Decision, Failsafe, Phase, action_of
+from flightstack.commander.failsafe import BATTERY_FAILSAFES, Action, Decision, Failsafe, Phase, action_of
 from flightstack.commander.failsafe_step import (
     IDLE,
     Announcement,
@@ -71,7 +71,6 @@ class StateMonitor:
 
 
 UPRIGHT_COSINE = 0.5 * math.sqrt(3.0)  # of 30 degrees
-BATTERY_FAILSAFES = (Failsafe.BATTERY_LOW, Failsafe.BATTERY_CRITICAL, Failsafe.BATTERY_EMERGENCY)
 EVENTS_OF_ACTION: dict[Action, tuple[Event, ...]] = {
     Action.POSITION: (Event.SELECT_POSITION, Event.SELECT_HOLD, Event.SELECT_LAND),
     Action.ALTITUDE: (Event.SELECT_ALTITUDE, Event.SELECT_HOLD, Event.SELECT_LAND),

@@ -11,6 +11,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 from flightstack.commander.failsafe import (
+    BATTERY_FAILSAFES,
     NOTHING,
     PRIORITY,
     RULE_OF,
@@ -89,9 +90,9 @@ def failsafe_step(
     time_us, phase = situation.time_us, situation.phase
     announcements: list[Announcement] = []
     kept = {failsafe: entry for failsafe, entry in memory.entries.items() if failsafe in conditions}
-    for failsafe in memory.entries:
-        if failsafe not in conditions:
-            announcements.append(Announcement(Severity.NOTICE, RULE_OF[failsafe].ends))
+    ended = [failsafe for failsafe in memory.entries if failsafe not in conditions]
+    for failsafe in _without_other_levels(ended, 0):
+        announcements.append(Announcement(Severity.NOTICE, RULE_OF[failsafe].ends))
     begun = [rule.failsafe for rule in RULES if rule.failsafe in conditions and rule.failsafe not in kept]
     begun = [f for f in begun if action_of(f, behaviour) > Action.NONE and phase in RULE_OF[f].phases]
     entries = kept | {failsafe: Entry(time_us) for failsafe in begun}
@@ -102,13 +103,19 @@ def failsafe_step(
     ]
     decision = decide(demands, phase, situation.sticks_are_live, behaviour)
     escalates = decision.action > max(Action.WARN, memory.decision.action)
-    for failsafe in begun:
+    for failsafe in _without_other_levels(begun, -1):
         if not (escalates and failsafe is decision.cause):
             announcements.append(Announcement(Severity.WARNING, RULE_OF[failsafe].begins))
     if escalates:
         waited_s = (time_us - entries[decision.cause].since_us) * 1e-6 if decision.cause else 0.0
         announcements.append(_announce(decision, begun, waited_s, behaviour))
     return Step(Memory(entries, decision), tuple(announcements))
+
+
+def _without_other_levels(failsafes: Sequence[Failsafe], index: int) -> list[Failsafe]:
+    """Return the failsafes; of the battery's levels that of ``index`` alone, which says most."""
+    levels = [level for level in BATTERY_FAILSAFES if level in failsafes]
+    return [each for each in failsafes if each not in levels or each is levels[index]]
 
 
 def _present_action(failsafe: Failsafe, entry: Entry, situation: Situation, behaviour: Behaviour) -> Action:

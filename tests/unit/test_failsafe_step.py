@@ -87,6 +87,19 @@ def test_a_second_failsafe_escalates_and_names_itself() -> None:
     assert active_failsafes(flight.memory) == everything[::-1]
 
 
+def test_battery_levels_that_begin_or_end_together_are_told_once() -> None:
+    flight = Flight("COM_LOW_BAT_ACT=0")
+    everything = (Failsafe.BATTERY_LOW, Failsafe.BATTERY_CRITICAL, Failsafe.BATTERY_EMERGENCY)
+    flight.run(0.1, *everything, Failsafe.GNSS_REFUSED)
+    assert [text for _, text in flight.said if "Battery" in text] == ["Battery level is dangerously low"]
+    assert active_failsafes(flight.memory)[0] is Failsafe.BATTERY_EMERGENCY
+    flight.said.clear()
+    flight.run(0.1, Failsafe.BATTERY_LOW)
+    assert [text for _, text in flight.said if "Battery" in text] == ["Battery level is no longer critical"]
+    flight.run(0.1)
+    assert flight.said[-1] == (Severity.NOTICE, "Battery level is no longer low")
+
+
 def test_a_user_overrides_what_is_active_but_not_what_comes_after() -> None:
     flight = Flight("NAV_DLL_ACT=2", "COM_LOW_BAT_ACT=3", "COM_FAIL_ACT_T=0")
     assert flight.run(0.1, Failsafe.GCS_LOST) is Action.RETURN
