@@ -247,7 +247,10 @@ def is_scenario(path: Path) -> bool:
 
 def load_scenario(path: Path) -> Scenario:
     """Read a scenario file; raise ConfigError, which names the key and what is allowed."""
-    return check_scenario(read_scenario(path, read_toml(path).values()))
+    values = read_toml(path).values()
+    if "campaign" in values:
+        raise ConfigError(path, "", "is a campaign: fly it with gcs campaign")
+    return check_scenario(read_scenario(path, values))
 
 
 def read_scenario(path: Path, values: Mapping[str, Any]) -> Scenario:

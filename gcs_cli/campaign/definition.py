@@ -121,7 +121,8 @@ def load_campaign(path: Path) -> Campaign:
     """Read a campaign file; raise ConfigError, which names the key and what is allowed."""
     values = dict(read_toml(path).values())
     if "campaign" not in values:
-        raise ConfigError(path, "", "is no campaign: it has no table [campaign]")
+        problem = "is a scenario: fly it with gcs test" if "expect" in values else "is no campaign"
+        raise ConfigError(path, "", f"{problem}; a campaign has the tables [campaign] and [vary]")
     head, vary = values.pop("campaign"), values.pop("vary", None)
     if not isinstance(head, dict):
         raise ConfigError(path, "campaign", "must be a table")

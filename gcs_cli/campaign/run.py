@@ -36,11 +36,14 @@ from gcs_cli.errors import DONE, FAILED, INTERRUPTED, USAGE, CliError, library
 from gcs_cli.run_directory import LOG_NAME, REPORT_NAME, results_directory
 from gcs_cli.scenarios.pool import Finished, Notice
 from gcs_cli.scenarios.result import Wanted
+from gcs_cli.scenarios.selection import missing_error
 
 
 def run_campaign(pool: FlightPool, options: CampaignOptions, console: Console) -> int:
     """Fly what is not flown yet, write the table and the report; return the exit code. Raise ConfigError, CliError."""
     library("pyarrow", "gcs campaign")  # missing: say so before the flights
+    if not options.file.exists():
+        raise missing_error(options.file)
     campaign = load_campaign(options.file)
     if options.seek is not None and options.only is not None:
         flight = flown_before(options.folder, options.only)

@@ -13,6 +13,7 @@ from pathlib import Path
 from flightstack.core.errors import ConfigError
 from flightstack.testing.scenario import Scenario, is_scenario, load_scenario, repeat_command
 from gcs_cli.errors import USAGE, CliError
+from gcs_cli.transfers.plan_files import examples_folder
 
 _SKIPPED = frozenset({"__pycache__", "build", "dist", "node_modules", "site-packages"})
 """Folders without scenarios, besides hidden ones."""
@@ -45,13 +46,22 @@ def find_scenarios(paths: Sequence[Path]) -> list[Path]:
     found: dict[Path, Path] = {}
     for path in paths:
         if not path.exists():
-            raise ConfigError(path, "", "there is no such file or folder")
+            raise missing_error(path)
         for file in _in_folder(path) if path.is_dir() else (path,):
             found.setdefault(file.resolve(), file)
     if not found:
         where = ", ".join(map(str, paths))
         raise CliError(f"{where}: no scenario here: a scenario is a TOML file with a table [expect]", USAGE)
     return list(found.values())
+
+
+def missing_error(path: Path) -> ConfigError:
+    """Return the error of a missing file, with the file whose name lacks its suffix or its folder."""
+    name = f"{path.name.removesuffix('.toml')}.toml"
+    places = (path.parent / name, Path("missions", name), examples_folder() / name)
+    near = next((place for place in places if place.is_file()), None)
+    hint = "" if near is None else f"; did you mean {near}?"
+    return ConfigError(path, "", f"there is no such file or folder{hint}")
 
 
 def _in_folder(folder: Path) -> Iterator[Path]:

@@ -12,12 +12,17 @@ from gcs_cli.errors import USAGE, CliError
 DEFAULT_PLAN = "square"
 
 
-def example_plans() -> dict[str, Path]:
-    """Return the example plans by name: from the installed package, else from the source tree."""
+def examples_folder() -> Path:
+    """Return the folder of the example plans and scenarios: in the installed package, else in the source tree."""
     here = Path(__file__).resolve().parents[1]
     packaged = here / "missions"
-    folder = packaged if packaged.is_dir() else here.parent / "missions"
-    return {path.stem: path for path in sorted(folder.glob("*")) if path.suffix in (".plan", ".waypoints")}
+    return packaged if packaged.is_dir() else here.parent / "missions"
+
+
+def example_plans() -> dict[str, Path]:
+    """Return the example plans by name."""
+    found = sorted(examples_folder().glob("*"))
+    return {path.stem: path for path in found if path.suffix in (".plan", ".waypoints")}
 
 
 def plan_file(given: str | Path) -> Path:

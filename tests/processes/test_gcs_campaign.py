@@ -138,7 +138,7 @@ def test_a_killed_worker_leaves_its_flight_to_the_next_run(folder: Path) -> None
             "gcs: Missing argument 'FILE': a scenario file with [campaign] and [vary], such as "
             "examples/campaigns/hop_in_gusts.toml\n",
         ),
-        (["none.toml"], "gcs: none.toml: cannot be read: No such file or directory"),
+        (["none.toml"], "gcs: none.toml: there is no such file or folder"),
         (["c.toml", "--seek", "best"], "gcs: --seek: best is not one of worst"),
         (["c.toml", "--flights", "50"], "gcs: --flights is for --seek: "),
         (["c.toml", "--workers", "0"], "gcs: --workers: 0 is outside the allowed range 1 to 256"),

@@ -11,6 +11,7 @@ from flightstack.core.errors import ConfigError
 from gcs_cli.errors import CliError
 from gcs_cli.scenarios.selection import Selector, find_scenarios, select
 from gcs_cli.scenarios.watch import Stamps
+from tests.support.commands import gcs
 
 TEXT = "plan = 'hop'\nrepeat = 2\n[expect]\n"
 
@@ -43,6 +44,27 @@ def test_a_file_given_twice_is_flown_once(folder: Path) -> None:
 def test_a_missing_path_is_an_error(folder: Path) -> None:
     with pytest.raises(ConfigError, match="none: there is no such file or folder"):
         find_scenarios([Path("none")])
+
+
+@pytest.mark.parametrize(
+    ("name", "near"),
+    [("a", "a.toml"), ("wind/gust", "wind/gust.toml"), ("low_battery", ".*missions/low_battery.toml")],
+)
+def test_a_missing_path_names_the_file_that_is_meant(folder: Path, name: str, near: str) -> None:
+    with pytest.raises(
+        ConfigError, match=f"{name}: there is no such file or folder; did you mean {near}\\?$"
+    ):
+        find_scenarios([Path(name)])
+    assert gcs("campaign", name).stderr.startswith(
+        f"gcs: {name}: there is no such file or folder; did you mean"
+    )
+
+
+def test_a_campaign_among_the_scenarios_is_named(folder: Path) -> None:
+    (folder / "sweep.toml").write_text(TEXT + "[campaign]\nflights = 3\n[vary]\n")
+    with pytest.raises(ConfigError, match=r"sweep\.toml: is a campaign: fly it with gcs campaign$"):
+        select([Path("sweep.toml")])
+    assert "a.toml: is a scenario: fly it with gcs test; a campaign has" in gcs("campaign", "a.toml").stderr
 
 
 def test_a_folder_without_scenarios_is_an_error(tmp_path: Path) -> None:
