@@ -14,7 +14,7 @@ from rich.text import Text
 
 from gcs_cli.campaign.rows import Row
 from gcs_cli.campaign.statistics import pass_probability, worst
-from gcs_cli.fly.fly_display import draws_bars
+from gcs_cli.fly.fly_display import before_echo, draws_bars
 from gcs_cli.tables import new_table
 
 _WORST = 5
@@ -136,7 +136,8 @@ class LiveDisplay:
 
     def tick(self) -> None:
         """Redraw the live table."""
-        self._live.update(Group(self._bar(), self._facts(), self._table()), refresh=True)
+        shown = Group(self._bar(), self._facts(), self._table())
+        self._live.update(before_echo(shown, self._live.console), refresh=True)
 
     def close(self) -> None:
         """Remove the live table."""

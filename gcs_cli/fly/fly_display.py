@@ -6,6 +6,7 @@ import time
 from typing import Any, Protocol
 
 from rich.console import Console, RenderableType
+from rich.constrain import Constrain
 from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.spinner import Spinner
@@ -20,6 +21,8 @@ from gcs_cli.tui.watch_lines import text_line
 from gcs_cli.vehicle.view_types import StatusText
 
 _FRAME_S = 0.1
+_ECHO = 5
+"""Columns of ^C, twice, and of the cursor."""
 _WITH_BAR, _WITH_PLACE = 60, 90  # columns of the terminal
 
 
@@ -66,6 +69,11 @@ def draws_bars(console: Console) -> bool:
     return console.is_terminal and not console.is_dumb_terminal
 
 
+def before_echo(shown: RenderableType, console: Console) -> Constrain:
+    """Leave columns free on the right, where the terminal echoes ^C: in a new line, the live one would stay."""
+    return Constrain(shown, max(1, console.width - _ECHO))
+
+
 class _NewTexts:
     """Status texts not shown yet, without those that a shutdown in flight causes."""
 
@@ -100,7 +108,10 @@ class BarDisplay:
         if now_s >= self._due_s:
             self._due_s = now_s + _FRAME_S
             width = self._live.console.width
-            self._live.update(progress(flight, now_s, self._spinner, width), refresh=True)
+            self._live.update(
+                before_echo(progress(flight, now_s, self._spinner, width - _ECHO), self._live.console),
+                refresh=True,
+            )
 
     def note(self, line: str) -> None:
         """Print the line above the live one."""

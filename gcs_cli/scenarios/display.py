@@ -13,7 +13,7 @@ from rich.spinner import Spinner
 from rich.table import Table
 from rich.text import Text
 
-from gcs_cli.fly.fly_display import draws_bars
+from gcs_cli.fly.fly_display import before_echo, draws_bars
 from gcs_cli.scenarios.result import Result, Row, summary_text
 from gcs_cli.scenarios.selection import Case
 
@@ -142,7 +142,7 @@ class LiveDisplay:
             row = Table.grid(padding=(0, 1))
             row.add_row(spinner.render(now_s), Text(words, no_wrap=True, overflow="ellipsis"))
             rows.append(row)
-        self._live.update(Group(*rows), refresh=True)
+        self._live.update(before_echo(Group(*rows), self._live.console), refresh=True)
 
     def _bar(self, now_s: float) -> RenderableType:
         grid = Table.grid(padding=(0, 1), expand=True)

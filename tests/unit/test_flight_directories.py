@@ -88,6 +88,18 @@ def test_the_live_line_fits_the_terminal(width: int, bar: bool, place: bool) -> 
     assert ("━" in line, "up " in line) == (bar, place)
 
 
+def test_the_live_line_leaves_room_for_the_echo_of_an_interrupt() -> None:
+    """^C wrapped into a new line, and the line stayed above the summary."""
+    story = Story(FakeVehicle()).run(until=Phase.FLY)
+    console = Console(file=io.StringIO(), width=100, force_terminal=True, _environ={"TERM": "xterm"})
+    display = make_display(console)
+    display.update(story.flight)
+    display.close()
+    assert isinstance(console.file, io.StringIO)
+    lines = Text.from_ansi(console.file.getvalue()).plain.splitlines()
+    assert 80 < max(map(len, lines)) <= 100 - len("^C^C") - 1
+
+
 def test_the_state_line_has_the_clock_of_the_texts() -> None:
     story = Story(FakeVehicle())
     story.vehicle.time_s = 60.0  # the vehicle has waited on the ground
