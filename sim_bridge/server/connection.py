@@ -6,6 +6,7 @@ import contextlib
 import select
 import signal
 import socket
+import sys
 import time
 from types import FrameType
 
@@ -79,6 +80,24 @@ def listen(host: str, port: int) -> socket.socket:
         raise
     listener.setblocking(False)
     return listener
+
+
+def hold(listener: socket.socket) -> socket.socket:
+    """Hold the address of a listener until the returned socket is closed; raise OSError if another process does.
+
+    A simulator closes its listener when its client has connected, and a second one could listen on the address. The
+    name is one of Linux's, without a file; elsewhere nothing is held.
+    """
+    host, port = listener.getsockname()[:2]
+    held = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    try:
+        if sys.platform == "linux":
+            held.bind(f"\0sim-bridge {host}:{port}")
+    except OSError:
+        held.close()
+        listener.close()
+        raise
+    return held
 
 
 class Connection:

@@ -27,6 +27,7 @@ from sim_bridge.server.connection import (
     PeerSilentError,
     StoppedError,
     StopSignal,
+    hold,
     listen,
 )
 from sim_bridge.server.endpoint import FlightStackEndpoint
@@ -62,12 +63,18 @@ def serve(options: ServerOptions) -> int:
     """Run the simulator for one client; return the exit code."""
     try:
         listener = listen(options.host, options.port)
+        held = hold(listener) if options.port else contextlib.nullcontext()  # a free one is not given twice
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or error
         port_is_bad = getattr(error, "errno", None) in (errno.EADDRINUSE, errno.EACCES)
         remedy = "choose another --port or --instance" if port_is_bad else "check --host"
         complain(f"cannot listen on {options.host}:{options.port}: {reason}; {remedy}")
         return USAGE
+    with held:
+        return _simulate(options, listener)
+
+
+def _simulate(options: ServerOptions, listener: socket.socket) -> int:
     with listener:
         stop = StopSignal()
         _print_start(options, listener.getsockname()[1])

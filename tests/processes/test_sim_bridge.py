@@ -152,6 +152,23 @@ def test_busy_port_is_named() -> None:
     assert done.stderr.count("\n") == 1
 
 
+def test_port_of_a_simulator_in_flight_is_busy() -> None:
+    """Its listener is closed then: a second simulator waited for a flight stack that flew with the first."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    bridge = SimBridge("--port", str(port))
+    client = Client(bridge.port)
+    client.request()
+    client.fly(3)
+    done = sim_bridge_command("--port", port, "--timeout", "0.05")
+    assert done.stderr.startswith(f"sim-bridge: cannot listen on 127.0.0.1:{port}: Address already in use")
+    assert done.returncode == 2
+    client.socket.close()
+    bridge.end()
+    again = sim_bridge_command("--port", port, "--timeout", "0.05")
+    assert again.returncode == 3
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("connected", [True, False])
 def test_signals_end_in_order(bridge: SimBridge, number: signal.Signals, connected: bool) -> None:
