@@ -166,8 +166,12 @@ class Fleet:
 
 def check_vehicle(vehicle: SimOptions) -> None:
     """Check options, files and ports as simulator and flight stack do at their start; raise CliError, ConfigError."""
-    is_read = vehicle.params not in (None, Path(NONE))
-    check_options(vehicle if is_read else replace(vehicle, params=None), start_of(vehicle))
+    params = None if vehicle.params == Path(NONE) else vehicle.params
+    if params is not None and not params.exists():  # the flight stack creates it
+        check_creatable(params)
+        complain(f"gcs: note: {params} does not exist yet: it will keep the parameters that are changed")
+        params = None
+    check_options(replace(vehicle, params=params), start_of(vehicle))
     if vehicle.log not in (None, NONE):
         log = Path(str(vehicle.log))
         check_new(log, vehicle.overwrite)

@@ -221,7 +221,8 @@ def test_notices_are_printed_after_the_view(
             "file/instance-0/flight.ulg: cannot be written: Not a directory",
         ),
         ("--state-dir file", "file: cannot be written: Not a directory"),
-        ("--params missing.params", "--params missing.params: no such file"),
+        ("--params file/new.params", "file/new.params: cannot be written: Not a directory"),
+        ("--vehicles 2 --params missing.params", "missing.params: no such file"),
         ("--gcs station", "--gcs: station must be HOST:PORT"),
         ("--gcs 127.0.0.1:99999", "--gcs: 99999 is outside 1 to 65535"),
         ("--listen nowhere.invalid", "--listen: nowhere.invalid is not a host with an IPv4 address"),
@@ -235,3 +236,14 @@ def test_bad_option_is_refused_before_a_process_starts(
     (tmp_path / "file").touch()
     monkeypatch.setattr(sim_run, "Fleet", lambda: pytest.fail("a vehicle is started"))
     assert gcs("sim", *words.split()) == ("", f"gcs: {said}\n", 2)
+
+
+def test_a_parameter_file_that_does_not_exist_yet_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sim_run, "check_ports", lambda _vehicle: None)
+    sim_run.check_vehicle(SimOptions(params=tmp_path / "new.params"))
+    assert "new.params does not exist yet: it will keep" in capsys.readouterr().err
+    (tmp_path / "new.params").write_text("1\t1\tMPC_XY_CRUISE\t3\t9\n")
+    sim_run.check_vehicle(SimOptions(params=tmp_path / "new.params"))
+    assert capsys.readouterr().err == ""
