@@ -18,7 +18,8 @@ from flightstack.mavlink.link import Link, Message
 from flightstack.mavlink.packed import Packing
 from flightstack.params.vehicle import Vehicle
 from flightstack.services.telemetry.motion import PACKINGS
-from flightstack.services.telemetry.telemetry import GROUND_RATES_HZ, MAKERS
+from flightstack.services.telemetry.streams import GROUND_RATES_HZ
+from flightstack.services.telemetry.telemetry import MAKERS
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, ActuatorsFrame, PlantStateFrame
 from flightstack.testing import World
 from flightstack.vehicle.status import VehicleStatus

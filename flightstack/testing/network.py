@@ -9,7 +9,7 @@ from flightstack.core.port_numbers import API, GROUND
 from flightstack.mavlink.dialect import mavlink
 from flightstack.services.routing.hub import GroundHub
 from flightstack.services.routing.peer import PeerAddress
-from flightstack.services.telemetry.telemetry import Streams
+from flightstack.services.telemetry.streams import Streams
 from flightstack.testing.client import Client
 from flightstack.testing.engine import Engine
 from flightstack.testing.link import Link

@@ -12,7 +12,7 @@ from flightstack.mavlink.fields import RANGES
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.packed import Packing
 from flightstack.services.telemetry import motion, sensors
-from flightstack.services.telemetry.telemetry import GROUND_RATES_HZ
+from flightstack.services.telemetry.streams import GROUND_RATES_HZ
 from tests.support.tools import NIGHTLY
 
 PACKINGS = (*motion.PACKINGS, *sensors.PACKINGS)

@@ -22,13 +22,8 @@ from flightstack.estimation.sensor_feed import NewestSamples
 from flightstack.estimation.sensor_samples import BaroSample, GnssFix, GnssSample, MagSample
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
-from flightstack.services.telemetry.telemetry import (
-    SENSOR_STREAMED,
-    STREAMED,
-    Streams,
-    Telemetry,
-    default_rates_hz,
-)
+from flightstack.services.telemetry.streams import Streams, default_rates_hz
+from flightstack.services.telemetry.telemetry import SENSOR_STREAMED, STREAMED, Telemetry
 from tests.support.flown_sensors import Faults
 from tests.support.sensed_flight import sensed_after
 from tests.support.telemetry_status import status, usual_timing

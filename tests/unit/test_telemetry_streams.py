@@ -7,7 +7,8 @@ import math
 import pytest
 
 from flightstack.mavlink.dialect import mavlink
-from flightstack.services.telemetry.telemetry import API_RATES_HZ, GROUND_RATES_HZ, Streams, Telemetry
+from flightstack.services.telemetry.streams import API_RATES_HZ, GROUND_RATES_HZ, Streams
+from flightstack.services.telemetry.telemetry import Telemetry
 from tests.support.telemetry_status import status, telemetry, usual_timing
 
 ATTITUDE = mavlink.MAVLINK_MSG_ID_ATTITUDE

@@ -24,7 +24,8 @@ from flightstack.services.registry import make_services
 from flightstack.services.routing.peer import Peer, PeerAddress
 from flightstack.services.routing.router import Router, Schedule, Service
 from flightstack.services.routing.signing_setup import NEVER_FORWARDED, link_signing, signing_setup
-from flightstack.services.telemetry.telemetry import Streams, Telemetry, default_rates_hz
+from flightstack.services.telemetry.streams import Streams, default_rates_hz
+from flightstack.services.telemetry.telemetry import Telemetry
 from flightstack.services.telemetry.vehicle import status_texts, system_time_at
 from flightstack.vehicle.assembly import VehicleParts
 from flightstack.vehicle.flight_state import ItemReached, Text

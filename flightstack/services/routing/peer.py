@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from flightstack.mavlink.link import SILENT_AFTER_S, Link, Message
-from flightstack.services.telemetry.telemetry import Streams
+from flightstack.services.telemetry.streams import Streams
 
 
 class PeerAddress(NamedTuple):
