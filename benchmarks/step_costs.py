@@ -14,22 +14,25 @@ from benchmarks.measure import Figure, interleaved_us
 from benchmarks.one_process import Station, flying
 from flightstack.core.contract import MAX_ROTORS, LoopRow, Vector3
 from flightstack.mavlink.dialect import LAYOUT_BY_NAME, mavlink
+from flightstack.mavlink.frame_packer import FramePacker
 from flightstack.mavlink.link import Link, Message
-from flightstack.mavlink.packed import Packing
 from flightstack.params.vehicle import Vehicle
-from flightstack.services.telemetry.motion import PACKINGS
-from flightstack.services.telemetry.streams import GROUND_RATES_HZ
-from flightstack.services.telemetry.telemetry import MAKERS
+from flightstack.services.telemetry.motion import CONTENTS
+from flightstack.services.telemetry.motion_values import VALUES
+from flightstack.services.telemetry.streams import GROUND_RATES_HZ, Streams
+from flightstack.services.telemetry.telemetry import Telemetry
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, ActuatorsFrame, PlantStateFrame
 from flightstack.testing import World
-from flightstack.vehicle.status import VehicleStatus
 from sim_bridge.plant.compiled_plant import CompiledPlant
 from sim_bridge.plant.plant import InitialState, PlantOptions
 from sim_bridge.server.endpoint import FlightStackEndpoint
 from sim_bridge.simulator import Simulator
 
 Call = Callable[[], object]
-PACK, PACK_BY_PYMAVLINK = "telemetry: pack and frame values", "telemetry: the same by pymavlink"
+PACK = "telemetry: values of seven messages packed and framed"
+PACK_BY_PYMAVLINK = "telemetry: the same by pymavlink"
+POLLS_HZ = 50.0
+"""Rate at which messages are due."""
 
 
 class Part(NamedTuple):
@@ -117,42 +120,44 @@ class _Turns:
 
 
 def _telemetry(world: World) -> tuple[Call, Call, Call, Call]:
-    """Return calls for the mix of messages of one second, message by message in turns.
+    """Return calls for the messages at the vehicle's default rates.
 
-    They make a message of the status and its frame; pack and frame the values of a message by its format, and by
+    They make the frames of a poll of the status; pack and frame the values of the messages of motion by kernels, and by
     pymavlink; decode a frame.
     """
-    status, link, station = world.engine.stack.status(), Link(1, 1), Link(255, 190)
-    turns = [number for number, rate in GROUND_RATES_HZ.items() for _ in range(max(1, round(rate)))]
-    frames = [link.encode(MAKERS[number](status)) for number in turns]
-    formats = {packing.message_id: packing for packing in PACKINGS}
-    packs: list[Call] = []
-    by_pymavlink: list[Call] = []
-    for number, frame in zip(turns, frames, strict=True):
-        if number in formats:
-            (message,) = station.decode(frame)
-            fields = [getattr(message, name) for name in message.fieldnames]
-            values = [value for field in fields for value in (field if isinstance(field, list) else [field])]
-            packs.append(partial(_pack_by_format, link, formats[number], values))
-            by_pymavlink.append(partial(_pack_by_pymavlink, link, type(message), fields))
+    stack, link, station = world.engine.stack, Link(1, 1), Link(255, 190)
+    told = Telemetry(stack.status, stack.now, stack.parts.places, stack.status().info, stack.report.message)
+    polls = _polls()
+    frames = [frame for ids in polls for frame in told.frames(ids, link)]
+    values = np.ones(1, VALUES)
+    packer = FramePacker(values, CONTENTS)
+    numbers = [packer.index[number] for number, rate in GROUND_RATES_HZ.items() if rate == POLLS_HZ]
+    messages = [
+        message for number in numbers for message in station.decode(link.encode(packer.message(number)))
+    ]
+    fields = [(type(m), [getattr(m, name) for name in m.fieldnames]) for m in messages]
     return (
-        _Turns([partial(_make, link, MAKERS[number], status) for number in turns]),
-        _Turns(packs),
-        _Turns(by_pymavlink),
+        _Turns([partial(_poll, told, ids, link) for ids in polls]),
+        partial(link.encode_numbered, packer, numbers),
+        partial(_pack_by_pymavlink, link, fields),
         _Turns([partial(_decode, station, frame) for frame in frames]),
     )
 
 
-def _make(link: Link, maker: Callable[[VehicleStatus], Message], status: VehicleStatus) -> None:
-    link.encode(maker(status))
+def _polls() -> list[list[int]]:
+    """Return the messages that are due in the polls of a second."""
+    streams = Streams(GROUND_RATES_HZ)
+    return [streams.due(poll / POLLS_HZ, poll / POLLS_HZ) for poll in range(round(POLLS_HZ))]
 
 
-def _pack_by_format(link: Link, packing: Packing, values: list[float]) -> None:
-    link.encode(packing(*values))
+def _poll(told: Telemetry, message_ids: list[int], link: Link) -> None:
+    told.begin_poll()
+    told.frames(message_ids, link)
 
 
-def _pack_by_pymavlink(link: Link, kind: type[Message], fields: list[object]) -> None:
-    link.encode(kind(*fields))
+def _pack_by_pymavlink(link: Link, fields: list[tuple[type[Message], list[object]]]) -> None:
+    for kind, values in fields:
+        link.encode(kind(*values))
 
 
 def _decode(station: Link, frame: bytes) -> None:
@@ -227,9 +232,9 @@ def parts() -> list[Part]:
         Part("simulator, without its socket", simulator_side, 1.0, False),
         Part("flight stack's end of the simulator link", stack_side, 1.0, False),
         Part("both and the autopilot's tick with its log, holding", _holding(), 1.0, False),
-        Part("telemetry: a message, from status to frame", make, messages_per_step, False),
-        Part(PACK, pack, messages_per_step, False),
-        Part(PACK_BY_PYMAVLINK, pack_by_pymavlink, messages_per_step, False),
+        Part("telemetry: a poll, from status to frames", make, POLLS_HZ / 500.0, False),
+        Part(PACK, pack, POLLS_HZ / 500.0, False),
+        Part(PACK_BY_PYMAVLINK, pack_by_pymavlink, POLLS_HZ / 500.0, False),
         Part("ground station: decode it (pymavlink)", decode, messages_per_step, False),
     ]
 

@@ -1,4 +1,4 @@
-"""WGS 84 positions, the local tangent plane, and the magnetic field of the earth. Not compiled."""
+"""WGS 84 positions, the local tangent plane, and the magnetic field of the earth."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from functools import cache
 from typing import NamedTuple
 
+from flightstack.core.compiled import compiled, plain
 from flightstack.core.contract import Vector3
 from flightstack.core.portable_math import sin_cos
 
@@ -19,6 +20,20 @@ class GeoPoint(NamedTuple):
     latitude_deg: float
     longitude_deg: float
     altitude_m: float
+
+
+@compiled
+def geographic(origin: GeoPoint, scales: tuple[float, float], position_ned_m: Vector3) -> GeoPoint:
+    """Return the geodetic point of a NED position [m] relative to ``origin``; ``scales`` are those of its frame."""
+    north_m_per_deg, east_m_per_deg = scales
+    longitude_deg = origin.longitude_deg + position_ned_m.y / east_m_per_deg
+    if abs(longitude_deg) > 180.0:  # beyond the date line
+        longitude_deg = (longitude_deg + 180.0) % 360.0 - 180.0
+    return GeoPoint(
+        origin.latitude_deg + position_ned_m.x / north_m_per_deg,
+        longitude_deg,
+        origin.altitude_m - position_ned_m.z,
+    )
 
 
 class LocalFrame:
@@ -59,14 +74,7 @@ class LocalFrame:
 
     def to_geo(self, position_ned_m: Vector3) -> GeoPoint:
         """Return the geodetic point of a NED position [m] relative to the origin."""
-        longitude_deg = self.origin.longitude_deg + position_ned_m.y / self._east_m_per_deg
-        if abs(longitude_deg) > 180.0:  # beyond the date line
-            longitude_deg = (longitude_deg + 180.0) % 360.0 - 180.0
-        return GeoPoint(
-            self.origin.latitude_deg + position_ned_m.x / self._north_m_per_deg,
-            longitude_deg,
-            self.origin.altitude_m - position_ned_m.z,
-        )
+        return plain(geographic)(self.origin, self.scales, position_ned_m)
 
 
 FIELD_YEAR = 2026.0

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any, NamedTuple, TypeAlias
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from flightstack.mavlink.decoding import decoded
 from flightstack.mavlink.dialect import mavlink
@@ -20,6 +20,9 @@ from flightstack.mavlink.frames import (
 )
 from flightstack.mavlink.packed import PackedMessage
 from flightstack.mavlink.signing import LinkSigning
+
+if TYPE_CHECKING:
+    from flightstack.mavlink.frame_packer import FramePacker  # NumPy, which not every end of a link needs
 
 Message: TypeAlias = Any
 """A pymavlink message object, or a ``PackedMessage`` to send."""
@@ -74,6 +77,19 @@ class Link:
         codec.seq = (codec.seq + 1) % 256
         self.sent += 1
         return self._outgoing(frame, crc_extra)
+
+    def encode_numbered(self, packer: FramePacker, numbers: Sequence[int]) -> list[bytes]:
+        """Return the frames of messages of ``packer``, by their numbers, with this link's next sequence numbers."""
+        codec = self._codec
+        frames = packer.frames(numbers, codec.seq, codec.srcSystem, codec.srcComponent)
+        codec.seq = (codec.seq + len(frames)) % 256
+        self.sent += len(frames)
+        if self._signing is None:
+            return frames
+        return [
+            self._signing.outgoing(frame, packer.crc_extra(number))
+            for frame, number in zip(frames, numbers, strict=True)
+        ]
 
     def _outgoing(self, frame: bytes, crc_extra: int) -> bytes:
         return frame if self._signing is None else self._signing.outgoing(frame, crc_extra)

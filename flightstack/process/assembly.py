@@ -50,7 +50,7 @@ from flightstack.vehicle.status import VehicleStatus, vehicle_info, vehicle_stat
 
 _KERNELS = (
     "inner_kernel", "outer_kernel", "rest_kernel", "levelling_kernel", "goal_kernel",
-    "follow_rotors", "detect", "fence_step", "store_outer_row", "outer_heading", "euler_rad",
+    "follow_rotors", "detect", "fence_step", "store_outer_row", "outer_heading", "read_motion", "pack_frames",
 )  # fmt: skip
 _LOOP_KERNELS = ("inner_kernel", "outer_kernel")
 _ESTIMATOR_KERNELS = ("imu_kernel", "push_kernel", "field_kernel", "update_health")
@@ -184,7 +184,7 @@ def _join(
         sensed = None if estimation is None else estimation.sensed()
         return vehicle_status(vehicle_id, parts, simulator.battery, sensed)
 
-    telemetry = Telemetry(status, lambda: parts.now.time_us, report.message, estimation is not None)
+    telemetry = Telemetry(status, parts.now, parts.places, vehicle_id, report.message, estimation is not None)
     context = VehicleContext.of(parts, params, simulator, generic, logs, prepare_reboot)
     ground = GroundHub(context, parts, telemetry, vehicle_id)
     return Stack(

@@ -97,16 +97,16 @@ def vehicle_info(vehicle: Vehicle, system_id: int, is_generic: bool, frame: Loca
     )
 
 
-_SINGLE_LIMIT = 1e18
+SINGLE_LIMIT = 1e18
 
 
 def in_single_precision(values: list[float]) -> list[float]:
     """Return ``values`` with infinity for those beyond 1e18: single precision must hold them and products of them."""
     if (
-        max(values) <= _SINGLE_LIMIT and min(values) >= -_SINGLE_LIMIT
+        max(values) <= SINGLE_LIMIT and min(values) >= -SINGLE_LIMIT
     ):  # the usual case; False if NaN hides a value
         return values
-    return [math.copysign(math.inf, value) if abs(value) > _SINGLE_LIMIT else value for value in values]
+    return [math.copysign(math.inf, value) if abs(value) > SINGLE_LIMIT else value for value in values]
 
 
 def vehicle_status(

@@ -9,14 +9,17 @@ from scipy.spatial.transform import Rotation
 
 from flightstack.commander.failsafe import Action
 from flightstack.commander.fence_monitor import FenceBreaches
-from flightstack.core.contract import LoopRow
+from flightstack.core.contract import MAX_ROTORS, LoopRow
 from flightstack.core.enums import Mode
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.guidance.mission import MissionProgress
+from flightstack.guidance.safe_places import SafePlaces
 from flightstack.mavlink.dialect import FsLoopTiming
 from flightstack.mavlink.link import Message
+from flightstack.params.behaviour import Behaviour
 from flightstack.services.telemetry.telemetry import Telemetry
 from flightstack.simulator_link.endpoint import NO_BATTERY
+from flightstack.vehicle.flight_state import FlightState
 from flightstack.vehicle.status import FlightTimes, PlanIds, VehicleInfo, VehicleStatus, in_single_precision
 
 HOME = GeoPoint(47.397742, 8.545594, 488.0)
@@ -49,7 +52,24 @@ def usual_timing() -> Message:
     return FsLoopTiming(1, 2, 0, 0, 500.0, 100.0, 30.0, *[1.0] * 6, 0)
 
 
-def telemetry(of: VehicleStatus | None = None, timing: Callable[[], Message] = usual_timing) -> Telemetry:
-    """Return telemetry of a constant status."""
+def flight_state(of: VehicleStatus) -> FlightState:
+    """Return the state of the flight that ``of`` shows."""
+    arrays = [np.array(values) for values in (of.state, of.setpoint, of.attitude_target, of.row)]
+    state, setpoint, target, row = arrays
+    has_place = of.sensed is None or of.sensed.has_origin
+    return FlightState(
+        Behaviour(), state, np.zeros(MAX_ROTORS), setpoint, target, row, has_place, time_us=of.time_us
+    )
+
+
+def telemetry(
+    of: VehicleStatus | None = None,
+    timing: Callable[[], Message] = usual_timing,
+    now: FlightState | None = None,
+) -> Telemetry:
+    """Return telemetry of a constant status, and of ``now`` if its time advances."""
     shown = of or status()
-    return Telemetry(lambda: shown, lambda: shown.time_us, timing)
+    now = flight_state(shown) if now is None else now
+    places = SafePlaces(shown.home)
+    places.frame = shown.info.frame
+    return Telemetry(lambda: shown, now, places, shown.info, timing, shown.sensed is not None)

@@ -23,7 +23,7 @@ from flightstack.mavlink.fields import fitted
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.log_messages import log_data_message
 from flightstack.params.vehicle import load_vehicle
-from flightstack.services.telemetry.telemetry import MAKERS, STREAMED
+from flightstack.services.telemetry.telemetry import STREAMED
 from flightstack.services.telemetry.vehicle import status_texts
 from flightstack.simulator_link.battery_frame import decode_battery, encode_battery
 from flightstack.simulator_link.endpoint import Battery
@@ -138,7 +138,8 @@ def test_a_plan_too_long_for_its_count_is_not_announced_as_a_short_one() -> None
     ],
 )  # fmt: skip
 def test_clocks_wrap_at_the_range_of_their_field(message_id, field, changes, expected) -> None:
-    assert getattr(over_the_wire(MAKERS[message_id](status(**changes))), field) == expected
+    (message,) = telemetry(status(**changes)).messages(message_id)
+    assert getattr(over_the_wire(message), field) == expected
 
 
 @pytest.mark.parametrize(

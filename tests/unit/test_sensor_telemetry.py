@@ -23,10 +23,10 @@ from flightstack.estimation.sensor_samples import BaroSample, GnssFix, GnssSampl
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 from flightstack.services.telemetry.streams import Streams, default_rates_hz
-from flightstack.services.telemetry.telemetry import SENSOR_STREAMED, STREAMED, Telemetry
+from flightstack.services.telemetry.telemetry import SENSOR_STREAMED, STREAMED
 from tests.support.flown_sensors import Faults
 from tests.support.sensed_flight import sensed_after
-from tests.support.telemetry_status import status, usual_timing
+from tests.support.telemetry_status import status, telemetry
 
 SECONDS = 20.0
 GOOD = (
@@ -43,10 +43,9 @@ def flown_status(sensed: Sensed):
 def sent(message_id: int, sensed: Sensed | None = None):
     """Return the messages of an id as a ground station decodes them."""
     shown = flown_status(sensed or sensed_after(SECONDS)[0])
-    telemetry = Telemetry(lambda: shown, lambda: shown.time_us, usual_timing, has_sensors=True)
     decoded = [
         m
-        for message in telemetry.messages(message_id)
+        for message in telemetry(shown).messages(message_id)
         for m in Link(255, 190).decode(Link(1, 1).encode(message))
     ]
     assert all(message.get_msgId() == message_id for message in decoded)
@@ -342,7 +341,7 @@ def test_messages_of_absurd_measurements_are_sent(values: list[float]) -> None:
     for _ in range(2):
         samples.imu_track.take(20.0, 0.004, a, b)
     shown = status(state=np.array(values), sensed=Sensed(memory, samples))
-    told = Telemetry(lambda: shown, lambda: shown.time_us, usual_timing, has_sensors=True)
+    told = telemetry(shown)
     for message_id in SENSOR_STREAMED:
         for message in told.messages(message_id):
             assert Link(1, 1).encode(message)
@@ -364,10 +363,9 @@ def test_places_on_earth_are_not_sent_before_the_first_fix() -> None:
 
 
 def test_sensor_messages_are_available_only_on_sensors() -> None:
-    shown = status()
-    telemetry = Telemetry(lambda: shown, lambda: shown.time_us, usual_timing)
+    told = telemetry()
     for message_id in (mavlink.MAVLINK_MSG_ID_HIGHRES_IMU, mavlink.MAVLINK_MSG_ID_VIBRATION):
-        assert not telemetry.is_available(message_id)
+        assert not told.is_available(message_id)
         assert Streams({}, STREAMED).interval_us(message_id) == 0
         assert not Streams({}).set_interval(message_id, 1e5)
         assert Streams({}, SENSOR_STREAMED).set_interval(message_id, 1e5)

@@ -223,9 +223,7 @@ class GroundHub:
         self._telemetry.begin_poll()
         for address, peer in list(self._peers.items()):
             if self._peers.get(address) is peer:  # the caller may have dropped it since
-                due = self._due(peer, changed, now_s, streams=address not in congested)
-                frames = [peer.link.encode_shared(message) for message in due]
-                for frame in frames:
+                for frame in self._frames(peer, changed, now_s, streams=address not in congested):
                     yield address, frame
         if self._to_forward:
             yield from self._forwarded(now_s)
@@ -265,20 +263,22 @@ class GroundHub:
             elif isinstance(address, PeerAddress) and address in self._peers:
                 self._peers[address].outbox.append(message)
 
-    def _due(self, peer: Peer, changed: bool, now_s: float, streams: bool) -> list[Message]:
-        """Return the messages to send to ``peer`` now. Keep texts for a silent peer, which may be heard again."""
+    def _frames(self, peer: Peer, changed: bool, now_s: float, streams: bool) -> list[bytes]:
+        """Return the frames to send to ``peer`` now. Keep texts for a silent peer, which may be heard again."""
         due: list[Message] = []
+        telemetry, is_served = self._telemetry, peer.is_served(now_s)
         if (changed or now_s >= peer.heartbeat_due_s) and (peer.heard or peer.permanent):
             peer.heartbeat_due_s = now_s + HEARTBEAT_S
-            due += self._telemetry.messages(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
-        if not peer.is_served(now_s):
+            due += telemetry.messages(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
+        if is_served:
+            due += peer.outbox
+            peer.outbox.clear()
+        else:
             peer.outbox[:] = _kept_texts(peer)
-            return due
-        due += peer.outbox
-        peer.outbox.clear()
-        if streams:
-            due += peer.streams.due(self._telemetry, now_s)
-        return due
+        frames = [peer.link.encode_shared(message) for message in due]
+        if is_served and streams:
+            frames += telemetry.frames(peer.streams.due(telemetry.time_us * 1e-6, now_s), peer.link)
+        return frames
 
     def _note_changes(self) -> bool:
         """Announce reached items and a change of home; return True if mode or arming has changed."""

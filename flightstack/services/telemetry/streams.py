@@ -12,8 +12,7 @@ import math
 from collections.abc import Set
 
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
-from flightstack.services.telemetry.telemetry import STREAMED, Telemetry
+from flightstack.services.telemetry.telemetry import STREAMED
 
 M = mavlink
 
@@ -188,11 +187,10 @@ class Streams:
         """Return the time for which nothing is due, from the time ``vehicle_s`` of the last call of ``due`` [s]."""
         return self._soonest_s - vehicle_s
 
-    def due(self, telemetry: Telemetry, link_now_s: float) -> list[Message]:
-        """Return the messages that are due on both the vehicle clock and the link clock."""
-        now_s = telemetry.time_us * 1e-6
+    def due(self, now_s: float, link_now_s: float) -> list[int]:
+        """Return the messages that are due on both the vehicle clock and the link clock, by their ids."""
         until_s = now_s + ROUNDING_S
-        due: list[Message] = []
+        due: list[int] = []
         if until_s < self._soonest_s:
             return due
         soonest_s = math.inf
@@ -201,7 +199,7 @@ class Streams:
             if until_s >= vehicle_s and link_now_s >= stream.link_s:
                 stream.sent(now_s, link_now_s)
                 vehicle_s = stream.vehicle_s
-                due += telemetry.messages(stream.message_id)
+                due.append(stream.message_id)
             if vehicle_s < soonest_s:  # noqa: PLR1730  # ``min`` takes three times as long
                 soonest_s = vehicle_s
         self._soonest_s = soonest_s

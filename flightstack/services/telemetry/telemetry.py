@@ -1,16 +1,20 @@
-"""Telemetry: each message once per poll, of one status. No I/O."""
+"""Telemetry: each message once per poll, of one status, and the frames of streamed messages. No I/O."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from itertools import groupby
 
 from flightstack.core.errors import TargetError
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.frame_packer import FramePacker
+from flightstack.mavlink.link import Link, Message
 from flightstack.services.telemetry import modes, motion, vehicle
-from flightstack.services.telemetry.fields import euler_rad, wrapped
+from flightstack.services.telemetry.fields import wrapped
+from flightstack.services.telemetry.motion_values import Motion, Places
 from flightstack.services.telemetry.sensors import SENSED
-from flightstack.vehicle.status import VehicleStatus
+from flightstack.vehicle.flight_state import FlightState
+from flightstack.vehicle.status import VehicleInfo, VehicleStatus
 
 M = mavlink
 
@@ -19,18 +23,9 @@ MAKERS: dict[int, Callable[[VehicleStatus], Message]] = {
     M.MAVLINK_MSG_ID_SYS_STATUS: vehicle.sys_status,
     M.MAVLINK_MSG_ID_SYSTEM_TIME: vehicle.system_time,
     M.MAVLINK_MSG_ID_GPS_RAW_INT: motion.gps_raw,
-    M.MAVLINK_MSG_ID_ATTITUDE: motion.attitude,
-    M.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: motion.attitude_quaternion,
-    M.MAVLINK_MSG_ID_LOCAL_POSITION_NED: motion.local_position,
-    M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: motion.global_position,
-    M.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: motion.servo_output,
     M.MAVLINK_MSG_ID_MISSION_CURRENT: vehicle.mission_current,
     M.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: vehicle.origin,
-    M.MAVLINK_MSG_ID_VFR_HUD: motion.vfr_hud,
-    M.MAVLINK_MSG_ID_ATTITUDE_TARGET: motion.attitude_target,
-    M.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: motion.position_target,
     M.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: motion.position_target_global,
-    M.MAVLINK_MSG_ID_ALTITUDE: motion.altitude,
     M.MAVLINK_MSG_ID_BATTERY_STATUS: vehicle.battery_status,
     M.MAVLINK_MSG_ID_AUTOPILOT_VERSION: vehicle.autopilot_version,
     M.MAVLINK_MSG_ID_FENCE_STATUS: vehicle.fence_status,
@@ -45,9 +40,11 @@ MAKERS: dict[int, Callable[[VehicleStatus], Message]] = {
     M.MAVLINK_MSG_ID_CURRENT_MODE: modes.current_mode,
     M.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: modes.available_modes_monitor,
 }
-"""Constructors of the messages that depend on the status alone, by message id."""
+"""Constructors of the other messages that depend on the status alone, by message id."""
 
-STREAMED = frozenset({*MAKERS, FS_LOOP_TIMING_ID})
+MOTION = frozenset(getattr(M, f"MAVLINK_MSG_ID_{name}") for name in motion.CONTENTS)
+"""Messages of the values of motion."""
+STREAMED = MOTION | {*MAKERS, FS_LOOP_TIMING_ID}
 """Messages that can be sent at a rate."""
 SENSOR_STREAMED = STREAMED | SENSED.keys()
 """The same for a vehicle that flies on its sensors."""
@@ -59,6 +56,7 @@ _GLOBAL = frozenset(
     }
 )
 """Messages of places on earth, which a vehicle on its sensors does not know before its first fix."""
+_NONE: frozenset[int] = frozenset()
 _REQUESTED = frozenset({M.MAVLINK_MSG_ID_AVAILABLE_MODES, M.MAVLINK_MSG_ID_MISSION_ITEM_REACHED})
 """Further messages on request."""
 
@@ -69,7 +67,9 @@ class Telemetry:
     def __init__(
         self,
         status: Callable[[], VehicleStatus],
-        time_us: Callable[[], int],
+        now: FlightState,
+        places: Places,
+        info: VehicleInfo,
         loop_timing: Callable[[], Message],
         has_sensors: bool = False,
     ) -> None:
@@ -78,11 +78,15 @@ class Telemetry:
         self.streamed = SENSOR_STREAMED if has_sensors else STREAMED
         """Messages that can be sent at a rate."""
         self._status_of_now = status
-        self._time_us = time_us
+        self._now = now
         self._loop_timing = loop_timing
         self._status: VehicleStatus | None = None
+        self._last: VehicleStatus | None = None
         self._made: dict[int, tuple[Message, ...]] = {}
-        euler_rad(1.0, 0.0, 0.0, 0.0)  # compile now and not at the first message
+        self._motion = Motion(now, places, info)
+        self._packer = FramePacker(self._motion.values, motion.CONTENTS)
+        self._is_read = False
+        self._tick_us = now.time_us
 
     def is_available(self, message_id: int) -> bool:
         """Return True if the message can be requested."""
@@ -90,20 +94,20 @@ class Telemetry:
 
     def begin_poll(self) -> None:
         """Discard the status and the messages of the last poll."""
-        self._status = None
+        self._status, self._is_read, self._tick_us = None, False, self._now.time_us
         self._made.clear()
 
     @property
     def status(self) -> VehicleStatus:
         """The status in this poll."""
         if self._status is None:
-            self._status = self._status_of_now()
+            self._status = self._last = self._status_of_now()
         return self._status
 
     @property
     def time_us(self) -> int:
         """Vehicle time of the newest tick."""
-        return self._time_us()
+        return self._now.time_us
 
     @property
     def boot_ms(self) -> int:
@@ -112,12 +116,41 @@ class Telemetry:
 
     def messages(self, message_id: int) -> tuple[Message, ...]:
         """Return a message of ``streamed``, as of this tick: ticks may come between two parts of a poll."""
-        if self._status is not None and self._status.time_us != self._time_us():
+        if self._tick_us != self._now.time_us:
             self.begin_poll()
         made = self._made.get(message_id)
         if made is None:
             made = self._made[message_id] = self._make(message_id)
         return made
+
+    def frames(self, message_ids: Iterable[int], link: Link) -> list[bytes]:
+        """Return the frames on ``link`` of messages of ``streamed``, as of this tick."""
+        frames: list[bytes] = []
+        for is_motion, run in groupby(message_ids, MOTION.__contains__):
+            if is_motion:
+                frames += link.encode_numbered(self._read(), self._numbers(run))
+            else:
+                frames += [link.encode_shared(made) for number in run for made in self.messages(number)]
+        return frames
+
+    def _read(self) -> FramePacker:
+        """Return the packer with the values of this tick."""
+        if self._tick_us != self._now.time_us:
+            self.begin_poll()
+        if not self._is_read:
+            self._is_read = True
+            self._motion.read()
+        return self._packer
+
+    def _numbers(self, message_ids: Iterable[int]) -> list[int]:
+        """Return the packer's numbers of the messages that can be sent now."""
+        index, hidden = self._packer.index, self._hidden
+        return [index[message_id] for message_id in message_ids if message_id not in hidden]
+
+    @property
+    def _hidden(self) -> frozenset[int]:
+        """Messages that are not sent now."""
+        return _GLOBAL if self.has_sensors and not self._now.has_state else _NONE
 
     def requested(self, message_id: int, argument: float = 0.0) -> tuple[Message, ...]:
         """Return an available message as of now; ``argument`` is the second parameter of REQUEST_MESSAGE.
@@ -133,16 +166,20 @@ class Telemetry:
 
     def farewell(self) -> Message:
         """Return the final HEARTBEAT with MAV_STATE_POWEROFF, of the last status if the target is lost."""
-        last = self._status
         self.begin_poll()
         try:
             last = self.status
         except TargetError:
-            if last is None:
+            if self._last is None:
                 raise
+            last = self._last
         return vehicle.heartbeat(last, leaving=True)
 
     def _make(self, message_id: int) -> tuple[Message, ...]:
+        if message_id in self._hidden:
+            return ()
+        if message_id in MOTION:
+            return (self._read().message(self._packer.index[message_id]),)
         if message_id == FS_LOOP_TIMING_ID:
             return (self._loop_timing(),)
         return _of_status(self.status, message_id)
@@ -150,11 +187,8 @@ class Telemetry:
 
 def _of_status(f: VehicleStatus, message_id: int) -> tuple[Message, ...]:
     """Return a message that depends on the status alone."""
-    if f.sensed is not None:
-        if message_id in SENSED:
-            return SENSED[message_id](f, f.sensed)
-        if message_id in _GLOBAL and not f.sensed.has_origin:
-            return ()
+    if f.sensed is not None and message_id in SENSED:
+        return SENSED[message_id](f, f.sensed)
     if message_id == EscStatus.id and f.info.rotors > 4:  # one message holds four rotors
         return (motion.esc_status(f), motion.esc_status(f, 4))
     return (MAKERS[message_id](f),)
