@@ -86,3 +86,22 @@ def test_intervals_that_cannot_be(interval: float) -> None:
     assert not streams.set_interval(ATTITUDE, interval)
     assert not streams.set_interval(9999, 1e5)
     assert streams.interval_us(ATTITUDE) == 20_000
+
+
+def test_a_change_of_one_interval_leaves_the_others_due_as_before() -> None:
+    """Messages that are due together are looked at as one, until one of them is changed."""
+    changed = mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET
+    one, other = Streams(GROUND_RATES_HZ), Streams(GROUND_RATES_HZ)
+    alone = {number: Streams({number: rate_hz}) for number, rate_hz in GROUND_RATES_HZ.items()}
+    for tick in range(2000):
+        now_s = tick * 0.004
+        if tick == 701:
+            assert one.set_interval(changed, 30_000)
+            assert alone[changed].set_interval(changed, 30_000)
+        if tick == 1301:
+            assert one.set_interval(changed, 0)
+            assert alone[changed].set_interval(changed, 0)
+        sent = one.due(now_s, now_s)
+        assert sent == [number for number, stream in alone.items() if stream.due(now_s, now_s)]
+        expected = [number for number in other.due(now_s, now_s) if number != changed]
+        assert [number for number in sent if number != changed] == expected
