@@ -69,8 +69,8 @@ class Engine:
         self._wrap_loops = wrap_loops
         compile_helper.start(tasks=(compile_helper.GUIDANCE, _PLANT))
         self.stack = self._build()
-        self.simulator: Simulator = setup.simulator(vehicle_of(self.config))
-        self.simulator.set_interval_us(self.stack.rates.interval_us)
+        self._simulator: Simulator = setup.simulator(vehicle_of(self.config))
+        self._simulator.set_interval_us(self.stack.rates.interval_us)
         self._codec = Link(1, SIMULATOR_COMPONENT)
         self.actuators = ActuatorsFrame()
         self.machine_ns = 0
@@ -100,8 +100,8 @@ class Engine:
         """Ticks of the vehicle on the simulator's clock."""
         self._missed_us = self._next_timing_us = self._ticks = 0
         if self.stack.estimation is not None:
-            self.simulator.start_sensors(self.config.home)
-        self._quiet = QuietTicks(self.stack, self.lockstep, self.simulator, self.actuators)
+            self._simulator.start_sensors(self.config.home)
+        self._quiet = QuietTicks(self.stack, self.lockstep, self._simulator, self.actuators)
         self._endpoint.receive(memoryview(self.states()))
         self._now.has_state = self.was_ready = self.stack.estimation is None
 
@@ -109,6 +109,16 @@ class Engine:
         self.logs.append(LogBuffer(self._boot_us * 1e-6))
         self._open = FlightLog(self.logs[-1], len(self.stack.vehicle.rotors))
         return self._open
+
+    @property
+    def simulator(self) -> Simulator:
+        """The simulator, which has advanced after the newest tick."""
+        self.settle()
+        return self._simulator
+
+    @simulator.setter
+    def simulator(self, simulator: Simulator) -> None:
+        self._simulator = simulator
 
     @property
     def time_s(self) -> float:
@@ -180,9 +190,9 @@ class Engine:
             if self.tick():
                 return 1, True
             done = 1
-        count = min(most - done, self._left, self._quiet.count(self.simulator, self.actuators))
+        count = min(most - done, self._left, self._quiet.count(self._simulator, self.actuators))
         if count > 0:
-            count = self._quiet.run(self.simulator, self.actuators, count)
+            count = self._quiet.run(self._simulator, self.actuators, count)
             self._count(count, count)
             return done + count, self._ends_period()
         return done, False
@@ -207,7 +217,7 @@ class Engine:
         if not (self.owes_step and self._endpoint.answers_exactly):
             return 0
         self.owes_step = False
-        done = self._quiet.run_on(self.simulator, self.actuators, most)
+        done = self._quiet.run_on(self._simulator, self.actuators, most)
         if done:
             self._count(done, done)
         else:
@@ -218,7 +228,7 @@ class Engine:
         """Run an outer tick that exchanges no bytes, with the quiet ones that follow it; return their number, or 0."""
         if self._left or not self._endpoint.answers_exactly:
             return 0
-        done = self._quiet.run_periods(self.simulator, self.actuators, most)
+        done = self._quiet.run_periods(self._simulator, self.actuators, most)
         if done:
             self._count(done, done - 1)
         return done
@@ -241,7 +251,7 @@ class Engine:
     def advance(self) -> None:
         """Advance the simulator by one interval with the newest actuators, and send the stack its state."""
         self.owes_step = False
-        self.simulator.apply(self.actuators)
+        self._simulator.apply(self.actuators)
         self.machine_ns += self._interval_us * 1000
         if self.loses_states:
             self._missed_us += self._interval_us
@@ -250,7 +260,7 @@ class Engine:
 
     def _send_directly(self) -> bool:
         """Pass state and sensors to the stack without bytes; return False if there are further messages."""
-        simulator, link = self.simulator, self._endpoint
+        simulator, link = self._simulator, self._endpoint
         if not simulator.sends_state_alone or (simulator.sensors is None) is not (link.sensors is None):
             return False
         measurements = () if simulator.sensors is None else simulator.sensors.measurements
@@ -265,7 +275,7 @@ class Engine:
 
     def states(self) -> bytes | memoryview:
         """Return the bytes that the simulator sends for one step."""
-        return self.simulator.outgoing()
+        return self._simulator.outgoing()
 
     def take_answer(self, answer: bytes | memoryview) -> None:
         """Take the stack's actuators."""
@@ -276,18 +286,19 @@ class Engine:
         """Pass the vehicle's requests to the simulator, and the answers back."""
         requests = self.stack.simulator.take_requests()
         for request in self._codec.decode(requests) if requests else ():
-            result = inject_failure(self.simulator, request.param1, request.param2, request.param3)
+            result = inject_failure(self._simulator, request.param1, request.param2, request.param3)
             ack = mavlink.MAVLink_command_ack_message(request.command, result)
             self.stack.simulator.receive(memoryview(self._codec.encode(ack)))
 
     def power_cycle(self, off_s: float) -> None:
         """Switch the vehicle off for ``off_s`` and on again: rotors stop, plans and parameters survive."""
+        self.settle()
         old = self.stack
         old.recorder.close()
         self.actuators = ActuatorsFrame()  # all zero: disarmed
         steps_off = round(off_s * old.rates.inner_hz)
         for _ in range(steps_off):
-            self.simulator.apply(self.actuators)
+            self._simulator.apply(self.actuators)
         self._send_states(old.simulator)  # the new vehicle's clock begins here
         self._boot_us += old.now.time_us + steps_off * old.rates.interval_us
         old.loops.close()

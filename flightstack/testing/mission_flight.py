@@ -29,7 +29,7 @@ def fly_plan(world: World, plan: Plan, limit_s: float | None = None, step: Step 
     try:
         world.upload(plan)
         if limit_s is None:  # of an accepted plan: one with an idle loop never ends
-            limit_s = flight_limit_s(plan.items, world.setup.home, world.stack.now.behaviour)
+            limit_s = flight_limit_s(plan.items, world.setup.home, world.engine.stack.now.behaviour)
         await_state(world, step or world.run_on)
         world.arm()
         world.start_mission()
@@ -41,7 +41,7 @@ def fly_plan(world: World, plan: Plan, limit_s: float | None = None, step: Step 
 def await_state(world: World, step: Step) -> None:
     """Run until the vehicle may fly on its state, as one on sensors does after seconds, or for ``READY_S``."""
     end_s = world.time_s + READY_S
-    while not world.stack.is_ready and world.time_s < end_s and not step(0.0):
+    while not world.engine.stack.is_ready and world.time_s < end_s and not step(0.0):
         pass
 
 
@@ -56,7 +56,7 @@ def _flown(world: World, limit_s: float, step: Step) -> Outcome:
     """Fly to the end, and return to launch after a mission that ends in the air."""
     end_s = world.time_s + limit_s
     items, is_returning = world.plan.items, not ends_in_air(world.plan.items)
-    while (now := world.stack.now).status.armed:
+    while (now := world.engine.stack.now).status.armed:
         if world.time_s > end_s:
             return too_late(_view(world), items, limit_s)
         if not is_returning and now.mission_complete and now.status.mode is Mode.HOLD:
@@ -70,7 +70,7 @@ def _flown(world: World, limit_s: float, step: Step) -> Outcome:
 
 def _view(world: World) -> VehicleView:
     """Return the ground station's view with the true progress, which messages on a bad link may lack."""
-    now = world.stack.now
+    now = world.engine.stack.now
     progress = Mission(
         now.progress.current, now.mission_count, now.progress.reached,
         MISSION_COMPLETE if now.mission_complete else None,

@@ -101,8 +101,8 @@ class _Run:
             )
         end_s = scenario.duration_s or limit_s or _DEFAULT_LIMIT_S
         flew = False
-        while world.time_s < end_s and (world.stack.now.status.armed or not flew):
-            flew = flew or world.stack.now.status.armed
+        while world.time_s < end_s and (world.engine.stack.now.status.armed or not flew):
+            flew = flew or world.engine.stack.now.status.armed
             if self._step(end_s - world.time_s):
                 break
         return None

@@ -13,7 +13,6 @@ from flightstack.core.contract import Vector3
 from flightstack.core.enums import Mode
 from flightstack.core.geodesy import LocalFrame
 from flightstack.plan import MissionItem, MissionType, Plan
-from flightstack.process.assembly import Stack
 from flightstack.testing.client import Client, ConditionTimeoutError, RefusedError
 from flightstack.testing.engine import Engine
 from flightstack.testing.faults import apply_fault
@@ -92,31 +91,21 @@ class World:
             raise TypeError(f"give a setup or conditions, not both: {', '.join(conditions)}")
         self.setup = setup or Setup.of(conditions)
         self._telemetry = telemetry
-        self._engine = built(self.setup, make_engine)
+        self.engine = built(self.setup, make_engine)
+        """Flight stack and simulator; not part of the public interface."""
         self.events: list[Event] = []
         """Faults and changes of links, oldest first."""
         self.plan = Plan(())
         """The plan that was uploaded last."""
         self._network = Network(self.setup.seed)
         self._failsafes: tuple[Failsafe, ...] = ()
-        self._runner = EngineRunner(self._engine, self._network, self._note_failsafes)
+        self._runner = EngineRunner(self.engine, self._network, self._note_failsafes)
         self.gcs: Client = self.add_client(GROUND)
         """The ground station."""
         self.sender = self.gcs
         """The client that sends requests without another one, such as a companion while the ground station is cut."""
 
     # ------------------------------------------------------------------ parts
-
-    @property
-    def engine(self) -> Engine:
-        """Flight stack and simulator, which has advanced after the newest tick; not part of the public interface."""
-        self._engine.settle()
-        return self._engine
-
-    @property
-    def stack(self) -> Stack:
-        """The flight stack after the newest tick; not part of the public interface."""
-        return self._engine.stack
 
     @property
     def link(self) -> Link:
@@ -133,7 +122,7 @@ class World:
 
         ``system_id`` is by default the largest free one: 255 for the world's ground station, then 254, 253 and so on.
         """
-        return self._network.add(name, self.stack.ground, self._telemetry, is_companion, system_id)
+        return self._network.add(name, self.engine.stack.ground, self._telemetry, is_companion, system_id)
 
     @property
     def state(self) -> State:
@@ -153,7 +142,7 @@ class World:
     @property
     def time_s(self) -> float:
         """Simulated time since the start of the world [s]; a power cycle does not change it."""
-        return self._engine.time_s
+        return self.engine.time_s
 
     # ------------------------------------------------------------------ time
 
@@ -163,11 +152,11 @@ class World:
 
     def step(self) -> None:
         """Run for one period of the outer loop: the shortest time between two exchanges of messages."""
-        self._runner.run(self.stack.rates.divisor)
+        self._runner.run(self.engine.stack.rates.divisor)
 
     def run_for(self, seconds: float) -> None:
         """Run for ``seconds`` of simulated time."""
-        self._runner.run(round(seconds * self.stack.rates.inner_hz))
+        self._runner.run(round(seconds * self.engine.stack.rates.inner_hz))
 
     def run_on(self, most_s: float) -> None:
         """Run as ``step``, and on until there are messages to exchange, for ``most_s`` at most.
@@ -184,8 +173,10 @@ class World:
         the state after ``timeout_s`` of simulated time.
         """
         __tracebackhide__ = True
-        is_true, is_of_events = condition_of(condition, lambda: self.state, lambda: reported_by(self.stack))
-        rates = self.stack.rates
+        is_true, is_of_events = condition_of(
+            condition, lambda: self.state, lambda: reported_by(self.engine.stack)
+        )
+        rates = self.engine.stack.rates
         left = round(timeout_s * rates.outer_hz) * rates.divisor
         while not is_true():
             if left <= 0:
@@ -205,7 +196,7 @@ class World:
 
     def wait_until_ready(self, timeout_s: float = 60.0) -> None:
         """Run until the vehicle may fly on its state, as one on sensors does after seconds."""
-        self.run_until(lambda _: self.stack.is_ready, timeout_s)
+        self.run_until(lambda _: self.engine.stack.is_ready, timeout_s)
 
     def watch(self, callback: Callable[[], None], each_tick: Callable[[], bool] = lambda: True) -> None:
         """Call ``callback`` after every outer tick; while ``each_tick`` is False, after those with an event."""
@@ -216,7 +207,7 @@ class World:
         self._runner.after(seconds, callback)
 
     def _note_failsafes(self) -> None:
-        active = self.stack.parts.failsafes.active
+        active = self.engine.stack.parts.failsafes.active
         if active != self._failsafes:
             for failsafe in active:
                 if failsafe not in self._failsafes:
@@ -231,6 +222,7 @@ class World:
     def wait_for(self, request: Request, what: str) -> None:
         """Wait for the answer of a request; raise RefusedError."""
         __tracebackhide__ = True
+        self.engine.settle()
         hub, end_s = self.engine.stack.ground, self.time_s + _REQUEST_LIMIT_S
         while True:
             self._network.settle(hub, self.time_s)
@@ -263,6 +255,7 @@ class World:
 
     def _connected(self, client: Client | None = None) -> Client:
         """Return a client, by default ``sender``, once it knows the vehicle."""
+        self.engine.settle()
         client, end_s = client or self.sender, self.time_s + _CONNECT_LIMIT_S
         if client.session.view.identity is None:
             self._network.settle(self.engine.stack.ground, self.time_s)
@@ -390,7 +383,7 @@ class World:
 
     def flight(self, outcome: Outcome | None = None) -> Flight:
         """Return the newest flight from its log, up to now if it is not over; ``outcome`` is that of its mission."""
-        log = Log(self._engine.newest_log(), self._engine.newest_boot_s)
+        log = Log(self.engine.newest_log(), self.engine.newest_boot_s)
         flight = Flight(log, outcome, self.plan, self.setup, tuple(self.events))
         if outcome is None or not log:
             return flight
@@ -398,7 +391,7 @@ class World:
 
     def close(self) -> None:
         """Release the loops, which may run in a process."""
-        self._engine.close()
+        self.engine.close()
 
     def __enter__(self) -> World:
         return self
