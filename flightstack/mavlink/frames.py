@@ -34,6 +34,13 @@ def checksum(body: bytes, crc_extra: int) -> bytes:
     return crc16.mcrf4xx(b"%b%c" % (body, crc_extra)).to_bytes(CHECKSUM_SIZE, "little")
 
 
+def has_checksum(frame: bytes, start: int, crc_extra: int) -> bool:
+    """Return True if the checksum of a complete frame is right; its payload begins at ``start``."""
+    end = start + frame[1]
+    computed: int = crc16.mcrf4xx(b"%b%c" % (frame[1:end], crc_extra))
+    return computed == frame[end] | frame[end + 1] << 8
+
+
 def pack_frame(
     message_id: int, payload: bytes, crc_extra: int, sequence: int, system_id: int, component_id: int
 ) -> bytes:
@@ -122,13 +129,13 @@ def checked(data: bytes) -> Frame | None:
     Unknown messages are accepted in version 2 only, where two more header bytes must match.
     """
     message_id = message_id_of(data)
-    end = (HEADER_V1 if data[0] == MAGIC_V1 else HEADER_V2) + data[1]
+    start = HEADER_V1 if data[0] == MAGIC_V1 else HEADER_V2
     kind = mavlink.mavlink_map.get(message_id)
     if data[0] == MAGIC_V1 and (kind is None or data[1] > kind.unpacker.size):
         return None  # one in 256 noise bytes starts such a frame: only a checksum can confirm it
     if kind is None:
         return Frame(data, message_id, known=False)
-    if checksum(data[1:end], kind.crc_extra) != data[end : end + CHECKSUM_SIZE]:
+    if not has_checksum(data, start, kind.crc_extra):
         return None
     return Frame(data, message_id, known=True)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
-from flightstack.mavlink.decoding import decoded
+from flightstack.mavlink.decoding import received
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.fields import PACKING_ERRORS, TEXT_FIELDS, clean, fit
+from flightstack.mavlink.fields import PACKING_ERRORS, fit
 from flightstack.mavlink.frames import (
     CHECKSUM_SIZE,
     HEADER_V2,
@@ -15,7 +15,7 @@ from flightstack.mavlink.frames import (
     MAGIC_V2,
     Frame,
     FrameReader,
-    message_id_of,
+    has_checksum,
     pack_frame,
 )
 from flightstack.mavlink.packed import PackedMessage
@@ -119,21 +119,33 @@ class Link:
         return self._reader.has_partial
 
     def decode(self, data: bytes) -> Iterator[Message]:
-        """Yield the messages that ``data`` completes; count other bytes in ``bad``.
+        """Return the messages that ``data`` completes; count other bytes in ``bad``.
 
-        ``get_msgbuf()`` returns the received frame. Text fields are safe to print.
+        ``get_msgbuf()`` returns the received frame. Fields are decoded when one of them is read. Text fields are safe
+        to print.
         """
-        if self._is_one_frame(data):  # typical datagram: no search for frames
-            message = self._message(data)
-            if message is not None:
-                yield message
-            return
+        kind = self._kind_of_one(data)
+        if kind is None:
+            return self._stream(data)
+        message = self._message(data, kind, is_checked=False)  # typical datagram: no search for frames
+        return iter(() if message is None else (message,))
+
+    def _kind_of_one(self, data: bytes) -> Any:
+        """Return the class of the message if ``data`` is exactly one known, unsigned frame and none is incomplete."""
+        payload_size = len(data) - HEADER_V2 - CHECKSUM_SIZE
+        if payload_size < 0 or data[0] != MAGIC_V2 or data[2] != 0:
+            return None
+        if data[1] != payload_size or self._reader.has_partial:
+            return None
+        return mavlink.mavlink_map.get(data[7] | data[8] << 8 | data[9] << 16)
+
+    def _stream(self, data: bytes) -> Iterator[Message]:
         faults_before = self._reader.faults
         frames = self._reader.feed(data)
         self.bad += self._reader.faults - faults_before
         for frame in frames:
             if frame.known:
-                message = self._message(frame.data)
+                message = self._message(frame.data, mavlink.mavlink_map[frame.message_id], is_checked=True)
                 if message is not None:
                     yield message
             else:
@@ -141,37 +153,14 @@ class Link:
                 if self._keeps_unknown and (self._signing is None or self._signing.accepts(frame.data)):
                     yield _unknown(frame)
 
-    def _message(self, frame: bytes) -> Message | None:
-        """Decode one known frame; return None for a wrong checksum or signature."""
-        if self._signing is not None and not self._signing.accepts(frame):
-            self.bad += 1
-            return None
-        kind = mavlink.mavlink_map[message_id_of(frame)]
-        texts = TEXT_FIELDS[kind]
-        message = self._decoded_text(frame, texts) if texts else decoded(frame, kind)
-        if message is None:
+    def _message(self, frame: bytes, kind: Any, *, is_checked: bool) -> Message | None:
+        """Return the message in a known frame; None for a wrong signature or, unless checked, a wrong checksum."""
+        is_accepted = self._signing is None or self._signing.accepts(frame)
+        if not (is_accepted and (is_checked or has_checksum(frame, HEADER_V2, kind.crc_extra))):
             self.bad += 1
             return None
         self.received += 1
-        return message
-
-    def _decoded_text(self, frame: bytes, names: tuple[str, ...]) -> Message | None:
-        try:
-            message = self._codec.decode(bytearray(frame))
-        except mavlink.MAVError:
-            return None
-        for name in names:  # the frame keeps the bytes as they came
-            setattr(message, name, clean(getattr(message, name)))
-        return message
-
-    def _is_one_frame(self, data: bytes) -> bool:
-        """Return True if ``data`` is exactly one known, unsigned frame and no incomplete frame is held."""
-        payload_size = len(data) - HEADER_V2 - CHECKSUM_SIZE
-        if payload_size < 0 or data[0] != MAGIC_V2 or data[2] != 0:
-            return False
-        if data[1] != payload_size or self.has_partial:
-            return False
-        return message_id_of(data) in mavlink.mavlink_map
+        return received(frame, kind)
 
 
 def is_unknown(message: Message) -> bool:

@@ -73,12 +73,8 @@ def test_silent_messages_are_known():
 
 def test_sources_are_sorted_and_named():
     history = recorded()
-    camera = attitude(0.0)
-    camera._header.srcSystem, camera._header.srcComponent = 1, 100
-    other = attitude(0.0)
-    other._header.srcSystem, other._header.srcComponent = 2, 66
-    history.record(other, 1.0)
-    history.record(camera, 1.0)
+    history.record(attitude(0.0, 2, 66), 1.0)
+    history.record(attitude(0.0, 1, 100), 1.0)
     names = list(dict.fromkeys(source_name(row.key) for row in message_rows(history, END_S)))
     assert names == ["1 AUTOPILOT1", "1 CAMERA", "2 USER42"]
 

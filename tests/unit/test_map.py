@@ -226,9 +226,7 @@ def position(north_m: float, system: int = 1, hdg: int = 65535):
     message = mavlink.MAVLink_global_position_int_message(
         0, round(geo.latitude_deg * 1e7), round(geo.longitude_deg * 1e7), 0, 0, 0, 0, 0, hdg
     )
-    message = received(message)
-    message._header.srcSystem = system
-    return message
+    return received(message, system)
 
 
 def test_model_shows_setpoint_relative_to_the_vehicle():

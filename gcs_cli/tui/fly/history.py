@@ -5,8 +5,8 @@ Written by the thread of the link, read by the screens.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from operator import itemgetter
+from collections.abc import Callable, Iterator, Sequence
+from operator import attrgetter
 from struct import Struct
 from threading import Lock
 from typing import Any, NamedTuple
@@ -48,7 +48,7 @@ class Stream:
         self.last = message
         self.count = 0
         plain, self._lists, self.fields = _numeric_fields(message)
-        self._plain: Callable[[Mapping[str, Any]], tuple[float, ...]] = _getter(plain)
+        self._plain: Callable[[Message], tuple[float, ...]] = _getter(plain)
         self._row = Struct(f"{1 + len(self.fields)}d")
         self._rows = np.empty((_FIRST_ROWS, 1 + len(self.fields)))
 
@@ -59,10 +59,9 @@ class Stream:
             grown = np.empty((min(ROWS_KEPT, 2 * len(self._rows)), self._rows.shape[1]))
             grown[: len(self._rows)] = self._rows
             self._rows = grown
-        values = message.__dict__
-        row = self._plain(values)
+        row = self._plain(message)
         for name, size in self._lists:
-            listed = values[name]
+            listed = getattr(message, name)
             row += tuple(listed) if len(listed) == size else (np.nan,) * size
         self._row.pack_into(self._rows.data, at * self._row.size, now_s, *row)
         self.last = message
@@ -90,11 +89,11 @@ class Stream:
         return 0.0 if is_stopped or period_s <= 0.0 else 1.0 / period_s
 
 
-def _getter(names: Sequence[str]) -> Callable[[Mapping[str, Any]], tuple[Any, ...]]:
-    """Return a function that looks up the values of ``names``."""
+def _getter(names: Sequence[str]) -> Callable[[Message], tuple[Any, ...]]:
+    """Return a function that reads the fields ``names`` of a message."""
     if len(names) > 1:
-        return itemgetter(*names)
-    return lambda values: tuple(values[name] for name in names)
+        return attrgetter(*names)
+    return lambda message: tuple(getattr(message, name) for name in names)
 
 
 def _numeric_fields(message: Message) -> tuple[list[str], list[tuple[str, int]], list[str]]:
@@ -129,9 +128,9 @@ class History:
 
     def record(self, message: Message, now_s: float) -> None:
         """Record a message, received at ``now_s``."""
-        header, instance_name = message.get_header(), message.instance_field
+        instance_name = message.instance_field
         instance = None if instance_name is None else getattr(message, instance_name)
-        key = (header.srcSystem, header.srcComponent, header.msgId, instance)
+        key = (message.get_srcSystem(), message.get_srcComponent(), message.get_msgId(), instance)
         with self._lock:
             stream = self._streams.get(key)
             if stream is None or stream.last.__class__ is not message.__class__:
