@@ -53,6 +53,8 @@ class Link:
         self.received = 0
         self.sent = 0
         self.bad = 0
+        self.unknown = 0
+        """Messages unknown to the dialect that ``decode`` has yielded; they count as bad too."""
 
     def encode(self, message: Message) -> bytes:
         """Return the frame of ``message`` with this link's next sequence number.
@@ -151,6 +153,7 @@ class Link:
             else:
                 self.bad += 1
                 if self._keeps_unknown and (self._signing is None or self._signing.accepts(frame.data)):
+                    self.unknown += 1
                     yield _unknown(frame)
 
     def _message(self, frame: bytes, kind: Any, *, is_checked: bool) -> Message | None:

@@ -31,29 +31,38 @@ class Wire:
         self.own = Address(own_system, COMPONENT_ID)
         """System and component of this side."""
         self.record = record
-        self.bad = 0
-        """Bytes and frames that are no valid messages."""
         self._signing = signing
+        self._bad_before = 0
+        """Those of decoders that were dropped."""
         self._decoders: dict[Peer, Link] = {}
         self._encoders: dict[Peer | None, Link] = {}
 
+    @property
+    def bad(self) -> int:
+        """Bytes and frames that are no valid messages."""
+        return self._bad_before + sum(link.bad - link.unknown for link in self._decoders.values())
+
     def decode(self, data: bytes, peer: Peer) -> Iterator[Message]:
         """Yield the authentic messages in a datagram, those unknown to the dialect too."""
+        link = self._decoders.get(peer) or self._new_decoder(peer)
+        messages = link.decode(data)
+        return messages if self._signing is None and self.record is None else self._recorded(messages, link)
+
+    def _new_decoder(self, peer: Peer) -> Link:
         if len(self._decoders) > _MOST_PEERS:
+            self._bad_before = self.bad
             self._decoders.clear()
-        link = self._decoders.get(peer)
-        if link is None:
-            link = self._decoders[peer] = Link(*self.own, keeps_unknown=True, signing=self._signing)
-        bad_before = link.bad
-        for message in link.decode(data):
-            if is_unknown(message):
-                bad_before += 1
+        self._decoders[peer] = Link(*self.own, keeps_unknown=True, signing=self._signing)
+        return self._decoders[peer]
+
+    def _recorded(self, messages: Iterator[Message], link: Link) -> Iterator[Message]:
+        """Yield and record the authentic messages."""
+        for message in messages:
             if not link.is_authentic(message):
                 continue
             if self.record is not None:
                 self._record_received(message, self.record)
             yield message
-        self.bad += link.bad - bad_before
 
     @staticmethod
     def _record_received(message: Message, record: Callable[[bytes], None]) -> None:
