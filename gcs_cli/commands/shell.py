@@ -126,8 +126,9 @@ def _interact(runner: _Runner, connection: Connection) -> int:
     with _line_editing(runner.command):
         while True:
             try:
+                prompt = _prompt(connection)  # before another thread uses the connection
                 with kept_alive(connection):
-                    line = input(_prompt(connection))
+                    line = input(prompt)
             except EOFError:
                 print()
                 return DONE

@@ -116,7 +116,7 @@ def _print_once(connection: Connection, screen: str) -> None:
     feed = Feed(connection)
 
     def is_full() -> bool:
-        view = connection.session.view
+        view = feed.view
         known = (
             view.attitude,
             view.position_ned_m,

@@ -14,7 +14,7 @@ from flightstack.transports.udp import Address
 from gcs_cli.link.quality import LinkMonitor, LinkQuality
 from gcs_cli.link.subscription import Subscription
 from gcs_cli.link.wire import SYSTEM_ID, Wire
-from gcs_cli.vehicle.vehicle_view import update
+from gcs_cli.vehicle.view_builder import ViewBuilder, update
 from gcs_cli.vehicle.view_types import VehicleView
 
 HEARTBEAT_PERIOD_S = 1.0
@@ -57,7 +57,7 @@ class Session:
         wire: Wire | None = None,
         monitors: bool = False,
     ) -> None:
-        self.view = VehicleView()
+        self._builder = ViewBuilder(VehicleView())
         self.peer = peer
         self.observe: Callable[[Message], None] | None = None
         """Called with every message from the vehicle's system."""
@@ -67,13 +67,23 @@ class Session:
         self._heartbeat_type = heartbeat_type
         self.service: Service | None = None
         """The service that exchanges messages with the vehicle, besides the attached ones."""
-        self._subscription = Subscription(lambda: self.view, {})
-        self._monitor = LinkMonitor(lambda: self.view.link)
+        self._subscription = Subscription(lambda: self._builder.identity, {})
+        self._monitor = LinkMonitor(lambda: self._builder.link)
+        self._monitors = monitors
         self._background: list[Service] = [self._monitor] if monitors else []
         self._services: tuple[Service, ...] = ()
         self._collect_services()
         self._heartbeat_due_s = 0.0
         self._heartbeat_due_vehicle_s = -math.inf  # as soon as the vehicle's time is known
+
+    @property
+    def view(self) -> VehicleView:
+        """The state of the vehicle, which is built when it is read; for the thread that receives."""
+        return self._builder.view
+
+    @view.setter
+    def view(self, view: VehicleView) -> None:
+        self._builder = ViewBuilder(view)
 
     @property
     def own(self) -> Component:
@@ -83,7 +93,7 @@ class Session:
     @property
     def target(self) -> tuple[int, int]:
         """System and component of the vehicle; (0, 0), broadcast, before its first heartbeat."""
-        identity = self.view.identity
+        identity = self._builder.identity
         return (_BROADCAST, _BROADCAST) if identity is None else (identity.system_id, identity.component_id)
 
     @property
@@ -111,13 +121,13 @@ class Session:
 
     def subscribe(self, rates_hz: Mapping[int, float]) -> None:
         """Request messages from the vehicle, id -> rate [Hz], instead of those of an earlier call."""
-        self._subscription = Subscription(lambda: self.view, rates_hz)
+        self._subscription = Subscription(lambda: self._builder.identity, rates_hz)
         self._collect_services()
 
     def keep_vehicle(self) -> None:
         """Accept no other vehicle from now on, even if this one is lost."""
-        assert self.view.identity is not None
-        self._system_id = self.view.identity.system_id
+        assert self._builder.identity is not None
+        self._system_id = self._builder.identity.system_id
 
     def use(self, service: Service | None) -> None:
         """Replace the service that exchanges messages with the vehicle."""
@@ -140,11 +150,12 @@ class Session:
 
     def is_heard(self, now_s: float) -> bool:
         """Return True if the vehicle is connected: it was heard, and its heartbeat has not timed out."""
-        return self.peer is not None and self.view.identity is not None and not self.view.lost(now_s)
+        builder = self._builder
+        return self.peer is not None and builder.identity is not None and not builder.is_lost(now_s)
 
     def receive(self, data: bytes, peer: Address, now_s: float) -> None:
         """Process a datagram."""
-        if self._only_peer not in (None, peer) or (self.is_heard(now_s) and peer != self.peer):
+        if self._only_peer not in (None, peer) or (peer != self.peer and self.is_heard(now_s)):
             return
         for message in self.wire.decode(data, peer):
             self.take(message, peer, now_s)
@@ -156,26 +167,21 @@ class Session:
                 return
         elif not self._is_vehicle(message, peer, now_s):
             return
-        self.view = update(self.view, message, now_s)
+        is_own = self._builder.add(message, now_s)
         if self.observe is not None:
             self.observe(message)
-        if not self._is_other_system(message):
+        if is_own:
             for service in self._services:
                 service.receive(message, now_s)
-            self._note_quality()
-
-    def _note_quality(self) -> None:
-        """Keep the newest round trip and loss in the view, which the screens draw."""
-        link, monitor = self.view.link, self._monitor
-        if link.round_trip_s != monitor.round_trip_s or link.recent_loss != monitor.loss:
-            noted = link._replace(round_trip_s=monitor.round_trip_s, recent_loss=monitor.loss)
-            self.view = self.view._replace(link=noted)
+            if self._monitors:
+                self._builder.note_quality(self._monitor.round_trip_s, self._monitor.loss)
 
     def _is_vehicle(self, message: Message, peer: Address, now_s: float) -> bool:
         """Return True if the message is from our vehicle; without one, accept the first autopilot's heartbeat."""
-        if self.view.identity is not None and peer == self.peer and not self._is_other_system(message):
+        is_own = (message.get_srcSystem(), message.get_srcComponent()) == self.target
+        if is_own and self._builder.identity is not None and peer == self.peer:
             return True
-        candidate = VehicleView() if self._is_other_system(message) else self.view
+        candidate = self.view if is_own else VehicleView()
         if update(candidate, message, now_s).last_heartbeat_s != now_s:
             return False
         if self._system_id not in (None, message.get_srcSystem()):
@@ -183,11 +189,6 @@ class Session:
         self.view, self.peer = candidate, peer
         self._heartbeat_due_s = now_s
         return True
-
-    def _is_other_system(self, message: Message) -> bool:
-        header, identity = message.get_header(), self.view.identity
-        target = (_BROADCAST, _BROADCAST) if identity is None else identity[:2]
-        return (header.srcSystem, header.srcComponent) != target
 
     def disconnect(self) -> None:
         """Accept the vehicle from any peer: its connection was closed."""
@@ -198,7 +199,7 @@ class Session:
 
         After ``disconnect`` nothing can be sent, but services still notice the loss of the vehicle and their timeouts.
         """
-        if self.peer is None and self.view.identity is None:
+        if self.peer is None and self._builder.identity is None:
             return []
         frames = []
         if self.peer is not None and self.heartbeat_is_due(now_s):
@@ -211,7 +212,7 @@ class Session:
 
     def heartbeat_is_due(self, now_s: float) -> bool:
         """Return True if the next ``poll`` sends a heartbeat."""
-        vehicle_s = self.view.time_s
+        vehicle_s = self._builder.time_s
         return now_s >= self._heartbeat_due_s or (
             vehicle_s is not None and vehicle_s >= self._heartbeat_due_vehicle_s
         )
@@ -219,13 +220,13 @@ class Session:
     def skip_heartbeat(self, now_s: float) -> None:
         """Send the next heartbeat one period from now: the peer just got one."""
         self._heartbeat_due_s = now_s + HEARTBEAT_PERIOD_S
-        vehicle_s = self.view.time_s
+        vehicle_s = self._builder.time_s
         if vehicle_s is not None:
             self._heartbeat_due_vehicle_s = vehicle_s + HEARTBEAT_PERIOD_S
 
     def next_deadline(self) -> float | None:
         """Return the time at which to call ``poll`` at the latest; None without a vehicle."""
-        if self.peer is None and self.view.identity is None:
+        if self.peer is None and self._builder.identity is None:
             return None
         due_s = [service.next_deadline() for service in self._services]
         due_s.append(None if self.peer is None else self._heartbeat_due_s)

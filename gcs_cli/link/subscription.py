@@ -9,7 +9,8 @@ from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
 from flightstack.mavlink.link import Address, Message, is_for, is_from
 from gcs_cli.autopilots import common_commands
 from gcs_cli.autopilots.autopilot import Autopilot
-from gcs_cli.vehicle.view_types import VehicleView
+from gcs_cli.autopilots.registry import autopilot_of
+from gcs_cli.vehicle.view_types import Identity, VehicleView
 
 RETRY_S = 1.0
 """Time after which a request without an answer is sent again."""
@@ -28,12 +29,12 @@ _OF_GROUPS = int(mavlink.MAVLINK_MSG_ID_ATTITUDE)
 class Subscription:
     """Requests streams one after the other, and again if they stop. A refused stream is not requested again.
 
-    ``view`` returns the state of the vehicle. Besides ``rates_hz`` (message id -> rate), the streams that its
+    ``identity`` returns that of the vehicle. Besides ``rates_hz`` (message id -> rate), the streams that its
     autopilot does not send until asked are requested.
     """
 
-    def __init__(self, view: Callable[[], VehicleView], rates_hz: Mapping[int, float]) -> None:
-        self._view = view
+    def __init__(self, identity: Callable[[], Identity | None], rates_hz: Mapping[int, float]) -> None:
+        self._identity = identity
         self._wanted_hz = rates_hz
         self._vehicle = (0, 0)
         self._rates_hz: Mapping[int, float] = {}
@@ -58,10 +59,10 @@ class Subscription:
 
     def poll(self, now_s: float) -> list[Message]:
         """Return the requests to send now, if any."""
-        identity = self._view().identity
+        identity = self._identity()
         vehicle = (0, 0) if identity is None else identity[:2]
         if vehicle != self._vehicle:  # a new vehicle may accept requests that the former one refused
-            self._begin(vehicle, self._view().autopilot, now_s)
+            self._begin(vehicle, autopilot_of(0 if identity is None else identity.autopilot), now_s)
         if vehicle == (0, 0):
             return []
         return [*self._group_requests(now_s), *self._message_request(now_s)]

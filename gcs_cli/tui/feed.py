@@ -75,20 +75,21 @@ class Feed:
         self._running: dict[int, _Running] = {}
         self.rates_hz: dict[int, float] = dict(ROTORS_AND_TIMING)
         self._is_stopping = False
+        self._shown: tuple[VehicleView, tuple[VehicleView, ...]] = (VehicleView(), ())
+        """State of the selected vehicle, and of all, after the last step of the link."""
         self._wake = threading.Event()
         """Ends the wait for a batch."""
         self._thread: threading.Thread | None = None
 
     @property
     def view(self) -> VehicleView:
-        """State of the selected vehicle."""
-        return self.connection.session.view
+        """State of the selected vehicle after the last step of the link."""
+        return self._shown[0]
 
     @property
     def views(self) -> tuple[VehicleView, ...]:
-        """States of all vehicles on the link, by system id."""
-        sessions = tuple(self.connection.fleet.sessions.values())
-        return tuple(sorted((session.view for session in sessions), key=lambda view: view.identity or ()))
+        """States of all vehicles on the link after its last step, by system id."""
+        return self._shown[1]
 
     @property
     def targets(self) -> tuple[VehicleView, ...]:
@@ -112,6 +113,7 @@ class Feed:
         self.connection.on_step = self._serve
         self.connection.fleet.subscribe(self.rates_hz)
         self.connection.fleet.keep()
+        self._show()
         self._thread = threading.Thread(target=self._run, name="link", daemon=True)
         self._thread.start()
 
@@ -175,7 +177,7 @@ class Feed:
             self._observe_traffic(message, now_s)
 
     def _observe_traffic(self, message: Message, now_s: float) -> None:
-        view = self.view
+        view = self.connection.session.view
         self.traffic.record(message, now_s, casts_parameters=view.autopilot.casts_parameters)
         if view.identity is not None and view.identity.system_id == message.get_srcSystem():
             request = self.traffic.own_address_request(message, now_s)
@@ -204,6 +206,7 @@ class Feed:
 
         Raise CliError in a job that has to end.
         """
+        self._show()
         while self._calls:
             self._calls.popleft()()
         for view in self.views:
@@ -212,6 +215,12 @@ class Feed:
             self._follow(system_id)
         if self.is_stopping and self._job is not None and not self._job.ends_in_order:
             raise CliError("interrupted")
+
+    def _show(self) -> None:
+        """Build the views that the screens read."""
+        sessions = self.connection.fleet.sessions.values()
+        views = sorted((session.view for session in sessions), key=lambda view: view.identity or ())
+        self._shown = self.connection.session.view, tuple(views)
 
     def _execute(self, job: _Job) -> None:
         if not job.future.set_running_or_notify_cancel():

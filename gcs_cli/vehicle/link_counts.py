@@ -42,43 +42,80 @@ class LinkCounts(NamedTuple):
         return self.received / total if total else None
 
 
-class _Sequence(NamedTuple):
-    """The counts of ``LinkCounts`` that follow from sequence numbers."""
+class LinkCounter:
+    """Counts the messages of a vehicle; ``counts`` is made when it is read."""
 
-    lost: int
-    last_sequence: int | None
-    missing: int
-    stray: int | None
+    __slots__ = (
+        "_counts", "_last_received_s", "_last_sequence", "_lost", "_missing", "_quality", "_rate_hz", "_received",
+        "_stray", "_window_count", "_window_start_s",
+    )  # fmt: skip
 
+    def __init__(self, counts: LinkCounts) -> None:
+        """Continue from ``counts``."""
+        self._counts: LinkCounts | None = counts
+        self._received, self._lost = counts.received, counts.lost
+        self._last_sequence, self._last_received_s = counts.last_sequence, counts.last_received_s
+        self._rate_hz = counts.rate_hz
+        self._window_start_s, self._window_count = counts.window_start_s, counts.window_count
+        self._quality = counts.round_trip_s, counts.recent_loss
+        self._missing, self._stray = counts.missing, counts.stray
 
-def _following(link: LinkCounts, sequence: int, now_s: float) -> _Sequence:
-    """Return the counts of losses after a message with this sequence number."""
-    lost, last, missing, stray = link.lost, link.last_sequence, link.missing, link.stray
-    if last is None or link.last_received_s is None or now_s - link.last_received_s > _SILENCE_S:
-        return _Sequence(lost, sequence, 0, None)
-    late = (last - sequence) % 256
-    if late == 0:  # repeated
-        return _Sequence(lost, last, missing, stray)
-    begins_anew = stray is not None and sequence == (stray + 1) % 256
-    if late <= _MOST_LATE and not begins_anew:
-        if missing >> late & 1:  # overtaken by later ones, which counted it as lost
-            return _Sequence(lost - 1, last, missing ^ 1 << late, stray)
-        return _Sequence(lost, last, missing, sequence)  # repeated, or of a sender that began anew
-    gap = (sequence - last - 1) % 256
-    if begins_anew or gap > _LARGEST_GAP:
-        return _Sequence(lost, sequence, 0, None)
-    return _Sequence(lost + gap, sequence, (missing << gap + 1 | (1 << gap + 1) - 2) & _ALL_LATE, None)
+    @property
+    def counts(self) -> LinkCounts:
+        """The counts now."""
+        if self._counts is None:
+            self._counts = LinkCounts(
+                self._received, self._lost, self._last_sequence, self._last_received_s, self._rate_hz,
+                self._window_start_s, self._window_count, *self._quality, self._missing, self._stray,
+            )  # fmt: skip
+        return self._counts
 
+    def note_quality(self, round_trip_s: float | None, recent_loss: float | None) -> None:
+        """Keep the newest round trip and loss, which are measured elsewhere."""
+        if self._quality != (round_trip_s, recent_loss):
+            self._quality = round_trip_s, recent_loss
+            self._counts = None
 
-def counted(link: LinkCounts, sequence: int, now_s: float) -> LinkCounts:
-    """Return the counts after a message with this sequence number."""
-    start, count, rate, last = link.window_start_s, link.window_count + 1, link.rate_hz, link.last_received_s
-    if start is None or last is None or (rate is None and now_s == start):
-        start, count = now_s, 0  # read at once with the first message: a backlog has no rate
-    elif now_s != last and last - start >= _RATE_WINDOW_S:  # messages read at one time belong to one window
-        start, count, rate = last, 1, link.window_count / (last - start)
-    lost, last_sequence, missing, stray = _following(link, sequence, now_s)
-    measured = link.round_trip_s, link.recent_loss
-    return LinkCounts(
-        link.received + 1, lost, last_sequence, now_s, rate, start, count, *measured, missing, stray
-    )
+    def count(self, sequence: int, now_s: float) -> None:
+        """Count a message with this sequence number."""
+        start_s, last_s = self._window_start_s, self._last_received_s
+        self._window_count += 1
+        if start_s is None or last_s is None or (self._rate_hz is None and now_s == start_s):
+            # read at once with the first message: a backlog has no rate
+            self._window_start_s, self._window_count = now_s, 0
+        elif now_s != last_s and last_s - start_s >= _RATE_WINDOW_S:
+            # messages read at one time belong to one window
+            self._rate_hz = (self._window_count - 1) / (last_s - start_s)
+            self._window_start_s, self._window_count = last_s, 1
+        self._follow(sequence, last_s is None or now_s - last_s > _SILENCE_S)
+        self._received += 1
+        self._last_received_s = now_s
+        self._counts = None
+
+    def _follow(self, sequence: int, begins: bool) -> None:
+        """Count the losses before a message; ``begins``: the first one, also after a silence."""
+        last, stray = self._last_sequence, self._stray
+        if last is None or begins:
+            self._begin(sequence)
+            return
+        late = (last - sequence) % 256
+        if late == 0:  # repeated
+            return
+        begins_anew = stray is not None and sequence == (stray + 1) % 256
+        if late <= _MOST_LATE and not begins_anew:
+            if self._missing >> late & 1:  # overtaken by later ones, which counted it as lost
+                self._lost -= 1
+                self._missing ^= 1 << late
+            else:
+                self._stray = sequence  # repeated, or of a sender that began anew
+            return
+        gap = 255 - late
+        if begins_anew or gap > _LARGEST_GAP:
+            self._begin(sequence)
+            return
+        self._lost += gap
+        self._missing = (self._missing << gap + 1 | (1 << gap + 1) - 2) & _ALL_LATE
+        self._last_sequence, self._stray = sequence, None
+
+    def _begin(self, sequence: int) -> None:
+        self._last_sequence, self._missing, self._stray = sequence, 0, None

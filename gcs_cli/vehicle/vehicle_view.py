@@ -1,4 +1,4 @@
-"""Fold MAVLink messages into a ``VehicleView``. Pure; invalid values on the wire never raise."""
+"""What the messages of a vehicle change in its ``VehicleView``. Pure; invalid values on the wire never raise."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.portable_math import euler_angles
 from flightstack.mavlink.dialect import NAME_IN_VERSION, mavlink
 from gcs_cli.vehicle import mission_fold
-from gcs_cli.vehicle.link_counts import counted
-from gcs_cli.vehicle.status_texts import add_piece, without_stale_piece
+from gcs_cli.vehicle.status_texts import add_piece
 from gcs_cli.vehicle.view_types import (
     AvailableMode,
     Battery,
@@ -20,7 +19,6 @@ from gcs_cli.vehicle.view_types import (
     Euler,
     GeoPosition,
     Gnss,
-    Identity,
     LoopTiming,
     Mission,
     Setpoint,
@@ -29,7 +27,6 @@ from gcs_cli.vehicle.view_types import (
     view_with,
 )
 
-_NO_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID: a ground station, a camera …
 _ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 _IGNORE_POSITION, _IGNORE_VELOCITY, _IGNORE_YAW = 0b111, 0b111000, 1 << 10  # POSITION_TARGET_TYPEMASK
 _SEA_LEVEL_FRAMES = (0, 5)  # MAV_FRAME_GLOBAL and its twin for integers
@@ -39,8 +36,6 @@ _PREARM_CHECK = 1 << 28  # MAV_SYS_STATUS_PREARM_CHECK: no sensor
 _MOST_ROTORS = 16
 _STANDARD = "MAV_STANDARD_MODE_"
 _NOT_SELECTABLE = 2  # MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
-_RESTART_S = 0.25
-"""Step back of the vehicle's clock that no reordering of datagrams explains."""
 _ATTITUDE, _VELOCITY, _POSITION, _ALTITUDE = 1, 0b110, 1 << 4, 1 << 5
 """Flags of ESTIMATOR_STATUS and EKF_STATUS_REPORT."""
 
@@ -51,35 +46,6 @@ SENSOR_NAMES = {
     if bit.bit_count() == 1 and bit not in (_PREARM_CHECK, mavlink.MAV_SYS_STATUS_EXTENSION_USED)
 }
 """Names of the sensors in SYS_STATUS, by bit."""
-
-
-def update(view: VehicleView, message: Any, now_s: float) -> VehicleView:
-    """Return ``view`` after ``message``, received at ``now_s``; messages of others are ignored.
-
-    The first heartbeat of an autopilot selects the vehicle.
-    """
-    if view.identity is None:
-        if message.get_type() != "HEARTBEAT" or message.autopilot == _NO_AUTOPILOT:
-            return view
-        sender = Identity(
-            message.get_srcSystem(), message.get_srcComponent(), message.type, message.autopilot
-        )
-        view = view._replace(identity=sender)
-    elif (message.get_srcSystem(), message.get_srcComponent()) != view.identity[:2]:
-        return view
-    if view.partial_text is not None:
-        view = view_with(view, without_stale_piece(view, now_s))
-    fold = FOLDS.get(message.get_type())
-    changes: Changes = {} if fold is None else fold(view, message, now_s)
-    if _is_restarted(view.time_s, changes.get("time_s")):
-        changes = {"timing": None, **changes, "restarts": view.restarts + 1}
-    changes["link"] = counted(view.link, message.get_seq(), now_s)
-    return view_with(view, changes)
-
-
-def _is_restarted(before_s: float | None, after_s: float | None) -> bool:
-    """Return True if the vehicle's clock went back."""
-    return before_s is not None and after_s is not None and after_s <= before_s - _RESTART_S
 
 
 def _number(value: float) -> float | None:
@@ -162,7 +128,7 @@ def _system(view: VehicleView, message: Any, _now_s: float) -> Changes:
     return changes
 
 
-def _fence(view: VehicleView, message: Any, _now_s: float) -> Changes:
+def _fence(message: Any) -> Changes:
     return {"fence_breached": bool(message.breach_status)}
 
 
@@ -173,13 +139,13 @@ def _battery(view: VehicleView, message: Any, _now_s: float) -> Changes:
     return {"battery": view.battery._replace(time_remaining_s=message.time_remaining or None)}
 
 
-def _gnss(view: VehicleView, message: Any, _now_s: float) -> Changes:
+def _gnss(message: Any) -> Changes:
     satellites = None if message.satellites_visible == 255 else message.satellites_visible
     hdop = None if message.eph == 65535 else message.eph / 100
     return {"gnss": Gnss(message.fix_type, satellites, hdop, message.h_acc / 1e3 or None)}
 
 
-def _estimator_status(view: VehicleView, message: Any, _now_s: float) -> Changes:
+def _estimator_status(message: Any) -> Changes:
     ratios = (message.vel_ratio, message.pos_horiz_ratio, message.pos_vert_ratio, message.mag_ratio)
     horizontal_m, vertical_m = (
         accuracy if accuracy > 0.0 else None  # the true state has none
@@ -189,7 +155,7 @@ def _estimator_status(view: VehicleView, message: Any, _now_s: float) -> Changes
     return {"estimator": health}
 
 
-def _ekf_status(view: VehicleView, message: Any, _now_s: float) -> Changes:
+def _ekf_status(message: Any) -> Changes:
     variances = (
         message.velocity_variance,
         message.pos_horiz_variance,
@@ -210,7 +176,7 @@ def _estimator(flags: int, ratios: Iterable[float]) -> Estimator:
     )
 
 
-def _wind(view: VehicleView, message: Any, _now_s: float) -> Changes:
+def _wind(message: Any) -> Changes:
     """ArduPilot's WIND: the direction that the wind comes from, and the speed."""
     if not math.isfinite(message.direction):
         return {"wind_ned_m_s": None}
@@ -219,12 +185,12 @@ def _wind(view: VehicleView, message: Any, _now_s: float) -> Changes:
     return {"wind_ned_m_s": _vector(north, east, message.speed_z)}
 
 
-def _wind_cov(view: VehicleView, message: Any, _now_s: float) -> Changes:
+def _wind_cov(message: Any) -> Changes:
     vertical_m_s = message.wind_z if math.isfinite(message.wind_z) else 0.0  # NaN: unknown
     return {"wind_ned_m_s": _vector(message.wind_x, message.wind_y, vertical_m_s)}
 
 
-def _attitude(view: VehicleView, message: Any, _now_s: float) -> Changes:
+def _attitude(message: Any) -> Changes:
     angles = _vector(message.roll, message.pitch, message.yaw)
     return {
         "attitude": None if angles is None else Euler(*angles),
@@ -233,12 +199,12 @@ def _attitude(view: VehicleView, message: Any, _now_s: float) -> Changes:
     }
 
 
-def _attitude_target(view: VehicleView, message: Any, _now_s: float) -> Changes:
+def _attitude_target(message: Any) -> Changes:
     ignored = message.type_mask & _IGNORE_ATTITUDE
     return {"attitude_target": None if ignored else _euler(message.q), "time_s": message.time_boot_ms / 1e3}
 
 
-def _local_position(view: VehicleView, message: Any, _now_s: float) -> Changes:
+def _local_position(message: Any) -> Changes:
     return {
         "position_ned_m": _vector(message.x, message.y, message.z),
         "velocity_ned_m_s": _vector(message.vx, message.vy, message.vz),
@@ -265,7 +231,7 @@ def _home(view: VehicleView, message: Any, _now_s: float) -> Changes:
     return {"home": home, "home_count": view.home_count + 1}
 
 
-def _position_target(view: VehicleView, message: Any, _now_s: float) -> Changes:
+def _position_target(message: Any) -> Changes:
     mask = message.type_mask
     position = None if mask & _IGNORE_POSITION else _vector(message.x, message.y, message.z)
     velocity = None if mask & _IGNORE_VELOCITY else _vector(message.vx, message.vy, message.vz)
@@ -289,11 +255,11 @@ def _global_target(view: VehicleView, message: Any, _now_s: float) -> Changes:
     return {"setpoint": Setpoint(place, is_global=True), "time_s": message.time_boot_ms / 1e3}
 
 
-def _hud(view: VehicleView, message: Any, _now_s: float) -> Changes:
+def _hud(message: Any) -> Changes:
     return {"heading_deg": float(message.heading % 360), "throttle": message.throttle / 100}
 
 
-def _extended_state(view: VehicleView, message: Any, _now_s: float) -> Changes:
+def _extended_state(message: Any) -> Changes:
     return {"landed_state": message.landed_state}
 
 
@@ -323,7 +289,7 @@ def _esc_telemetry(view: VehicleView, message: Any, _now_s: float) -> Changes:
     return _with_rotors(view, first, message.rpm)
 
 
-def _loop_timing(view: VehicleView, message: Any, _now_s: float) -> Changes:
+def _loop_timing(message: Any) -> Changes:
     names = LoopTiming._fields[4:-1]
     measured = (_number(getattr(message, name)) for name in names)
     lockstep = message.clock == 0
@@ -332,11 +298,11 @@ def _loop_timing(view: VehicleView, message: Any, _now_s: float) -> Changes:
     return {"timing": timing}
 
 
-def _version(view: VehicleView, message: Any, _now_s: float) -> Changes:
+def _version(message: Any) -> Changes:
     return {"is_own": list(message.flight_custom_version) == NAME_IN_VERSION}
 
 
-def _system_time(view: VehicleView, message: Any, _now_s: float) -> Changes:
+def _system_time(message: Any) -> Changes:
     return {"time_s": message.time_boot_ms / 1e3}
 
 
@@ -344,36 +310,41 @@ def _mission(fold: Callable[[VehicleView, Any], Mission]) -> Callable[[VehicleVi
     return lambda view, message, _now_s: {"mission": fold(view, message)}
 
 
-FOLDS: dict[str, Callable[[VehicleView, Any, float], Changes]] = {
-    "HEARTBEAT": _heartbeat,
-    "AUTOPILOT_VERSION": _version,
-    "AVAILABLE_MODES": _available_mode,
-    "SYS_STATUS": _system,
-    "BATTERY_STATUS": _battery,
-    "FENCE_STATUS": _fence,
-    "GPS_RAW_INT": _gnss,
-    "ESTIMATOR_STATUS": _estimator_status,
-    "EKF_STATUS_REPORT": _ekf_status,
-    "WIND": _wind,
-    "WIND_COV": _wind_cov,
+MEASUREMENTS: dict[str, Callable[[Any], Changes]] = {
     "ATTITUDE": _attitude,
     "ATTITUDE_TARGET": _attitude_target,
-    "LOCAL_POSITION_NED": _local_position,
-    "GLOBAL_POSITION_INT": _global_position,
-    "HOME_POSITION": _home,
-    "POSITION_TARGET_LOCAL_NED": _position_target,
-    "POSITION_TARGET_GLOBAL_INT": _global_target,
-    "VFR_HUD": _hud,
+    "AUTOPILOT_VERSION": _version,
+    "EKF_STATUS_REPORT": _ekf_status,
+    "ESTIMATOR_STATUS": _estimator_status,
     "EXTENDED_SYS_STATE": _extended_state,
-    "MISSION_CURRENT": _mission(mission_fold.after_current),
-    "MISSION_ITEM_REACHED": _mission(mission_fold.after_reached),
-    "MISSION_COUNT": _mission(mission_fold.after_count),
-    "MISSION_ITEM": _mission(mission_fold.after_item),
-    "MISSION_ITEM_INT": _mission(mission_fold.after_item),
+    "FENCE_STATUS": _fence,
+    "FS_LOOP_TIMING": _loop_timing,
+    "GPS_RAW_INT": _gnss,
+    "LOCAL_POSITION_NED": _local_position,
+    "POSITION_TARGET_LOCAL_NED": _position_target,
+    "SYSTEM_TIME": _system_time,
+    "VFR_HUD": _hud,
+    "WIND": _wind,
+    "WIND_COV": _wind_cov,
+}
+"""Messages whose effect does not depend on the view before."""
+
+FOLDS: dict[str, Callable[[VehicleView, Any, float], Changes]] = {
+    "AVAILABLE_MODES": _available_mode,
+    "BATTERY_STATUS": _battery,
     "ESC_STATUS": _rotors,
     "ESC_TELEMETRY_1_TO_4": _esc_telemetry,
     "ESC_TELEMETRY_5_TO_8": _esc_telemetry,
-    "FS_LOOP_TIMING": _loop_timing,
-    "SYSTEM_TIME": _system_time,
+    "GLOBAL_POSITION_INT": _global_position,
+    "HEARTBEAT": _heartbeat,
+    "HOME_POSITION": _home,
+    "MISSION_COUNT": _mission(mission_fold.after_count),
+    "MISSION_CURRENT": _mission(mission_fold.after_current),
+    "MISSION_ITEM": _mission(mission_fold.after_item),
+    "MISSION_ITEM_INT": _mission(mission_fold.after_item),
+    "MISSION_ITEM_REACHED": _mission(mission_fold.after_reached),
+    "POSITION_TARGET_GLOBAL_INT": _global_target,
     "STATUSTEXT": add_piece,
+    "SYS_STATUS": _system,
 }
+"""The other messages, which are folded into the view before, at the time at which they are received."""

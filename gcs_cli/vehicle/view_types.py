@@ -397,4 +397,4 @@ def view_with(view: VehicleView, changes: Changes) -> VehicleView:
     values = list(view)
     for name, value in changes.items():
         values[_PLACES[name]] = value
-    return VehicleView._make(values)
+    return tuple.__new__(VehicleView, values)

@@ -6,7 +6,7 @@ from typing import Any
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
-from gcs_cli.vehicle.vehicle_view import update
+from gcs_cli.vehicle.view_builder import update
 from gcs_cli.vehicle.view_types import VehicleView
 
 HOLD_MODE, MISSION_MODE, RETURN_MODE = (4 << 16 | sub << 24 for sub in (3, 4, 5))

@@ -31,7 +31,7 @@ def asked(subscription: Subscription, now_s: float) -> list[tuple[int, int, floa
 
 @pytest.fixture
 def subscription() -> Subscription:
-    return Subscription(lambda: seen(VEHICLE), ROTORS_AND_TIMING)
+    return Subscription(lambda: seen(VEHICLE).identity, ROTORS_AND_TIMING)
 
 
 def test_a_subscription_asks_for_one_stream_after_the_other(subscription: Subscription) -> None:
@@ -67,7 +67,7 @@ def test_a_refused_stream_is_not_asked_for_again(subscription: Subscription) -> 
 
 def test_another_vehicle_is_asked_anew() -> None:
     vehicle = [(0, 0)]
-    subscription = Subscription(lambda: seen(vehicle[0]), {FS_LOOP_TIMING_ID: 2.0})
+    subscription = Subscription(lambda: seen(vehicle[0]).identity, {FS_LOOP_TIMING_ID: 2.0})
     assert (asked(subscription, 0.0), subscription.next_deadline()) == ([], None)
     vehicle[0] = VEHICLE
     assert len(asked(subscription, 1.0)) == 1
@@ -78,7 +78,7 @@ def test_another_vehicle_is_asked_anew() -> None:
 
 def test_streams_of_ardupilot_are_requested_by_groups_and_again_when_they_stop() -> None:
     ardupilot = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
-    subscription = Subscription(lambda: seen(VEHICLE, ardupilot), {})
+    subscription = Subscription(lambda: seen(VEHICLE, ardupilot).identity, {})
 
     def groups(now_s: float) -> int:
         return sum(message.get_type() == "REQUEST_DATA_STREAM" for message in subscription.poll(now_s))
@@ -91,6 +91,6 @@ def test_streams_of_ardupilot_are_requested_by_groups_and_again_when_they_stop()
 
 
 def test_nothing_is_requested_from_a_vehicle_that_streams_by_itself() -> None:
-    subscription = Subscription(lambda: seen(VEHICLE), {})
+    subscription = Subscription(lambda: seen(VEHICLE).identity, {})
     assert subscription.poll(0.0) == []
     assert subscription.next_deadline() is None

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from gcs_cli.vehicle.link_counts import LinkCounts, counted
+from gcs_cli.vehicle.link_counts import LinkCounter, LinkCounts
 
 
 def after(sequences: Iterable[int]) -> LinkCounts:
     """Return the counts after these messages, 100 a second."""
-    link = LinkCounts()
+    counter = LinkCounter(LinkCounts())
     for index, sequence in enumerate(sequences):
-        link = counted(link, sequence % 256, 0.01 * index)
-    return link
+        counter.count(sequence % 256, 0.01 * index)
+    return counter.counts
 
 
 def test_messages_that_others_overtook_are_not_lost() -> None:

@@ -19,7 +19,7 @@ from gcs_cli.actions.conditions import is_ready, parse_condition
 from gcs_cli.actions.on_vehicle import find_mode, mode_choices
 from gcs_cli.actions.run import refusal_reason
 from gcs_cli.link.tlog import decode_records
-from gcs_cli.vehicle.vehicle_view import update
+from gcs_cli.vehicle.view_builder import update
 from gcs_cli.vehicle.view_types import VehicleView
 
 DATA = Path(__file__).parents[1] / "data"

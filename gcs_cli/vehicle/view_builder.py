@@ -1,0 +1,105 @@
+"""The view of a vehicle after each of its messages, built when it is read. Pure."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gcs_cli.vehicle.link_counts import LinkCounter, LinkCounts
+from gcs_cli.vehicle.status_texts import without_stale_piece
+from gcs_cli.vehicle.vehicle_view import FOLDS, MEASUREMENTS
+from gcs_cli.vehicle.view_types import Changes, Identity, VehicleView, view_with
+
+_NO_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID: a ground station, a camera …
+_RESTART_S = 0.25
+"""Step back of the vehicle's clock that no reordering of datagrams explains."""
+
+
+class ViewBuilder:
+    """Folds messages; ``view`` is the state after the last one.
+
+    A view has some 40 values. A measurement changes a few of them 50 times a second, and a view is read 10 times a
+    second: measurements are collected, and the other messages folded at once. Only one thread may use a builder.
+    """
+
+    def __init__(self, view: VehicleView) -> None:
+        """Continue from ``view``."""
+        self.identity = view.identity
+        """Address and type of the vehicle; None before its first heartbeat."""
+        self.time_s = view.time_s
+        """The vehicle's clock; None if unknown."""
+        self._view = view
+        """The view before the measurements in ``_changes``."""
+        self._changes: Changes = {}
+        self._counter = LinkCounter(view.link)
+
+    @property
+    def view(self) -> VehicleView:
+        """The state of the vehicle."""
+        if self.link is not self._view.link:
+            self._changes["link"] = self.link
+        return self._folded()
+
+    @property
+    def link(self) -> LinkCounts:
+        """Counts of the vehicle's messages."""
+        return self._counter.counts
+
+    def is_lost(self, now_s: float) -> bool:
+        """Return True if the heartbeat has timed out."""
+        return self._view.lost(now_s)
+
+    def note_quality(self, round_trip_s: float | None, recent_loss: float | None) -> None:
+        """Keep the newest round trip and loss in the view."""
+        self._counter.note_quality(round_trip_s, recent_loss)
+
+    def add(self, message: Any, now_s: float) -> bool:
+        """Fold a message, received at ``now_s``; return False, and ignore it, if it is not the vehicle's.
+
+        The first heartbeat of an autopilot selects the vehicle.
+        """
+        identity = self.identity or self._identify(message)
+        if identity is None or (message.get_srcSystem(), message.get_srcComponent()) != identity[:2]:
+            return False
+        self._counter.count(message.get_seq(), now_s)
+        if self._view.partial_text is not None:
+            self._changes.update(without_stale_piece(self._folded(), now_s))
+            self._folded()
+        name = message.get_type()
+        measure = MEASUREMENTS.get(name)
+        if measure is not None:
+            self._collect(measure(message))
+        elif name in FOLDS:
+            self._collect(FOLDS[name](self._folded(), message, now_s))
+            self._folded()
+        return True
+
+    def _identify(self, message: Any) -> Identity | None:
+        """Return the sender of an autopilot's heartbeat as the vehicle."""
+        if message.get_type() != "HEARTBEAT" or message.autopilot == _NO_AUTOPILOT:
+            return None
+        sender = message.get_srcSystem(), message.get_srcComponent()
+        self.identity = Identity(*sender, message.type, message.autopilot)
+        self._view = self._view._replace(identity=self.identity)
+        return self.identity
+
+    def _collect(self, changes: Changes) -> None:
+        time_s, before_s = changes.get("time_s"), self.time_s
+        if time_s is not None:
+            self.time_s = time_s
+            if before_s is not None and time_s <= before_s - _RESTART_S:
+                changes["restarts"] = self._folded().restarts + 1
+                changes.setdefault("timing", None)  # of the loops before
+        self._changes.update(changes)
+
+    def _folded(self) -> VehicleView:
+        """Return the view with all measurements; its ``link`` may be older."""
+        if self._changes:
+            self._view, self._changes = view_with(self._view, self._changes), {}
+        return self._view
+
+
+def update(view: VehicleView, message: Any, now_s: float) -> VehicleView:
+    """Return ``view`` after ``message``, received at ``now_s``; messages of others are ignored."""
+    builder = ViewBuilder(view)
+    builder.add(message, now_s)
+    return builder.view
