@@ -7,6 +7,7 @@ message. It holds the frame, reads the header from it, and takes all other const
 from __future__ import annotations
 
 from collections.abc import Callable
+from operator import itemgetter
 from typing import Any
 
 from flightstack.mavlink.dialect import mavlink
@@ -97,6 +98,17 @@ def received(frame: bytes, kind: Any) -> Any:
     return message
 
 
+def field_reader(name: str, *fields: str) -> Callable[[Any], Any]:
+    """Return a function that reads numbers of the received messages ``name`` without decoding all fields.
+
+    It returns a tuple, or the value if there is one field.
+    """
+    kind = getattr(mavlink, f"MAVLink_{name.lower()}_message")
+    places, unpack = _places(kind), _unpacker(kind)
+    pick = itemgetter(*(places[field] for field in fields))
+    return lambda message: pick(unpack(message.get_msgbuf()))
+
+
 def _envelope(frame: bytes) -> dict[str, Any]:
     """Return what surrounds the fields of a frame."""
     if frame[0] == MAGIC_V1:
@@ -120,20 +132,16 @@ def _envelope(frame: bytes) -> dict[str, Any]:
 
 def _decoder(kind: Any) -> Callable[[bytes], dict[str, Any]]:
     """Return a function that decodes the fields of a frame."""
-    names, texts, unpack = tuple(kind.ordered_fieldnames), TEXT_FIELDS[kind], _unpacker(kind)
+    places, texts, unpack = _places(kind), TEXT_FIELDS[kind], _unpacker(kind)
+    names = tuple(places)
     if len(names) == kind.lengths.count(1) and not texts:
         return lambda frame: dict(zip(names, unpack(frame), strict=True))
-    places: list[int | slice] = []
-    start = 0
-    for length in kind.lengths:
-        places.append(start if length == 1 else slice(start, start + length))
-        start += length
 
     def decode(frame: bytes) -> dict[str, Any]:
         values = unpack(frame)
         fields: dict[str, Any] = {
             name: list(values[place]) if place.__class__ is slice else values[place]
-            for name, place in zip(names, places, strict=True)
+            for name, place in places.items()
         }
         for name in texts:
             raw = fields[f"_{name}_raw"] = fields[name].rstrip(b"\0")
@@ -141,6 +149,16 @@ def _decoder(kind: Any) -> Callable[[bytes], dict[str, Any]]:
         return fields
 
     return decode
+
+
+def _places(kind: Any) -> dict[str, int | slice]:
+    """Return the place of each field in the unpacked values of a payload."""
+    places: dict[str, int | slice] = {}
+    start = 0
+    for name, length in zip(kind.ordered_fieldnames, kind.lengths, strict=True):
+        places[name] = start if length == 1 else slice(start, start + length)
+        start += length
+    return places
 
 
 def _unpacker(kind: Any) -> Callable[[bytes], _Values]:

@@ -29,6 +29,9 @@ MAX_FAULTS = 32
 _BEGINNING = re.compile(rb"\xfd.[\x00\x01]|\xfe|\xfd.?\Z", re.DOTALL)
 
 
+_BYTES = [bytes((value,)) for value in range(256)]
+
+
 def checksum(body: bytes, crc_extra: int) -> bytes:
     """Return the checksum of a frame's bytes between magic and checksum, as two bytes."""
     return crc16.mcrf4xx(b"%b%c" % (body, crc_extra)).to_bytes(CHECKSUM_SIZE, "little")
@@ -37,7 +40,7 @@ def checksum(body: bytes, crc_extra: int) -> bytes:
 def has_checksum(frame: bytes, start: int, crc_extra: int) -> bool:
     """Return True if the checksum of a complete frame is right; its payload begins at ``start``."""
     end = start + frame[1]
-    computed: int = crc16.mcrf4xx(b"%b%c" % (frame[1:end], crc_extra))
+    computed: int = crc16.mcrf4xx(frame[1:end] + _BYTES[crc_extra])
     return computed == frame[end] | frame[end + 1] << 8
 
 

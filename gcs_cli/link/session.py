@@ -15,7 +15,7 @@ from gcs_cli.link.quality import LinkMonitor, LinkQuality
 from gcs_cli.link.subscription import Subscription
 from gcs_cli.link.wire import SYSTEM_ID, Wire
 from gcs_cli.vehicle.view_builder import ViewBuilder, update
-from gcs_cli.vehicle.view_types import VehicleView
+from gcs_cli.vehicle.view_types import LOST_AFTER_S, VehicleView
 
 HEARTBEAT_PERIOD_S = 1.0
 _BROADCAST = 0
@@ -150,8 +150,8 @@ class Session:
 
     def is_heard(self, now_s: float) -> bool:
         """Return True if the vehicle is connected: it was heard, and its heartbeat has not timed out."""
-        builder = self._builder
-        return self.peer is not None and builder.identity is not None and not builder.is_lost(now_s)
+        heartbeat_s = self._builder.last_heartbeat_s
+        return self.peer is not None and heartbeat_s is not None and not now_s - heartbeat_s > LOST_AFTER_S
 
     def receive(self, data: bytes, peer: Address, now_s: float) -> None:
         """Process a datagram."""

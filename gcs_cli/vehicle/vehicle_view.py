@@ -8,6 +8,7 @@ from typing import Any
 
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.portable_math import euler_angles
+from flightstack.mavlink.decoding import field_reader
 from flightstack.mavlink.dialect import NAME_IN_VERSION, mavlink
 from gcs_cli.vehicle import mission_fold
 from gcs_cli.vehicle.status_texts import add_piece
@@ -53,7 +54,8 @@ def _number(value: float) -> float | None:
 
 
 def _vector(x: float, y: float, z: float) -> Vector | None:
-    return Vector(x, y, z) if math.isfinite(x) and math.isfinite(y) and math.isfinite(z) else None
+    """Return the vector, None if a part is not finite; the sum of three numbers in single precision has no overflow."""
+    return Vector(x, y, z) if math.isfinite(x + y + z) else None
 
 
 def _euler(q: Any) -> Euler | None:
@@ -195,35 +197,42 @@ def _attitude(message: Any) -> Changes:
     return {
         "attitude": None if angles is None else Euler(*angles),
         "rates_frd_rad_s": _vector(message.rollspeed, message.pitchspeed, message.yawspeed),
-        "time_s": message.time_boot_ms / 1e3,
     }
 
 
 def _attitude_target(message: Any) -> Changes:
     ignored = message.type_mask & _IGNORE_ATTITUDE
-    return {"attitude_target": None if ignored else _euler(message.q), "time_s": message.time_boot_ms / 1e3}
+    return {"attitude_target": None if ignored else _euler(message.q)}
+
+
+_read_local_position = field_reader("LOCAL_POSITION_NED", "time_boot_ms", "x", "y", "z", "vx", "vy", "vz")
 
 
 def _local_position(message: Any) -> Changes:
+    time_ms, x, y, z, vx, vy, vz = _read_local_position(message)
     return {
-        "position_ned_m": _vector(message.x, message.y, message.z),
-        "velocity_ned_m_s": _vector(message.vx, message.vy, message.vz),
-        "time_s": message.time_boot_ms / 1e3,
+        "position_ned_m": _vector(x, y, z),
+        "velocity_ned_m_s": _vector(vx, vy, vz),
+        "time_s": time_ms / 1e3,
     }
+
+
+_read_global_position = field_reader(
+    "GLOBAL_POSITION_INT", "time_boot_ms", "lat", "lon", "alt", "relative_alt", "vx", "vy", "vz"
+)
 
 
 def _global_position(view: VehicleView, message: Any, _now_s: float) -> Changes:
     """Take the position, and the velocity without LOCAL_POSITION_NED; ArduPilot sends zeros until it has them."""
-    geo = GeoPosition(message.lat / 1e7, message.lon / 1e7, message.alt / 1e3, message.relative_alt / 1e3)
-    is_known = any(geo[:3])
-    velocity = view.velocity_ned_m_s
-    if is_known and view.position_ned_m is None:
-        velocity = Vector(message.vx / 1e2, message.vy / 1e2, message.vz / 1e2)
-    return {
-        "geo": geo if is_known else None,
-        "velocity_ned_m_s": velocity,
-        "time_s": message.time_boot_ms / 1e3,
+    time_ms, lat, lon, alt, relative_alt, vx, vy, vz = _read_global_position(message)
+    is_known = bool(lat or lon or alt)
+    changes: Changes = {
+        "geo": GeoPosition(lat / 1e7, lon / 1e7, alt / 1e3, relative_alt / 1e3) if is_known else None,
+        "time_s": time_ms / 1e3,
     }
+    if is_known and view.position_ned_m is None:
+        changes["velocity_ned_m_s"] = Vector(vx / 1e2, vy / 1e2, vz / 1e2)
+    return changes
 
 
 def _home(view: VehicleView, message: Any, _now_s: float) -> Changes:
@@ -231,12 +240,17 @@ def _home(view: VehicleView, message: Any, _now_s: float) -> Changes:
     return {"home": home, "home_count": view.home_count + 1}
 
 
+_read_position_target = field_reader(
+    "POSITION_TARGET_LOCAL_NED", "time_boot_ms", "type_mask", "x", "y", "z", "vx", "vy", "vz", "yaw"
+)
+
+
 def _position_target(message: Any) -> Changes:
-    mask = message.type_mask
-    position = None if mask & _IGNORE_POSITION else _vector(message.x, message.y, message.z)
-    velocity = None if mask & _IGNORE_VELOCITY else _vector(message.vx, message.vy, message.vz)
-    yaw = None if mask & _IGNORE_YAW else _number(message.yaw)
-    return {"setpoint": Setpoint(position, velocity, yaw), "time_s": message.time_boot_ms / 1e3}
+    time_ms, mask, x, y, z, vx, vy, vz, yaw_rad = _read_position_target(message)
+    position = None if mask & _IGNORE_POSITION else _vector(x, y, z)
+    velocity = None if mask & _IGNORE_VELOCITY else _vector(vx, vy, vz)
+    yaw = None if mask & _IGNORE_YAW else _number(yaw_rad)
+    return {"setpoint": Setpoint(position, velocity, yaw), "time_s": time_ms / 1e3}
 
 
 def _global_target(view: VehicleView, message: Any, _now_s: float) -> Changes:
@@ -310,24 +324,33 @@ def _mission(fold: Callable[[VehicleView, Any], Mission]) -> Callable[[VehicleVi
     return lambda view, message, _now_s: {"mission": fold(view, message)}
 
 
-MEASUREMENTS: dict[str, Callable[[Any], Changes]] = {
+LATEST: dict[str, Callable[[Any], Changes]] = {
     "ATTITUDE": _attitude,
     "ATTITUDE_TARGET": _attitude_target,
+    "FENCE_STATUS": _fence,
+    "FS_LOOP_TIMING": _loop_timing,
+    "GPS_RAW_INT": _gnss,
+    "VFR_HUD": _hud,
+}
+"""Messages whose values no other message changes and no fold reads: only the newest one counts."""
+
+TIMES: dict[str, Callable[[Any], int]] = {
+    name: field_reader(name, "time_boot_ms") for name in ("ATTITUDE", "ATTITUDE_TARGET")
+}
+"""The vehicle's clock in messages of ``LATEST`` [ms], of which each one counts."""
+
+MEASUREMENTS: dict[str, Callable[[Any], Changes]] = {
     "AUTOPILOT_VERSION": _version,
     "EKF_STATUS_REPORT": _ekf_status,
     "ESTIMATOR_STATUS": _estimator_status,
     "EXTENDED_SYS_STATE": _extended_state,
-    "FENCE_STATUS": _fence,
-    "FS_LOOP_TIMING": _loop_timing,
-    "GPS_RAW_INT": _gnss,
     "LOCAL_POSITION_NED": _local_position,
     "POSITION_TARGET_LOCAL_NED": _position_target,
     "SYSTEM_TIME": _system_time,
-    "VFR_HUD": _hud,
     "WIND": _wind,
     "WIND_COV": _wind_cov,
 }
-"""Messages whose effect does not depend on the view before."""
+"""Other messages whose effect does not depend on the view before."""
 
 FOLDS: dict[str, Callable[[VehicleView, Any, float], Changes]] = {
     "AVAILABLE_MODES": _available_mode,

@@ -6,7 +6,7 @@ from typing import Any
 
 from gcs_cli.vehicle.link_counts import LinkCounter, LinkCounts
 from gcs_cli.vehicle.status_texts import without_stale_piece
-from gcs_cli.vehicle.vehicle_view import FOLDS, MEASUREMENTS
+from gcs_cli.vehicle.vehicle_view import FOLDS, LATEST, MEASUREMENTS, TIMES
 from gcs_cli.vehicle.view_types import Changes, Identity, VehicleView, view_with
 
 _NO_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID: a ground station, a camera …
@@ -28,8 +28,9 @@ class ViewBuilder:
         self.time_s = view.time_s
         """The vehicle's clock; None if unknown."""
         self._view = view
-        """The view before the measurements in ``_changes``."""
+        """The view before the measurements in ``_changes`` and ``_latest``."""
         self._changes: Changes = {}
+        self._latest: dict[str, Any] = {}
         self._counter = LinkCounter(view.link)
 
     @property
@@ -37,6 +38,9 @@ class ViewBuilder:
         """The state of the vehicle."""
         if self.link is not self._view.link:
             self._changes["link"] = self.link
+        for name, message in self._latest.items():
+            self._changes.update(LATEST[name](message))
+        self._latest = {}
         return self._folded()
 
     @property
@@ -44,9 +48,10 @@ class ViewBuilder:
         """Counts of the vehicle's messages."""
         return self._counter.counts
 
-    def is_lost(self, now_s: float) -> bool:
-        """Return True if the heartbeat has timed out."""
-        return self._view.lost(now_s)
+    @property
+    def last_heartbeat_s(self) -> float | None:
+        """Time at which the newest heartbeat was received."""
+        return self._view.last_heartbeat_s
 
     def note_quality(self, round_trip_s: float | None, recent_loss: float | None) -> None:
         """Keep the newest round trip and loss in the view."""
@@ -65,9 +70,12 @@ class ViewBuilder:
             self._changes.update(without_stale_piece(self._folded(), now_s))
             self._folded()
         name = message.get_type()
-        measure = MEASUREMENTS.get(name)
-        if measure is not None:
-            self._collect(measure(message))
+        if name in LATEST:
+            self._latest[name] = message
+            if name in TIMES:
+                self._advance(TIMES[name](message) / 1e3)
+        elif name in MEASUREMENTS:
+            self._collect(MEASUREMENTS[name](message))
         elif name in FOLDS:
             self._collect(FOLDS[name](self._folded(), message, now_s))
             self._folded()
@@ -83,16 +91,22 @@ class ViewBuilder:
         return self.identity
 
     def _collect(self, changes: Changes) -> None:
-        time_s, before_s = changes.get("time_s"), self.time_s
+        time_s = changes.get("time_s")
         if time_s is not None:
-            self.time_s = time_s
-            if before_s is not None and time_s <= before_s - _RESTART_S:
-                changes["restarts"] = self._folded().restarts + 1
-                changes.setdefault("timing", None)  # of the loops before
+            self._advance(time_s)
         self._changes.update(changes)
 
+    def _advance(self, time_s: float) -> None:
+        """Take the vehicle's clock from a message."""
+        before_s, self.time_s = self.time_s, time_s
+        if before_s is not None and time_s <= before_s - _RESTART_S:
+            self._changes["restarts"] = self._folded().restarts + 1
+            self._changes["timing"] = None  # of the loops before
+
     def _folded(self) -> VehicleView:
-        """Return the view with all measurements; its ``link`` may be older."""
+        """Return the view with all measurements but those that no fold reads; its ``link`` may be older."""
+        if self.time_s != self._view.time_s:
+            self._changes["time_s"] = self.time_s
         if self._changes:
             self._view, self._changes = view_with(self._view, self._changes), {}
         return self._view

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from flightstack.mavlink.decoding import received
+from flightstack.mavlink.decoding import field_reader, received
 from flightstack.mavlink.dialect import ardupilot_dialect, mavlink
 from flightstack.mavlink.fields import TEXT_FIELDS, clean
 from flightstack.mavlink.frames import MAGIC_V1, checksum, pack_frame
@@ -78,6 +78,21 @@ def test_fields_are_read_in_any_order() -> None:
         for name in kind.fieldnames:
             value, expected = getattr(received(frame, kind), name), getattr(oracle, name)
             assert repr(value) == repr(clean(expected) if name in TEXT_FIELDS[kind] else expected)
+
+
+def test_field_reader_reads_what_the_attributes_hold() -> None:
+    random = Random(3)
+    for kind in (mavlink.MAVLink_attitude_target_message, mavlink.MAVLink_global_position_int_message):
+        read, read_time = (
+            field_reader(kind.msgname, *kind.fieldnames),
+            field_reader(kind.msgname, "time_boot_ms"),
+        )
+        for frame_of in (_version_1, _version_2):
+            for payload in _payloads(kind, random):
+                message = received(frame_of(kind, payload), kind)
+                shown = [list(value) if isinstance(value, tuple) else value for value in read(message)]
+                assert repr(shown) == repr([getattr(message, name) for name in kind.fieldnames])
+                assert read_time(message) == message.time_boot_ms
 
 
 def test_changed_field_keeps_its_value_when_others_are_decoded() -> None:
