@@ -328,7 +328,6 @@ LATEST: dict[str, Callable[[Any], Changes]] = {
     "ATTITUDE": _attitude,
     "ATTITUDE_TARGET": _attitude_target,
     "FENCE_STATUS": _fence,
-    "FS_LOOP_TIMING": _loop_timing,
     "GPS_RAW_INT": _gnss,
     "VFR_HUD": _hud,
 }
@@ -344,6 +343,7 @@ MEASUREMENTS: dict[str, Callable[[Any], Changes]] = {
     "EKF_STATUS_REPORT": _ekf_status,
     "ESTIMATOR_STATUS": _estimator_status,
     "EXTENDED_SYS_STATE": _extended_state,
+    "FS_LOOP_TIMING": _loop_timing,
     "LOCAL_POSITION_NED": _local_position,
     "POSITION_TARGET_LOCAL_NED": _position_target,
     "SYSTEM_TIME": _system_time,
