@@ -76,6 +76,8 @@ class Filter(NamedTuple):
     """Time of the state, at the delayed horizon; share of the measured IMU noise that innovations of GNSS confirm."""
     behind: Annotated[FloatArray, BEHIND_SIZE]
     """What the covariance has not followed yet: time, rotation vector of the body, velocity change NED by forces."""
+    turn: Annotated[FloatArray, 3]
+    """Rotation of about the last 5 s, in the body frame."""
     covariance: Covariance
     """Only the elements on and above the diagonal count."""
     observations: Annotated[RecordArray, Observed, OBSERVATIONS]

@@ -185,7 +185,15 @@ def start_memory(memory: MemoryArray) -> None:
 def filter_of(m: MemoryRecord) -> Filter:
     """Return the filter's arrays of a record of ``MEMORY``."""
     return Filter(
-        m["nominal"], m["h"], m["ph"], m["gain"], m["clock"], m["behind"], m["covariance"], m["observations"]
+        m["nominal"],
+        m["h"],
+        m["ph"],
+        m["gain"],
+        m["clock"],
+        m["behind"],
+        m["turn"],
+        m["covariance"],
+        m["observations"],
     )
 
 

@@ -29,7 +29,10 @@ from flightstack.estimation.error_state import (
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import BEHIND_SIZE, Filter
 
-_TURN_S, _LEAST_S = 1.0, 1e-3
+_TURN_S = 5.0
+"""Time constant with which rotations are forgotten."""
+_GUST_S, _LEAST_S = 1.0, 1e-3
+"""Time for which a change of the airspeed lasts, and the least step."""
 _WIND_M_S = 2.0
 """Wind with which changes of the airspeed are counted: it is not known."""
 _MOST_PRESSURE = 0.01
@@ -130,14 +133,20 @@ def _add_body_noise(p: Covariance, at: int, axis: Vector3, variance: float) -> N
 
 
 @compiled
-def _turn_variance(angle: Vector3, dt_s: float, params: EstimatorParams) -> float:
-    """Return the variance of each axis of the attitude by errors of scale and alignment of the gyro in a step.
+def _turn_variances(f: Filter, angle: Vector3, dt_s: float, params: EstimatorParams) -> Vector3:
+    """Return the variances about the body's axes by errors of scale and alignment of the gyro in a step.
 
-    An error e gives e ω T after a turn of duration T. As white noise that is a density of (e ω)² T, with T = 1 s.
+    An error e gives e φ after a rotation φ, and nothing any more after the rotation back. A process with the deviation
+    e φ, of the rotation of the last T, has noise of the density 2 (e φ)² / T. Rotation about the body's z axis moves
+    the tilt too, in step with the heading: ``_keep_misaligned`` counts that.
     """
-    square = angle.x * angle.x + angle.y * angle.y + angle.z * angle.z
-    error = params.gyro_scale_error
-    return error * error * square * (_TURN_S / max(dt_s, _LEAST_S))
+    turn, share = f.turn, min(dt_s / _TURN_S, 1.0)
+    turn[0] += angle.x - share * turn[0]
+    turn[1] += angle.y - share * turn[1]
+    turn[2] += angle.z - share * turn[2]
+    density = 2.0 * params.gyro_scale_error * params.gyro_scale_error * share
+    tilted = density * (turn[0] * turn[0] + turn[1] * turn[1])
+    return Vector3(tilted, tilted, tilted + density * turn[2] * turn[2])
 
 
 @compiled
@@ -165,11 +174,11 @@ def _pressure_variance(f: Filter, change: Vector3, dt_s: float, params: Estimato
     """Return the variance that a change of the airspeed in a step adds to the barometer's bias.
 
     The port feels a share of the dynamic pressure: an altitude of share u² / 2 g for the airspeed u, which changes by
-    share u du / g. The wind is not known. As white noise, like turns.
+    share u du / g, as white noise. The wind is not known.
     """
     north, east = f.nominal[4], f.nominal[5]
     square = north * north + east * east + _WIND_M_S * _WIND_M_S
-    share, lasting = params.baro_dynamic_share / params.gravity_m_s2, _TURN_S / max(dt_s, _LEAST_S)
+    share, lasting = params.baro_dynamic_share / params.gravity_m_s2, _GUST_S / max(dt_s, _LEAST_S)
     variance: float = share * share * square * (change.x * change.x + change.y * change.y) * lasting
     return min(variance, _MOST_PRESSURE)
 
@@ -189,10 +198,10 @@ def _add_process_noise(
     x = rotate(q, Vector3(1.0, 0.0, 0.0))
     y = rotate(q, Vector3(0.0, 1.0, 0.0))
     z = cross(x, y)
-    _add(p, ATTITUDE, 3, _turn_variance(angle, dt_s, params))
-    _add_body_noise(p, ATTITUDE, x, max(gyro * gyro, share * noise.gyro.x) * dt_s)
-    _add_body_noise(p, ATTITUDE, y, max(gyro * gyro, share * noise.gyro.y) * dt_s)
-    _add_body_noise(p, ATTITUDE, z, max(gyro * gyro, share * noise.gyro.z) * dt_s)
+    turns = _turn_variances(f, angle, dt_s, params)
+    _add_body_noise(p, ATTITUDE, x, turns.x + max(gyro * gyro, share * noise.gyro.x) * dt_s)
+    _add_body_noise(p, ATTITUDE, y, turns.y + max(gyro * gyro, share * noise.gyro.y) * dt_s)
+    _add_body_noise(p, ATTITUDE, z, turns.z + max(gyro * gyro, share * noise.gyro.z) * dt_s)
     _add_body_noise(p, VELOCITY, x, max(accel * accel, share * noise.accel.x) * dt_s)
     _add_body_noise(p, VELOCITY, y, max(accel * accel, share * noise.accel.y) * dt_s)
     _add_body_noise(p, VELOCITY, z, max(accel * accel, share * noise.accel.z) * dt_s)

@@ -14,7 +14,7 @@
 #define FS_HOLDS_HORIZONTAL FS_LIT(2.0)
 #define FS_HOLDS_TILT_AND_GYRO FS_LIT(3.0)
 
-/* kalman.py:218 */
+/* kalman.py:220 */
 void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
 {
     for (int32_t i = at; i < at + count; i++) {
@@ -28,7 +28,7 @@ void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real var
     }
 }
 
-/* kalman.py:96 */
+/* kalman.py:98 */
 void fs_clear(fs_real x[27])
 {
     for (int32_t i = 0; i < 27; i++) {
@@ -36,7 +36,7 @@ void fs_clear(fs_real x[27])
     }
 }
 
-/* Write P h' to ph and return h P h'. kalman.py:109 */
+/* Write P h' to ph and return h P h'. kalman.py:111 */
 static fs_real project(fs_filter *f)
 {
     fs_clear(f->ph);
@@ -63,7 +63,7 @@ static fs_real project(fs_filter *f)
  * Half the squared difference of two successive innovations has the variance of white noise, and an error of the
  * model, which both have, does not count. A slow sensor has the whole variance, as its correlation is counted apart.
  *
- * kalman.py:146
+ * kalman.py:148
  */
 static void adapt_noise(fs_observed *o, fs_real r, fs_real projected, fs_real last, const fs_noise *noise)
 {
@@ -81,7 +81,7 @@ static void adapt_noise(fs_observed *o, fs_real r, fs_real projected, fs_real la
     o->noise = fs_min(fs_max(r + share * (estimate - r), least), largest);
 }
 
-/* Make the gains of the states that are held zero. kalman.py:165 */
+/* Make the gains of the states that are held zero. kalman.py:167 */
 static void hold(fs_real gain[27], fs_real holds)
 {
     if (holds == FS_HOLDS_HORIZONTAL) {
@@ -113,7 +113,7 @@ static void hold(fs_real gain[27], fs_real holds)
  * Joseph's form with such a gain subtracts P h' h P / variance from the covariance, except between two states that
  * both keep their values: one product for each element instead of two.
  *
- * kalman.py:125
+ * kalman.py:127
  */
 static void correct(fs_filter *f, fs_real innovation)
 {
@@ -137,7 +137,7 @@ static void correct(fs_filter *f, fs_real innovation)
     fs_correct(f->nominal, f->gain, innovation);
 }
 
-/* kalman.py:181 */
+/* kalman.py:183 */
 bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *noise, fs_real holds)
 {
     fs_observed *o = &f->observations[row];
@@ -175,7 +175,7 @@ bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *nois
     return true;
 }
 
-/* kalman.py:229 */
+/* kalman.py:231 */
 fs_real fs_deviation(const fs_filter *f, int32_t at, int32_t count)
 {
     fs_real total = FS_LIT(0.0);

@@ -29,6 +29,7 @@ typedef struct {
     fs_real gain[27];
     fs_real clock[2];
     fs_real behind[7];
+    fs_real turn[3];
     fs_real covariance[27][27];
     fs_observed observations[25];
 } fs_filter;
@@ -42,10 +43,10 @@ typedef struct {
     fs_real is_slow;
 } fs_noise;
 
-/* Make count states from at independent of all others, each with variance. kalman.py:218 */
+/* Make count states from at independent of all others, each with variance. kalman.py:220 */
 void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real variance);
 
-/* Set every item to zero. kalman.py:96 */
+/* Set every item to zero. kalman.py:98 */
 void fs_clear(fs_real x[27]);
 
 /*
@@ -56,11 +57,11 @@ void fs_clear(fs_real x[27]);
  *
  * With holds other than zero, these states keep their values and their uncertainty: a Schmidt-Kalman update.
  *
- * kalman.py:181
+ * kalman.py:183
  */
 bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *noise, fs_real holds);
 
-/* Return the root of the summed variances of count states from at. kalman.py:229 */
+/* Return the root of the summed variances of count states from at. kalman.py:231 */
 fs_real fs_deviation(const fs_filter *f, int32_t at, int32_t count);
 
 #endif

@@ -10,9 +10,8 @@
 #include "fs_geometry.h"
 #include "fs_math.h"
 
+#define FS_TURN_S FS_LIT(5.0)
 #define FS_ATTITUDE 0
-#define FS_TURN_S FS_LIT(1.0)
-#define FS_LEAST_S FS_LIT(0.001)
 #define FS_VELOCITY 3
 #define FS_POSITION 6
 #define FS_GYRO_BIAS 9
@@ -21,24 +20,26 @@
 #define FS_BODY_FIELD 18
 #define FS_WIND 21
 #define FS_WIND_M_S FS_LIT(2.0)
+#define FS_GUST_S FS_LIT(1.0)
+#define FS_LEAST_S FS_LIT(0.001)
 #define FS_MOST_PRESSURE FS_LIT(0.01)
 #define FS_BARO_BIAS 23
 #define FS_MOST_ANGLE FS_LIT(0.09)
 #define FS_MOST_VELOCITY FS_LIT(25.0)
 
-/* prediction.py:92 */
+/* prediction.py:95 */
 fs_motion fs_motion_of(const fs_nominal *n)
 {
     return (fs_motion){n->attitude, n->velocity_ned_m_s, n->position_ned_m};
 }
 
-/* prediction.py:72 */
+/* prediction.py:75 */
 fs_vector3 fs_less_bias(const fs_vector3 *v, const fs_vector3 *bias, fs_real dt_s)
 {
     return (fs_vector3){v->x - bias->x * dt_s, v->y - bias->y * dt_s, v->z - bias->z * dt_s};
 }
 
-/* prediction.py:78 */
+/* prediction.py:81 */
 fs_motion fs_moved(const fs_motion *start, const fs_vector3 *angle, const fs_vector3 *delta_velocity, fs_real dt_s,
                    fs_real gravity)
 {
@@ -60,7 +61,7 @@ fs_motion fs_moved(const fs_motion *start, const fs_vector3 *angle, const fs_vec
     };
 }
 
-/* prediction.py:98 */
+/* prediction.py:101 */
 fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion)
 {
     return (fs_nominal){
@@ -78,7 +79,7 @@ fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion)
     };
 }
 
-/* prediction.py:212 */
+/* prediction.py:221 */
 void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_params *params)
 {
     const fs_nominal n = fs_read_nominal(f->nominal);
@@ -101,30 +102,28 @@ void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_
     f->clock[0] = sample->time_s;
 }
 
-/* prediction.py:116 */
-static void add(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
-{
-    for (int32_t i = at; i < at + count; i++) {
-        p[i][i] += variance;
-    }
-}
-
 /*
- * Return the variance of each axis of the attitude by errors of scale and alignment of the gyro in a step.
+ * Return the variances about the body's axes by errors of scale and alignment of the gyro in a step.
  *
- * An error e gives e omega T after a turn of duration T. As white noise that is a density of (e omega)^2 T, with T =
- * 1 s.
+ * An error e gives e phi after a rotation phi, and nothing any more after the rotation back. A process with the
+ * deviation e phi, of the rotation of the last T, has noise of the density 2 (e phi)^2 / T. Rotation about the body's
+ * z axis moves the tilt too, in step with the heading: _keep_misaligned counts that.
  *
- * prediction.py:133
+ * prediction.py:136
  */
-static fs_real turn_variance(const fs_vector3 *angle, fs_real dt_s, const fs_estimator_params *params)
+static fs_vector3 turn_variances(fs_filter *f, const fs_vector3 *angle, fs_real dt_s,
+                                 const fs_estimator_params *params)
 {
-    const fs_real square = angle->x * angle->x + angle->y * angle->y + angle->z * angle->z;
-    const fs_real error = params->gyro_scale_error;
-    return error * error * square * (FS_TURN_S / fs_max(dt_s, FS_LEAST_S));
+    const fs_real share = fs_min(dt_s / FS_TURN_S, FS_LIT(1.0));
+    f->turn[0] += angle->x - share * f->turn[0];
+    f->turn[1] += angle->y - share * f->turn[1];
+    f->turn[2] += angle->z - share * f->turn[2];
+    const fs_real density = FS_LIT(2.0) * params->gyro_scale_error * params->gyro_scale_error * share;
+    const fs_real tilted = density * (f->turn[0] * f->turn[0] + f->turn[1] * f->turn[1]);
+    return (fs_vector3){tilted, tilted, tilted + density * f->turn[2] * f->turn[2]};
 }
 
-/* Add the noise of one axis of the body, a unit vector in the world frame. prediction.py:122 */
+/* Add the noise of one axis of the body, a unit vector in the world frame. prediction.py:125 */
 static void add_body_noise(fs_real p[27][27], int32_t at, const fs_vector3 *axis, fs_real variance)
 {
     p[at][at] += variance * axis->x * axis->x;
@@ -135,6 +134,14 @@ static void add_body_noise(fs_real p[27][27], int32_t at, const fs_vector3 *axis
     p[at + 2][at + 2] += variance * axis->z * axis->z;
 }
 
+/* prediction.py:119 */
+static void add(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
+{
+    for (int32_t i = at; i < at + count; i++) {
+        p[i][i] += variance;
+    }
+}
+
 /*
  * Keep a horizontal bias of the accelerometer as uncertain as the alignment of the gyro leaves it.
  *
@@ -142,7 +149,7 @@ static void add_body_noise(fs_real p[27][27], int32_t at, const fs_vector3 *axis
  * the same velocity as a bias g e of the accelerometer. No other measurement tells them apart: what is added is a
  * bias along axis, a unit vector in the world frame, with the tilt that hides it from the velocity of level flight.
  *
- * prediction.py:144
+ * prediction.py:153
  */
 static void keep_misaligned(fs_real p[27][27], int32_t at, const fs_vector3 *axis, const fs_estimator_params *params)
 {
@@ -163,9 +170,9 @@ static void keep_misaligned(fs_real p[27][27], int32_t at, const fs_vector3 *axi
  * Return the variance that a change of the airspeed in a step adds to the barometer's bias.
  *
  * The port feels a share of the dynamic pressure: an altitude of share u^2 / 2 g for the airspeed u, which changes by
- * share u du / g. The wind is not known. As white noise, like turns.
+ * share u du / g, as white noise. The wind is not known.
  *
- * prediction.py:164
+ * prediction.py:173
  */
 static fs_real pressure_variance(const fs_filter *f, const fs_vector3 *change, fs_real dt_s,
                                  const fs_estimator_params *params)
@@ -174,12 +181,12 @@ static fs_real pressure_variance(const fs_filter *f, const fs_vector3 *change, f
     const fs_real east = f->nominal[5];
     const fs_real square = north * north + east * east + FS_WIND_M_S * FS_WIND_M_S;
     const fs_real share = params->baro_dynamic_share / params->gravity_m_s2;
-    const fs_real lasting = FS_TURN_S / fs_max(dt_s, FS_LEAST_S);
+    const fs_real lasting = FS_GUST_S / fs_max(dt_s, FS_LEAST_S);
     const fs_real variance = share * share * square * (change->x * change->x + change->y * change->y) * lasting;
     return fs_min(variance, FS_MOST_PRESSURE);
 }
 
-/* prediction.py:178 */
+/* prediction.py:187 */
 static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vector3 *angle, const fs_vector3 *change,
                               fs_real dt_s, const fs_imu_noise *noise, const fs_estimator_params *params)
 {
@@ -191,10 +198,10 @@ static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vec
     const fs_vector3 v_2 = {FS_LIT(0.0), FS_LIT(1.0), FS_LIT(0.0)};
     const fs_vector3 y = fs_rotate(q, &v_2);
     const fs_vector3 z = fs_cross(&x, &y);
-    add(f->covariance, FS_ATTITUDE, 3, turn_variance(angle, dt_s, params));
-    add_body_noise(f->covariance, FS_ATTITUDE, &x, fs_max(gyro * gyro, share * noise->gyro.x) * dt_s);
-    add_body_noise(f->covariance, FS_ATTITUDE, &y, fs_max(gyro * gyro, share * noise->gyro.y) * dt_s);
-    add_body_noise(f->covariance, FS_ATTITUDE, &z, fs_max(gyro * gyro, share * noise->gyro.z) * dt_s);
+    const fs_vector3 turns = turn_variances(f, angle, dt_s, params);
+    add_body_noise(f->covariance, FS_ATTITUDE, &x, turns.x + fs_max(gyro * gyro, share * noise->gyro.x) * dt_s);
+    add_body_noise(f->covariance, FS_ATTITUDE, &y, turns.y + fs_max(gyro * gyro, share * noise->gyro.y) * dt_s);
+    add_body_noise(f->covariance, FS_ATTITUDE, &z, turns.z + fs_max(gyro * gyro, share * noise->gyro.z) * dt_s);
     add_body_noise(f->covariance, FS_VELOCITY, &x, fs_max(accel * accel, share * noise->accel.x) * dt_s);
     add_body_noise(f->covariance, FS_VELOCITY, &y, fs_max(accel * accel, share * noise->accel.y) * dt_s);
     add_body_noise(f->covariance, FS_VELOCITY, &z, fs_max(accel * accel, share * noise->accel.z) * dt_s);
@@ -210,7 +217,7 @@ static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vec
     add(f->covariance, FS_BARO_BIAS, 1, params->baro_walk * params->baro_walk * dt_s + pressure);
 }
 
-/* prediction.py:228 */
+/* prediction.py:237 */
 void fs_predict_errors(fs_filter *f, const fs_imu_noise *noise, const fs_estimator_params *params)
 {
     const fs_real dt_s = f->behind[0];
@@ -233,7 +240,7 @@ void fs_predict_errors(fs_filter *f, const fs_imu_noise *noise, const fs_estimat
     }
 }
 
-/* prediction.py:243 */
+/* prediction.py:252 */
 void fs_add_unknown(fs_filter *f, const fs_delta_sample *step)
 {
     const fs_real half_s = FS_LIT(0.5) * step->dt_s;

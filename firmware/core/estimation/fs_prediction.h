@@ -34,23 +34,23 @@ typedef struct {
     fs_vector3 accel;
 } fs_imu_noise;
 
-/* Return the part of the nominal state that moves. prediction.py:92 */
+/* Return the part of the nominal state that moves. prediction.py:95 */
 fs_motion fs_motion_of(const fs_nominal *n);
 
-/* Return a delta angle or velocity without the bias of its rate. prediction.py:72 */
+/* Return a delta angle or velocity without the bias of its rate. prediction.py:75 */
 fs_vector3 fs_less_bias(const fs_vector3 *v, const fs_vector3 *bias, fs_real dt_s);
 
 /*
  * Integrate one step: angle and delta_velocity in the body frame at the start, velocity by trapezoids.
- * prediction.py:78
+ * prediction.py:81
  */
 fs_motion fs_moved(const fs_motion *start, const fs_vector3 *angle, const fs_vector3 *delta_velocity, fs_real dt_s,
                    fs_real gravity);
 
-/* Return the nominal state with another motion. prediction.py:98 */
+/* Return the nominal state with another motion. prediction.py:101 */
 fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion);
 
-/* Propagate the state over the sample. The covariance is behind it until predict_errors. prediction.py:212 */
+/* Propagate the state over the sample. The covariance is behind it until predict_errors. prediction.py:221 */
 void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_params *params);
 
 /*
@@ -58,13 +58,13 @@ void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_
  *
  * The errors then move with the attitude in the middle of that time.
  *
- * prediction.py:228
+ * prediction.py:237
  */
 void fs_predict_errors(fs_filter *f, const fs_imu_noise *noise, const fs_estimator_params *params);
 
 /*
  * Add the uncertainty of what the sensor could not measure in a step; the position has half of the velocity's.
- * prediction.py:243
+ * prediction.py:252
  */
 void fs_add_unknown(fs_filter *f, const fs_delta_sample *step);
 
