@@ -26,6 +26,7 @@ from flightstack.estimation.error_state import (
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import (
     BARO,
+    CORRELATED,
     DRAG,
     GNSS_POSITION,
     GNSS_VELOCITY,
@@ -37,6 +38,8 @@ from flightstack.estimation.kalman import (
     RANGE,
     REST_RATE,
     REST_VELOCITY,
+    SLOW,
+    WHITE,
     Filter,
     Noise,
     clear,
@@ -132,7 +135,7 @@ def fuse_gnss_velocity(f: Filter, row: GnssRow, axis: int, fault: float, params:
     """Fuse the velocity along an axis; with the fault ``VELOCITY_IS_WRONG`` it has more noise."""
     speed_m_s = speed_accuracy(row)
     least = WRONG_VELOCITY_M_S if fault == VELOCITY_IS_WRONG else params.gnss_velocity_noise_m_s
-    noise = Noise(least, speed_m_s, max(2.0 * speed_m_s, least), params.gnss_velocity_gate, 0.0)
+    noise = Noise(least, speed_m_s, max(2.0 * speed_m_s, least), params.gnss_velocity_gate, WHITE)
     clear(f.h)
     f.h[VELOCITY + axis] = 1.0
     accepted = fuse(f, GNSS_VELOCITY + axis, row[4 + axis] - f.nominal[4 + axis], noise, 0.0)
@@ -150,7 +153,7 @@ def fuse_gnss_position(
         return
     accuracy_m = vertical_accuracy(row) if axis == 2 else horizontal_accuracy(row)
     least = params.gnss_position_noise_m
-    noise = Noise(least, accuracy_m, max(2.0 * accuracy_m, least), params.gnss_position_gate, 0.0)
+    noise = Noise(least, accuracy_m, max(2.0 * accuracy_m, least), params.gnss_position_gate, WHITE)
     clear(f.h)
     f.h[POSITION + axis] = 1.0
     f.h[GNSS_BIAS + axis] = 1.0
@@ -176,7 +179,7 @@ def fuse_baro(f: Filter, altitude_m: float, age_s: float, params: EstimatorParam
     f.h[POSITION + 2] = -1.0
     f.h[BARO_BIAS] = 1.0
     predicted_m = -(f.nominal[9] - age_s * f.nominal[6]) + f.nominal[24]
-    noise = Noise(params.baro_noise_m, 1.0, params.baro_largest_noise_m, params.baro_gate, 0.0)
+    noise = Noise(params.baro_noise_m, 1.0, params.baro_largest_noise_m, params.baro_gate, CORRELATED)
     fuse(f, BARO, altitude_m - predicted_m, noise, 0.0 if _is_aided(f) else HOLDS_HORIZONTAL)
 
 
@@ -194,7 +197,7 @@ def fuse_range(f: Filter, vertical_m: float, ground_m: float, age_s: float, para
     clear(f.h)
     f.h[POSITION + 2] = -1.0
     height_m = ground_m - (f.nominal[9] - age_s * f.nominal[6])
-    noise = Noise(params.range_noise_m, params.range_noise_m, 1.0, params.range_gate, 0.0)
+    noise = Noise(params.range_noise_m, params.range_noise_m, 1.0, params.range_gate, WHITE)
     fuse(f, RANGE, vertical_m - height_m, noise, 0.0)
 
 
@@ -206,7 +209,7 @@ def fuse_field_axis(f: Filter, axis: int, measured: Vector3, params: EstimatorPa
     correct the gyro's biases about x and y, by which the tilt moves, while the velocity tells more of them.
     """
     least, largest = params.mag_noise_gauss, params.mag_largest_noise_gauss
-    noise = Noise(least, min(_MAG_START * least, largest), largest, params.mag_gate, 1.0)
+    noise = Noise(least, min(_MAG_START * least, largest), largest, params.mag_gate, SLOW)
     n = read_nominal(f.nominal)
     earth, body = n.earth_field_ned_gauss, n.body_field_frd_gauss
     clear(f.h)
@@ -238,7 +241,7 @@ def fuse_drag(f: Filter, axis: int, force: Vector3, params: EstimatorParams) -> 
     the rotors' momentum and that of the body. Its change with |u| is left out of the Jacobian.
     """
     deviation = math.sqrt(params.drag_variance)
-    noise = Noise(deviation, deviation, deviation, _DRAG_GATE, 0.0)
+    noise = Noise(deviation, deviation, deviation, _DRAG_GATE, WHITE)
     n = read_nominal(f.nominal)
     v, bias = n.velocity_ned_m_s, n.accel_bias_m_s2
     north, east = n.wind_north_m_s, n.wind_east_m_s
@@ -259,7 +262,7 @@ def fuse_drag(f: Filter, axis: int, force: Vector3, params: EstimatorParams) -> 
 def fuse_rest_velocity(f: Filter, axis: int, params: EstimatorParams) -> None:
     """Fuse zero velocity along an axis of a vehicle that stands."""
     velocity = params.rest_velocity_noise_m_s
-    noise = Noise(velocity, velocity, velocity, 5.0, 0.0)
+    noise = Noise(velocity, velocity, velocity, 5.0, WHITE)
     clear(f.h)
     f.h[VELOCITY + axis] = 1.0
     fuse(f, REST_VELOCITY + axis, -f.nominal[4 + axis], noise, 0.0)
@@ -274,7 +277,7 @@ def fuse_rest_rate(
     ``rate_rad_s``, with this variance of noise, is the bias of the gyro.
     """
     deviation = params.rest_rate_noise_rad_s + math.sqrt(variance)
-    noise = Noise(deviation, deviation, deviation, 3.0, 0.0)
+    noise = Noise(deviation, deviation, deviation, 3.0, WHITE)
     clear(f.h)
     f.h[GYRO_BIAS + axis] = 1.0
     value = rate_rad_s.x if axis == 0 else rate_rad_s.y if axis == 1 else rate_rad_s.z
@@ -284,7 +287,7 @@ def fuse_rest_rate(
 @compiled
 def fuse_hold(f: Filter, axis: int, held_m: float, params: EstimatorParams) -> None:
     """Fuse a horizontal position that is held without a measurement of it, which bounds velocity and tilt."""
-    noise = Noise(params.hold_noise_m, params.hold_noise_m, params.hold_noise_m, 100.0, 0.0)
+    noise = Noise(params.hold_noise_m, params.hold_noise_m, params.hold_noise_m, 100.0, WHITE)
     clear(f.h)
     f.h[POSITION + axis] = 1.0
     fuse(f, HOLD_POSITION + axis, held_m - f.nominal[7 + axis], noise, 0.0)

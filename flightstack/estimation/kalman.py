@@ -29,6 +29,10 @@ _PRIOR = 2.0
 
 _LARGEST_CORRELATION = 0.95
 
+WHITE, CORRELATED, SLOW = 0.0, 1.0, 2.0
+"""Errors of successive measurements: independent of each other; correlated, so that they count for less; the same, and
+the first ones say little of the noise."""
+
 HOLDS_TILT, HOLDS_HORIZONTAL, HOLDS_TILT_AND_GYRO = 1.0, 2.0, 3.0
 """States that keep their values and their uncertainty in an update: tilt, velocity, position and the accelerometer's
 bias; the horizontal velocity and position; those of the first and the gyro's biases about x and y."""
@@ -44,7 +48,7 @@ class Observed(NamedTuple):
     variance: float
     """That the filter expects of it."""
     test_ratio: float
-    """Squared ratio to the gate; that of a slow sensor is as wide as its errors are alike."""
+    """Squared ratio to the gate, which is as wide as the errors are correlated."""
     fused_s: float
     """Time of the last accepted one."""
     noise: float
@@ -90,8 +94,8 @@ class Noise(NamedTuple):
     start: float
     largest: float
     gate: float
-    is_slow: float
-    """1 if the errors of successive measurements may be alike: then correlated innovations count for less."""
+    kind: float
+    """``WHITE``, ``CORRELATED`` or ``SLOW``."""
 
 
 @compiled
@@ -150,14 +154,16 @@ def _adapt_noise(o: ObservedRecord, r: float, projected: float, last: float, noi
 
     Each of these has twice its share of a mean: the noise stated at the start is forgotten with their number's square.
     Half the squared difference of two successive innovations has the variance of white noise, and an error of the
-    model, which both have, does not count. A slow sensor has the whole variance, as its correlation is counted apart.
+    model, which both have, does not count. Correlated errors have the whole variance, as their correlation is counted
+    apart.
     """
     innovation = o["innovation"]
     o["lagged"] += _ADAPTATION * (innovation * last - o["lagged"])
     share, square = _ADAPTATION, innovation * innovation
-    if noise.is_slow == 0.0 and o["fused"] > 1.0:
+    if noise.kind != SLOW and o["fused"] > 1.0:
         share = max(share, 2.0 / (o["fused"] + _PRIOR))
-        square = 0.5 * (innovation - last) * (innovation - last)
+        if noise.kind == WHITE:
+            square = 0.5 * (innovation - last) * (innovation - last)
     estimate = square - projected
     least, largest = noise.least * noise.least, noise.largest * noise.largest
     o["noise"] = min(max(r + share * (estimate - r), least), largest)
@@ -194,7 +200,7 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
     projected = _project(f)
     expected = projected + r
     variance = expected
-    if noise.is_slow > 0.0:
+    if noise.kind != WHITE:
         correlation = min(max(o["lagged"] / expected, 0.0), _LARGEST_CORRELATION)
         variance = projected + r * (1.0 + correlation) / (1.0 - correlation)
     last = o["innovation"]
@@ -202,7 +208,7 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
     o["innovation"], o["variance"], o["test_ratio"] = innovation, expected, ratio
     if not ratio <= 1.0:
         o["refused"] += 1.0
-        if noise.is_slow > 0.0 and abs(innovation) < noise.start:
+        if noise.kind == SLOW and abs(innovation) < noise.start:
             o["noise"] = min(r + _ADAPTATION * (innovation * innovation - expected), largest)
         return False
     o["fused"] += 1.0

@@ -17,7 +17,16 @@ from flightstack.estimation.error_state import (
 )
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.fusion import fuse_field_axis, speed_accuracy
-from flightstack.estimation.kalman import DECLINATION, KNOWN_FIELD, Filter, Noise, clear, fuse, reset_variance
+from flightstack.estimation.kalman import (
+    DECLINATION,
+    KNOWN_FIELD,
+    WHITE,
+    Filter,
+    Noise,
+    clear,
+    fuse,
+    reset_variance,
+)
 from flightstack.estimation.memory import (
     NOTHING,
     MemoryRecord,
@@ -113,7 +122,7 @@ def _fuse_known_field(m: MemoryRecord, f: Filter, axis: int, params: EstimatorPa
     noise = params.earth_field_gauss + params.field_scale * abs(value)
     clear(f.h)
     f.h[EARTH_FIELD + axis] = 1.0
-    of_model = Noise(noise, noise, noise, 1e3, 0.0)
+    of_model = Noise(noise, noise, noise, 1e3, WHITE)
     fuse(f, KNOWN_FIELD + axis, value - f.nominal[16 + axis], of_model, 0.0)
 
 
@@ -153,7 +162,7 @@ def _fuse_declination(f: Filter, was_rad: float, change_rad: float) -> None:
     clear(f.h)
     f.h[EARTH_FIELD] = -east / square
     f.h[EARTH_FIELD + 1] = north / square
-    noise = Noise(_DECLINATION_NOISE_RAD, _DECLINATION_NOISE_RAD, _DECLINATION_NOISE_RAD, 1e3, 0.0)
+    noise = Noise(_DECLINATION_NOISE_RAD, _DECLINATION_NOISE_RAD, _DECLINATION_NOISE_RAD, 1e3, WHITE)
     fuse(f, DECLINATION, change_rad, noise, 0.0)
     sine, cosine = sin_cos(was_rad + change_rad)
     along = north * cosine + east * sine

@@ -18,8 +18,8 @@ from flightstack.estimation.error_state import (
     VELOCITY,
 )
 from flightstack.estimation.estimator_params import EstimatorParams
-from flightstack.estimation.fusion import fuse_field_axis
-from flightstack.estimation.kalman import GNSS_VELOCITY, MAG, Filter
+from flightstack.estimation.fusion import fuse_baro, fuse_field_axis
+from flightstack.estimation.kalman import BARO, GNSS_VELOCITY, MAG, Filter
 from flightstack.estimation.memory import MEMORY
 from flightstack.estimation.prediction import ImuNoise, predict_errors
 
@@ -145,3 +145,18 @@ def test_rotation_there_and_back_leaves_little_error_of_scale() -> None:
     assert (
         spread[2] < 0.4 * PARAMS.gyro_scale_error * 0.2
     )  # measured 0.24; 3.2 with noise that is white for 1 s
+
+
+def test_gusts_weigh_less_than_white_noise_of_the_barometer() -> None:
+    weights = []
+    for kept in (0.0, 0.9):
+        f, error_m, rng = level(9.8), 0.0, np.random.default_rng(6)
+        for _ in range(1500):
+            f.covariance[:], f.nominal[9] = np.eye(ERROR_STATES) * 1e-6, 0.0
+            error_m = kept * error_m + rng.normal(0.0, 0.3 * math.sqrt(1.0 - kept * kept))
+            fuse_baro(f, error_m, 0.0, PARAMS)
+        o = f.observations[BARO]
+        assert math.sqrt(o["noise"]) == pytest.approx(0.3, rel=0.2)
+        assert o["nis_sum"] / o["fused"] == pytest.approx(1.0, abs=0.15)
+        weights.append(f.gain[POSITION + 2])
+    assert weights[1] / weights[0] < 0.1  # measured 0.045; (1 − 0.9) / (1 + 0.9) = 0.053

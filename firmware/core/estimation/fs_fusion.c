@@ -8,11 +8,13 @@
 #include "fs_math.h"
 
 #define FS_MAG_START FS_LIT(25.0)
+#define FS_SLOW FS_LIT(2.0)
 #define FS_GNSS_VELOCITY 0
 #define FS_AIDED_S FS_LIT(1.0)
 #define FS_HOLDS_TILT_AND_GYRO FS_LIT(3.0)
 #define FS_HOLDS_TILT FS_LIT(1.0)
 #define FS_MAG 7
+#define FS_WHITE FS_LIT(0.0)
 #define FS_VELOCITY 3
 #define FS_REST_VELOCITY 11
 #define FS_GYRO_BIAS 9
@@ -23,6 +25,7 @@
 #define FS_AIR_KG_M3 FS_LIT(1.225)
 #define FS_DRAG 23
 #define FS_BARO_BIAS 23
+#define FS_CORRELATED FS_LIT(1.0)
 #define FS_BARO 6
 #define FS_HOLDS_HORIZONTAL FS_LIT(2.0)
 #define FS_RANGE 10
@@ -39,14 +42,14 @@
 #define FS_POSITION_DRIFTS FS_LIT(1.0)
 #define FS_GNSS_POSITION 3
 
-/* Return True if GNSS measures the horizontal motion. fusion.py:162 */
+/* Return True if GNSS measures the horizontal motion. fusion.py:165 */
 static bool is_aided(const fs_filter *f)
 {
     const fs_real age_s = f->clock[0] - f->observations[FS_GNSS_VELOCITY].fused_s;
     return age_s < FS_AIDED_S;
 }
 
-/* fusion.py:202 */
+/* fusion.py:205 */
 void fs_fuse_field_axis(fs_filter *f, int32_t axis, const fs_vector3 *measured, const fs_estimator_params *params)
 {
     const fs_real least = params->mag_noise_gauss;
@@ -56,7 +59,7 @@ void fs_fuse_field_axis(fs_filter *f, int32_t axis, const fs_vector3 *measured, 
         .start = fs_min(FS_MAG_START * least, largest),
         .largest = largest,
         .gate = params->mag_gate,
-        .is_slow = FS_LIT(1.0),
+        .kind = FS_SLOW,
     };
     const fs_nominal n = fs_read_nominal(f->nominal);
     const fs_vector3 *earth = &n.earth_field_ned_gauss;
@@ -80,7 +83,7 @@ void fs_fuse_field_axis(fs_filter *f, int32_t axis, const fs_vector3 *measured, 
     (void)fs_fuse(f, FS_MAG + axis, innovation, &noise, params->mag_corrects_tilt > FS_LIT(0.0) ? FS_LIT(0.0) : held);
 }
 
-/* fusion.py:227 */
+/* fusion.py:230 */
 void fs_fuse_field(fs_filter *f, const fs_vector3 *measured, const fs_estimator_params *params)
 {
     for (int32_t axis = 0; axis < 3; axis++) {
@@ -88,29 +91,29 @@ void fs_fuse_field(fs_filter *f, const fs_vector3 *measured, const fs_estimator_
     }
 }
 
-/* fusion.py:259 */
+/* fusion.py:262 */
 void fs_fuse_rest_velocity(fs_filter *f, int32_t axis, const fs_estimator_params *params)
 {
     const fs_real velocity = params->rest_velocity_noise_m_s;
-    const fs_noise noise = {velocity, velocity, velocity, FS_LIT(5.0), FS_LIT(0.0)};
+    const fs_noise noise = {velocity, velocity, velocity, FS_LIT(5.0), FS_WHITE};
     fs_clear(f->h);
     f->h[FS_VELOCITY + axis] = FS_LIT(1.0);
     (void)fs_fuse(f, FS_REST_VELOCITY + axis, -f->nominal[4 + axis], &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:269 */
+/* fusion.py:272 */
 void fs_fuse_rest_rate(fs_filter *f, int32_t axis, const fs_vector3 *rate_rad_s, fs_real variance,
                        const fs_estimator_params *params)
 {
     const fs_real deviation = params->rest_rate_noise_rad_s + fs_sqrt(variance);
-    const fs_noise noise = {deviation, deviation, deviation, FS_LIT(3.0), FS_LIT(0.0)};
+    const fs_noise noise = {deviation, deviation, deviation, FS_LIT(3.0), FS_WHITE};
     fs_clear(f->h);
     f->h[FS_GYRO_BIAS + axis] = FS_LIT(1.0);
     const fs_real value = axis == 0 ? rate_rad_s->x : (axis == 1 ? rate_rad_s->y : rate_rad_s->z);
     (void)fs_fuse(f, FS_REST_RATE + axis, value - f->nominal[10 + axis], &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:285 */
+/* fusion.py:288 */
 void fs_fuse_hold(fs_filter *f, int32_t axis, fs_real held_m, const fs_estimator_params *params)
 {
     const fs_noise noise = {
@@ -118,18 +121,18 @@ void fs_fuse_hold(fs_filter *f, int32_t axis, fs_real held_m, const fs_estimator
         .start = params->hold_noise_m,
         .largest = params->hold_noise_m,
         .gate = FS_LIT(100.0),
-        .is_slow = FS_LIT(0.0),
+        .kind = FS_WHITE,
     };
     fs_clear(f->h);
     f->h[FS_POSITION + axis] = FS_LIT(1.0);
     (void)fs_fuse(f, FS_HOLD_POSITION + axis, held_m - f->nominal[7 + axis], &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:234 */
+/* fusion.py:237 */
 void fs_fuse_drag(fs_filter *f, int32_t axis, const fs_vector3 *force, const fs_estimator_params *params)
 {
     const fs_real deviation = fs_sqrt(params->drag_variance);
-    const fs_noise noise = {deviation, deviation, deviation, FS_DRAG_GATE, FS_LIT(0.0)};
+    const fs_noise noise = {deviation, deviation, deviation, FS_DRAG_GATE, FS_WHITE};
     const fs_nominal n = fs_read_nominal(f->nominal);
     const fs_vector3 *v = &n.velocity_ned_m_s;
     const fs_vector3 *bias = &n.accel_bias_m_s2;
@@ -152,7 +155,7 @@ void fs_fuse_drag(fs_filter *f, int32_t axis, const fs_vector3 *force, const fs_
     (void)fs_fuse(f, FS_DRAG + axis, innovation, &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:169 */
+/* fusion.py:172 */
 void fs_fuse_baro(fs_filter *f, fs_real altitude_m, fs_real age_s, const fs_estimator_params *params)
 {
     fs_clear(f->h);
@@ -164,12 +167,12 @@ void fs_fuse_baro(fs_filter *f, fs_real altitude_m, fs_real age_s, const fs_esti
         .start = FS_LIT(1.0),
         .largest = params->baro_largest_noise_m,
         .gate = params->baro_gate,
-        .is_slow = FS_LIT(0.0),
+        .kind = FS_CORRELATED,
     };
     (void)fs_fuse(f, FS_BARO, altitude_m - predicted_m, &noise, is_aided(f) ? FS_LIT(0.0) : FS_HOLDS_HORIZONTAL);
 }
 
-/* fusion.py:184 */
+/* fusion.py:187 */
 fs_real fs_cos_tilt_of(const fs_filter *f)
 {
     const fs_real x = f->nominal[1];
@@ -178,7 +181,7 @@ fs_real fs_cos_tilt_of(const fs_filter *f)
     return cosine;
 }
 
-/* fusion.py:192 */
+/* fusion.py:195 */
 void fs_fuse_range(fs_filter *f, fs_real vertical_m, fs_real ground_m, fs_real age_s,
                    const fs_estimator_params *params)
 {
@@ -190,42 +193,42 @@ void fs_fuse_range(fs_filter *f, fs_real vertical_m, fs_real ground_m, fs_real a
         .start = params->range_noise_m,
         .largest = FS_LIT(1.0),
         .gate = params->range_gate,
-        .is_slow = FS_LIT(0.0),
+        .kind = FS_WHITE,
     };
     (void)fs_fuse(f, FS_RANGE, vertical_m - height_m, &noise, FS_LIT(0.0));
 }
 
-/* Return an accuracy that a receiver states; unknown if it states none. Zero is an ideal receiver's. fusion.py:67 */
+/* Return an accuracy that a receiver states; unknown if it states none. Zero is an ideal receiver's. fusion.py:70 */
 static fs_real stated(fs_real accuracy, fs_real unknown)
 {
     return fs_is_finite(accuracy) && accuracy >= FS_LIT(0.0) ? accuracy : unknown;
 }
 
-/* fusion.py:85 */
+/* fusion.py:88 */
 fs_real fs_speed_accuracy(const fs_real row[10])
 {
     return stated(row[9], FS_UNKNOWN_M_S);
 }
 
-/* fusion.py:79 */
+/* fusion.py:82 */
 fs_real fs_vertical_accuracy(const fs_real row[10])
 {
     return stated(row[8], FS_UNKNOWN_VERTICAL_M);
 }
 
-/* fusion.py:73 */
+/* fusion.py:76 */
 fs_real fs_horizontal_accuracy(const fs_real row[10])
 {
     return stated(row[7], FS_UNKNOWN_M);
 }
 
-/* fusion.py:91 */
+/* fusion.py:94 */
 fs_real fs_gnss_bias_share(const fs_estimator_params *params, int32_t axis)
 {
     return params->gnss_bias_share * (axis == 2 ? fs_sqrt(FS_LIT(2.0)) : FS_LIT(1.0));
 }
 
-/* fusion.py:97 */
+/* fusion.py:100 */
 void fs_drift_gnss_bias(fs_filter *f, const fs_real row[10], fs_real elapsed_s, const fs_estimator_params *params)
 {
     const fs_real eph_m = fs_horizontal_accuracy(row);
@@ -253,7 +256,7 @@ void fs_drift_gnss_bias(fs_filter *f, const fs_real row[10], fs_real elapsed_s, 
  *
  * Fast motion and vibration look like noise of the IMU, but do not add up to an error of the velocity.
  *
- * fusion.py:120
+ * fusion.py:123
  */
 static void confirm_imu_noise(fs_filter *f, int32_t row)
 {
@@ -263,7 +266,7 @@ static void confirm_imu_noise(fs_filter *f, int32_t row)
                                 FS_LEAST_SHARE), FS_LIT(1.0));
 }
 
-/* fusion.py:131 */
+/* fusion.py:134 */
 void fs_fuse_gnss_velocity(fs_filter *f, const fs_real row[10], int32_t axis, fs_real fault,
                            const fs_estimator_params *params)
 {
@@ -274,7 +277,7 @@ void fs_fuse_gnss_velocity(fs_filter *f, const fs_real row[10], int32_t axis, fs
         .start = speed_m_s,
         .largest = fs_max(FS_LIT(2.0) * speed_m_s, least),
         .gate = params->gnss_velocity_gate,
-        .is_slow = FS_LIT(0.0),
+        .kind = FS_WHITE,
     };
     fs_clear(f->h);
     f->h[FS_VELOCITY + axis] = FS_LIT(1.0);
@@ -285,7 +288,7 @@ void fs_fuse_gnss_velocity(fs_filter *f, const fs_real row[10], int32_t axis, fs
     }
 }
 
-/* fusion.py:144 */
+/* fusion.py:147 */
 void fs_fuse_gnss_position(fs_filter *f, const fs_real row[10], fs_real age_s, int32_t axis, fs_real fault,
                            const fs_estimator_params *params)
 {
@@ -300,7 +303,7 @@ void fs_fuse_gnss_position(fs_filter *f, const fs_real row[10], fs_real age_s, i
         .start = accuracy_m,
         .largest = fs_max(FS_LIT(2.0) * accuracy_m, least),
         .gate = params->gnss_position_gate,
-        .is_slow = FS_LIT(0.0),
+        .kind = FS_WHITE,
     };
     fs_clear(f->h);
     f->h[FS_POSITION + axis] = FS_LIT(1.0);

@@ -8,13 +8,15 @@
 #include "fs_error_state.h"
 #include "fs_math.h"
 
+#define FS_WHITE FS_LIT(0.0)
 #define FS_LARGEST_CORRELATION FS_LIT(0.95)
+#define FS_SLOW FS_LIT(2.0)
 #define FS_ADAPTATION FS_LIT(0.01)
 #define FS_PRIOR FS_LIT(2.0)
 #define FS_HOLDS_HORIZONTAL FS_LIT(2.0)
 #define FS_HOLDS_TILT_AND_GYRO FS_LIT(3.0)
 
-/* kalman.py:220 */
+/* kalman.py:226 */
 void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
 {
     for (int32_t i = at; i < at + count; i++) {
@@ -28,7 +30,7 @@ void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real var
     }
 }
 
-/* kalman.py:98 */
+/* kalman.py:102 */
 void fs_clear(fs_real x[27])
 {
     for (int32_t i = 0; i < 27; i++) {
@@ -36,7 +38,7 @@ void fs_clear(fs_real x[27])
     }
 }
 
-/* Write P h' to ph and return h P h'. kalman.py:111 */
+/* Write P h' to ph and return h P h'. kalman.py:115 */
 static fs_real project(fs_filter *f)
 {
     fs_clear(f->ph);
@@ -61,9 +63,10 @@ static fs_real project(fs_filter *f)
  *
  * Each of these has twice its share of a mean: the noise stated at the start is forgotten with their number's square.
  * Half the squared difference of two successive innovations has the variance of white noise, and an error of the
- * model, which both have, does not count. A slow sensor has the whole variance, as its correlation is counted apart.
+ * model, which both have, does not count. Correlated errors have the whole variance, as their correlation is counted
+ * apart.
  *
- * kalman.py:148
+ * kalman.py:152
  */
 static void adapt_noise(fs_observed *o, fs_real r, fs_real projected, fs_real last, const fs_noise *noise)
 {
@@ -71,9 +74,11 @@ static void adapt_noise(fs_observed *o, fs_real r, fs_real projected, fs_real la
     o->lagged += FS_ADAPTATION * (innovation * last - o->lagged);
     fs_real share = FS_ADAPTATION;
     fs_real square = innovation * innovation;
-    if (noise->is_slow == FS_LIT(0.0) && o->fused > FS_LIT(1.0)) {
+    if (noise->kind != FS_SLOW && o->fused > FS_LIT(1.0)) {
         share = fs_max(share, FS_LIT(2.0) / (o->fused + FS_PRIOR));
-        square = FS_LIT(0.5) * (innovation - last) * (innovation - last);
+        if (noise->kind == FS_WHITE) {
+            square = FS_LIT(0.5) * (innovation - last) * (innovation - last);
+        }
     }
     const fs_real estimate = square - projected;
     const fs_real least = noise->least * noise->least;
@@ -81,7 +86,7 @@ static void adapt_noise(fs_observed *o, fs_real r, fs_real projected, fs_real la
     o->noise = fs_min(fs_max(r + share * (estimate - r), least), largest);
 }
 
-/* Make the gains of the states that are held zero. kalman.py:167 */
+/* Make the gains of the states that are held zero. kalman.py:173 */
 static void hold(fs_real gain[27], fs_real holds)
 {
     if (holds == FS_HOLDS_HORIZONTAL) {
@@ -113,7 +118,7 @@ static void hold(fs_real gain[27], fs_real holds)
  * Joseph's form with such a gain subtracts P h' h P / variance from the covariance, except between two states that
  * both keep their values: one product for each element instead of two.
  *
- * kalman.py:127
+ * kalman.py:131
  */
 static void correct(fs_filter *f, fs_real innovation)
 {
@@ -137,7 +142,7 @@ static void correct(fs_filter *f, fs_real innovation)
     fs_correct(f->nominal, f->gain, innovation);
 }
 
-/* kalman.py:183 */
+/* kalman.py:189 */
 bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *noise, fs_real holds)
 {
     fs_observed *o = &f->observations[row];
@@ -147,7 +152,7 @@ bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *nois
     const fs_real projected = project(f);
     const fs_real expected = projected + r;
     fs_real variance = expected;
-    if (noise->is_slow > FS_LIT(0.0)) {
+    if (noise->kind != FS_WHITE) {
         const fs_real correlation = fs_min(fs_max(o->lagged / expected, FS_LIT(0.0)), FS_LARGEST_CORRELATION);
         variance = projected + r * (FS_LIT(1.0) + correlation) / (FS_LIT(1.0) - correlation);
     }
@@ -158,7 +163,7 @@ bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *nois
     o->test_ratio = ratio;
     if (!(ratio <= FS_LIT(1.0))) {
         o->refused += FS_LIT(1.0);
-        if (noise->is_slow > FS_LIT(0.0) && fs_abs(innovation) < noise->start) {
+        if (noise->kind == FS_SLOW && fs_abs(innovation) < noise->start) {
             o->noise = fs_min(r + FS_ADAPTATION * (innovation * innovation - expected), largest);
         }
         return false;
@@ -175,7 +180,7 @@ bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *nois
     return true;
 }
 
-/* kalman.py:231 */
+/* kalman.py:237 */
 fs_real fs_deviation(const fs_filter *f, int32_t at, int32_t count)
 {
     fs_real total = FS_LIT(0.0);

@@ -40,13 +40,13 @@ typedef struct {
     fs_real start;
     fs_real largest;
     fs_real gate;
-    fs_real is_slow;
+    fs_real kind;
 } fs_noise;
 
-/* Make count states from at independent of all others, each with variance. kalman.py:220 */
+/* Make count states from at independent of all others, each with variance. kalman.py:226 */
 void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real variance);
 
-/* Set every item to zero. kalman.py:98 */
+/* Set every item to zero. kalman.py:102 */
 void fs_clear(fs_real x[27]);
 
 /*
@@ -57,11 +57,11 @@ void fs_clear(fs_real x[27]);
  *
  * With holds other than zero, these states keep their values and their uncertainty: a Schmidt-Kalman update.
  *
- * kalman.py:183
+ * kalman.py:189
  */
 bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *noise, fs_real holds);
 
-/* Return the root of the summed variances of count states from at. kalman.py:231 */
+/* Return the root of the summed variances of count states from at. kalman.py:237 */
 fs_real fs_deviation(const fs_filter *f, int32_t at, int32_t count);
 
 #endif

@@ -22,6 +22,7 @@
 #define FS_FIELD_STAGE 4
 #define FS_EARTH_FIELD 15
 #define FS_DECLINATION_NOISE_RAD FS_LIT(0.01)
+#define FS_WHITE FS_LIT(0.0)
 #define FS_DECLINATION 22
 #define FS_KNOWN_FIELD 19
 #define FS_COUNTED_TURN_RAD FS_LIT(0.01)
@@ -31,7 +32,7 @@
 #define FS_CERTAIN_SQUARE FS_LIT(16.0)
 #define FS_REFUSED_S FS_LIT(1.0)
 
-/* yaw_sources.py:167 */
+/* yaw_sources.py:176 */
 void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_sample *step)
 {
     if (m->yaw_fix.updates > FS_LIT(0.0)) {
@@ -45,7 +46,7 @@ void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_s
 
 /*
  * Turn the Earth's field by a change of the declination; the yaw follows as far as it depends on it.
- * yaw_sources.py:149
+ * yaw_sources.py:158
  */
 static void fuse_declination(fs_filter *f, fs_real was_rad, fs_real change_rad)
 {
@@ -60,7 +61,7 @@ static void fuse_declination(fs_filter *f, fs_real was_rad, fs_real change_rad)
         .start = FS_DECLINATION_NOISE_RAD,
         .largest = FS_DECLINATION_NOISE_RAD,
         .gate = FS_LIT(1000.0),
-        .is_slow = FS_LIT(0.0),
+        .kind = FS_WHITE,
     };
     (void)fs_fuse(f, FS_DECLINATION, change_rad, &noise, FS_LIT(0.0));
     fs_real sine;
@@ -73,7 +74,7 @@ static void fuse_declination(fs_filter *f, fs_real was_rad, fs_real change_rad)
     f->nominal[17] = along * sine + across * cosine;
 }
 
-/* Align the yaw again, or fuse the declination; return the next stage. yaw_sources.py:121 */
+/* Align the yaw again, or fuse the declination; return the next stage. yaw_sources.py:130 */
 static int32_t begin_earth_field(fs_estimator_memory *m, fs_filter *f, const fs_estimator_params *params)
 {
     const fs_vector3 known = fs_read_vector(m->earth, 0);
@@ -95,7 +96,7 @@ static int32_t begin_earth_field(fs_estimator_memory *m, fs_filter *f, const fs_
     return 1;
 }
 
-/* Fuse a component of the Earth's field. yaw_sources.py:110 */
+/* Fuse a component of the Earth's field. yaw_sources.py:119 */
 static void fuse_known_field(const fs_estimator_memory *m, fs_filter *f, int32_t axis,
                              const fs_estimator_params *params)
 {
@@ -103,13 +104,13 @@ static void fuse_known_field(const fs_estimator_memory *m, fs_filter *f, int32_t
     const fs_real noise = params->earth_field_gauss + params->field_scale * fs_abs(value);
     fs_clear(f->h);
     f->h[FS_EARTH_FIELD + axis] = FS_LIT(1.0);
-    const fs_noise of_model = {noise, noise, noise, FS_LIT(1000.0), FS_LIT(0.0)};
+    const fs_noise of_model = {noise, noise, noise, FS_LIT(1000.0), FS_WHITE};
     (void)fs_fuse(f, FS_KNOWN_FIELD + axis, value - f->nominal[16 + axis], &of_model, FS_LIT(0.0));
 }
 
 /*
  * Count the turn since the attitude in pending as a reset of the yaw; the field is not new any more.
- * yaw_sources.py:137
+ * yaw_sources.py:146
  */
 static void count_turn(fs_estimator_memory *m, const fs_filter *f)
 {
@@ -127,7 +128,7 @@ static void count_turn(fs_estimator_memory *m, const fs_filter *f)
     }
 }
 
-/* yaw_sources.py:85 */
+/* yaw_sources.py:94 */
 int32_t fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, int32_t stage, const fs_estimator_params *params)
 {
     fs_flags *flags = &m->flags;
@@ -154,7 +155,7 @@ int32_t fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, int32_t stage,
     return stage + 1;
 }
 
-/* Note the field; set the states of the field, and an unknown yaw, by the first one. yaw_sources.py:69 */
+/* Note the field; set the states of the field, and an unknown yaw, by the first one. yaw_sources.py:78 */
 static void start_field(fs_estimator_memory *m, fs_filter *f, const fs_vector3 *field,
                         const fs_estimator_params *params)
 {
@@ -177,7 +178,7 @@ static void start_field(fs_estimator_memory *m, fs_filter *f, const fs_vector3 *
     }
 }
 
-/* yaw_sources.py:54 */
+/* yaw_sources.py:63 */
 int32_t fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t axis,
                       const fs_estimator_params *params)
 {
@@ -192,7 +193,7 @@ int32_t fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[],
     return axis < 2 ? axis + 1 : 0;
 }
 
-/* Take tilt and yaw from the models, velocity and position from GNSS. yaw_sources.py:214 */
+/* Take tilt and yaw from the models, velocity and position from GNSS. yaw_sources.py:223 */
 static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 {
     m->yaw_fix.wrong_s = FS_LIT(0.0);
@@ -223,7 +224,7 @@ static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real 
 
 /*
  * Return True if the models have contradicted the yaw for a second, or do while GNSS velocities are refused.
- * yaw_sources.py:200
+ * yaw_sources.py:209
  */
 static bool is_wrong(fs_estimator_memory *m, fs_real time_s)
 {
@@ -241,7 +242,7 @@ static bool is_wrong(fs_estimator_memory *m, fs_real time_s)
     return lasts || (differs && is_refused);
 }
 
-/* yaw_sources.py:176 */
+/* yaw_sources.py:185 */
 void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 {
     fs_yaw_bank *bank = &m->yaw_bank;
