@@ -152,6 +152,18 @@ def _start_gnss(m: MemoryRecord, f: Filter, row: FloatArray, params: EstimatorPa
             p[at, GNSS_BIAS + axis] = -slow
     m["last_gnss_s"] = row[0]
     m["flags"]["has_gnss"] = 1
+    if m["flags"]["landed"] == 1:
+        _start_platform(m, f, row)
+
+
+@compiled
+def _start_platform(m: MemoryRecord, f: Filter, row: FloatArray) -> None:
+    """Take the first velocity of GNSS as that of what the vehicle stands on: until then it counted as still."""
+    for axis in range(2):
+        m["gnss_speed_m_s"][axis] = row[4 + axis]
+    if not is_platform_at_rest(m, f):
+        for axis in range(2):
+            reset_variance(f.covariance, VELOCITY + axis, 1, row[4 + axis] * row[4 + axis])
 
 
 @compiled

@@ -26,14 +26,14 @@
 #define FS_LONGEST_INTERVAL_S FS_LIT(2.5)
 #define FS_SPEED_SMOOTHING_S FS_LIT(2.0)
 
-/* position_sources.py:158 */
+/* position_sources.py:170 */
 bool fs_is_velocity_measured(const fs_filter *f)
 {
     const fs_real fused_s = f->observations[FS_GNSS_VELOCITY].fused_s;
     return fused_s > FS_LIT(0.0) && f->clock[0] - fused_s < FS_GNSS_LOST_S;
 }
 
-/* position_sources.py:165 */
+/* position_sources.py:177 */
 bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f)
 {
     const fs_real north = m->gnss_speed_m_s[0];
@@ -42,7 +42,7 @@ bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f)
     return !is_measured || fs_sqrt(north * north + east * east) < FS_MOVES_M_S;
 }
 
-/* position_sources.py:173 */
+/* position_sources.py:185 */
 int32_t fs_hold_position(fs_estimator_memory *m, fs_filter *f, int32_t axis, const fs_estimator_params *params)
 {
     fs_hold *hold = &m->hold;
@@ -64,6 +64,22 @@ int32_t fs_hold_position(fs_estimator_memory *m, fs_filter *f, int32_t axis, con
     }
     fs_fuse_hold(f, axis, hold->place_m[axis], params);
     return 1 - axis;
+}
+
+/*
+ * Take the first velocity of GNSS as that of what the vehicle stands on: until then it counted as still.
+ * position_sources.py:160
+ */
+static void start_platform(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
+{
+    for (int32_t axis = 0; axis < 2; axis++) {
+        m->gnss_speed_m_s[axis] = row[4 + axis];
+    }
+    if (!fs_is_platform_at_rest(m, f)) {
+        for (int32_t axis = 0; axis < 2; axis++) {
+            fs_reset_variance(f->covariance, FS_VELOCITY + axis, 1, row[4 + axis] * row[4 + axis]);
+        }
+    }
 }
 
 /*
@@ -92,6 +108,9 @@ static void start_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[]
     }
     m->last_gnss_s = row[0];
     m->flags.has_gnss = 1;
+    if (m->flags.landed == 1) {
+        start_platform(m, f, row);
+    }
 }
 
 /*

@@ -17,15 +17,15 @@
 #include "fs_types.h"
 #include "fs_yaw_estimator.h"
 
-/* Return True if a GNSS velocity was accepted within the last second. position_sources.py:158 */
+/* Return True if a GNSS velocity was accepted within the last second. position_sources.py:170 */
 bool fs_is_velocity_measured(const fs_filter *f);
 
-/* Return False if GNSS measures that what the vehicle stands on moves, as a boat does. position_sources.py:165 */
+/* Return False if GNSS measures that what the vehicle stands on moves, as a boat does. position_sources.py:177 */
 bool fs_is_platform_at_rest(const fs_estimator_memory *m, const fs_filter *f);
 
 /*
  * Hold the horizontal position while the velocity is not measured, north before east; return the next axis.
- * position_sources.py:173
+ * position_sources.py:185
  */
 int32_t fs_hold_position(fs_estimator_memory *m, fs_filter *f, int32_t axis, const fs_estimator_params *params);
 
