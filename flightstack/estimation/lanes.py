@@ -191,12 +191,11 @@ def _facts_of(view: _View, lane: Lane, health: EstimateHealth, since_s: float) -
     means = lane.newest.imu_track.mean_since(since_s)
     measures = health.imu_age_s <= IMU_MISSING_S and not health.imu_is_stuck
     if means is None or not (health.aligned and measures and math.isfinite(ratio + health.tilt_rad)):
-        return LaneFacts(False, ratio, _STILL, _STILL)
+        return LaneFacts(False, ratio, _STILL, _STILL, health.tilt_rad)
     x = view.biases.tolist()
     (p, q, r), (fx, fy, fz) = means
-    return LaneFacts(
-        True, ratio, Vector3(p - x[0], q - x[1], r - x[2]), Vector3(fx - x[3], fy - x[4], fz - x[5])
-    )
+    rates, force = Vector3(p - x[0], q - x[1], r - x[2]), Vector3(fx - x[3], fy - x[4], fz - x[5])
+    return LaneFacts(True, ratio, rates, force, health.tilt_rad)
 
 
 def _offset(new: FloatArray, old: FloatArray) -> StateOffset:

@@ -20,6 +20,8 @@ from flightstack.core.portable_math import distance
 LEAST_GAIN, ENOUGH = 0.2, 0.5
 """Difference of combined test ratios that counts (EKF2_SEL_ERR_RED), and their sum at which the lane changes."""
 MOST_RELATIVE = 1.0
+LESS_CERTAIN = 2.0
+"""Ratio of the deviations of the tilt from which smaller test ratios do not count: they are those of a wide gate."""
 BETWEEN_S = 10.0
 """Least time between two changes to a lane that is only better."""
 RATE_RAD_S, TURN_RAD = math.radians(1.5), math.radians(0.5)
@@ -40,6 +42,8 @@ class LaneFacts(NamedTuple):
     rates_rad_s: Vector3
     """Mean since the last selection, less the bias."""
     force_m_s2: Vector3
+    tilt_rad: float = 0.0
+    """Deviation."""
 
 
 class LaneRecord(NamedTuple):
@@ -103,7 +107,7 @@ def select(before: Selection, facts: Sequence[LaneFacts], time_s: float, dt_s: f
     """Return the selection at ``time_s``, ``dt_s`` after the last one."""
     here = before.selected
     compared = [
-        _compared(record, i, facts, facts[i].ratio - facts[here].ratio, before.disagree, dt_s)
+        _compared(record, i, facts, _worse(facts[i], facts[here]), before.disagree, dt_s)
         for i, record in enumerate(before.lanes)
     ]
     selection = before._replace(lanes=tuple(compared))
@@ -115,6 +119,15 @@ def select(before: Selection, facts: Sequence[LaneFacts], time_s: float, dt_s: f
     if selection.lanes[here].disagrees and not selection.lanes[other].disagrees:
         return change(selection, other, time_s, "disagrees with the others")
     return _better(selection, facts, time_s)
+
+
+def _worse(lane: LaneFacts, here: LaneFacts) -> float:
+    """Return by how much the test ratio of a lane is larger than that of the selected one.
+
+    A noisy sensor makes a filter uncertain, and so its test ratios small: it is not better for that.
+    """
+    worse = lane.ratio - here.ratio
+    return max(worse, 0.0) if lane.tilt_rad > LESS_CERTAIN * here.tilt_rad else worse
 
 
 def _better(selection: Selection, facts: Sequence[LaneFacts], time_s: float) -> Selection:

@@ -106,6 +106,12 @@ def test_of_three_the_one_that_disagrees_is_left(fault: LaneFacts) -> None:
     assert first_change((GOOD, fault, GOOD)) is None
 
 
+@pytest.mark.parametrize(("tilt_deg", "is_better"), [(0.3, True), (0.5, False), (5.0, False)])
+def test_lane_with_small_ratios_for_a_wide_gate_is_not_better(tilt_deg: float, is_better: bool) -> None:
+    here = TURNED._replace(ratio=0.45, tilt_rad=math.radians(0.2))
+    assert (first_change((here, GOOD._replace(tilt_rad=math.radians(tilt_deg)))) is not None) is is_better
+
+
 def test_sensors_that_agree_again_are_trusted_after_a_time() -> None:
     selection = start()
     for tick in range(100):
