@@ -94,7 +94,7 @@ def _end_gnss(m: MemoryRecord, f: Filter, row: FloatArray, first: int, params: E
     if m["flags"]["landed"] == 0:
         take_gnss_innovations(c, f, elapsed_s, m["flags"]["has_baro"] == 1)
         if first == 0:
-            take_horizontal_innovations(c, f, elapsed_s)
+            take_horizontal_innovations(c, f, elapsed_s, params.gravity_m_s2)
     dx, dy = f.nominal[7] - before["place_m"][0], f.nominal[8] - before["place_m"][1]
     if before["outage_s"] > _GNSS_LOST_S and dx * dx + dy * dy > _COUNTED_M * _COUNTED_M:
         v = before["velocity_m_s"]

@@ -1,10 +1,11 @@
-"""Checks of the sensors against each other: accelerometer, barometer, GNSS velocity and GNSS position.
+"""Checks of the sensors against each other: accelerometer, gyro, barometer, GNSS velocity and GNSS position.
 
 The mean of the normalised innovations of a sensor is near zero if filter and sensor agree, whatever the noise. A fault
 shows in the signs of several means, as in PX4's check of the vertical acceleration
 (``Ekf::estimateInertialNavFallingLikelihood``): if GNSS and barometer contradict the prediction alike, the
-accelerometer is wrong. Position and velocity of GNSS are compared with each other, over 20 s, and so is the pressure
-altitude with the vertical velocity: where they drift apart, the height of GNSS tells which one is wrong.
+accelerometer is wrong; if velocity and position of GNSS do, or the yaw of the magnetometer leaves the estimate on a
+constant heading, the gyro is. Position and velocity of GNSS are compared with each other, over 20 s, and so is the
+pressure altitude with the vertical velocity: where they drift apart, the height of GNSS tells which one is wrong.
 """
 
 from __future__ import annotations
@@ -13,13 +14,25 @@ import math
 from typing import Annotated, NamedTuple, TypeAlias
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray, Record
-from flightstack.estimation.error_state import ACCEL_BIAS, BARO_BIAS, POSITION, VELOCITY
+from flightstack.core.contract import FloatArray, Record, Vector3
+from flightstack.core.geometry import rotate
+from flightstack.estimation.error_state import (
+    ACCEL_BIAS,
+    ATTITUDE,
+    BARO_BIAS,
+    ERROR_STATES,
+    GYRO_BIAS,
+    POSITION,
+    VELOCITY,
+    read_nominal,
+)
 from flightstack.estimation.kalman import (
     BARO,
     GNSS_POSITION,
     GNSS_VELOCITY,
+    MAG,
     Filter,
+    clear,
 )
 
 CONSISTENT, POSITION_DRIFTS, VELOCITY_IS_WRONG = 0.0, 1.0, 2.0
@@ -40,6 +53,13 @@ _ACCEL_DENSITY, _ACCEL_BIAS_DENSITY, _BARO_DENSITY, _HEIGHT_DENSITY = 1.0, 0.25,
 """Variance per second that a wrong sensor adds to vertical velocity, accelerometer bias, barometer bias and height."""
 WRONG_VELOCITY_M_S = 2.0
 """Least noise of a GNSS velocity that contradicts other sensors; after the fault the filter learns a smaller one."""
+_SPEED_LIMIT, _PLACE_LIMIT = 0.8, 0.3
+"""Means of velocity and position of GNSS, alike, from which the gyro counts as wrong about a horizontal axis."""
+_STEP_RAD_S, _STEP_S, _STEPS_S = 0.025, 2.0, 1.0
+"""Step of a gyro's bias [1σ], its age when it is found, and the least time between two."""
+_YAW_MEAN_S, _YAW_LIMIT_RAD, _STRAIGHT_RAD_S, _TURN_SHARE = 10.0, 0.0175, 0.05, 0.8
+"""Time in which the yaw of the magnetometer leaves the estimate if the gyro is wrong about the vertical, and the limit;
+rate of a turn, in which soft iron does the same; least share of a turn in the square of the innovations."""
 _STUCK_S, _EQUAL_M = 1.0, 1e-9
 _DRIFT_S, _LONGEST_GAP_S, _DRIFT_ACCURACIES, _LEAST_ACCURACY_M = 20.0, 2.0, 4.0, 0.5
 """The least accuracy keeps the errors of the velocity of a receiver with centimetres from counting as a drift."""
@@ -74,6 +94,18 @@ class Checks(NamedTuple):
     """Of the barometer, downwards, from the velocity of GNSS."""
     sideways: Annotated[FloatArray, 2]
     """Means of the innovations of GNSS velocity along north and east."""
+    places: Annotated[FloatArray, 2]
+    """The same of GNSS position."""
+    gyro_s: float
+    """Time at which the gyro was found wrong last."""
+    yaw_now_rad: float
+    """Yaw of the magnetometer beyond the estimate."""
+    yaw_rad: float
+    """Its mean over 1 s."""
+    yaw_then_rad: float
+    """The same over 10 s."""
+    field_s: float
+    """Time of the last one."""
     onset_s: Annotated[FloatArray, 2]
     """Time at which GNSS velocity contradicted the prediction last, with the sign of its error."""
     altitude_s: float
@@ -109,13 +141,73 @@ def take_pressure_innovation(c: ChecksRecord, f: Filter, measured_s: float, alti
 
 
 @compiled
-def take_horizontal_innovations(c: ChecksRecord, f: Filter, dt_s: float) -> None:
-    """Take the horizontal innovations of GNSS velocity, and note when they contradict the prediction."""
+def take_horizontal_innovations(c: ChecksRecord, f: Filter, dt_s: float, gravity: float) -> None:
+    """Take the horizontal innovations of GNSS, and note when those of the velocity contradict the prediction.
+
+    If those of the position do so alike, the gyro is wrong.
+    """
+    is_wrong = False
     for axis in range(2):
         mean = _mean(c["sideways"][axis], f, GNSS_VELOCITY + axis, 1.0, dt_s)
-        c["sideways"][axis] = mean
+        place = _mean(c["places"][axis], f, GNSS_POSITION + axis, 1.0, dt_s)
+        c["sideways"][axis], c["places"][axis] = mean, place
         if abs(mean) > _LIMIT:
             c["onset_s"][axis] = f.clock[0] if mean > 0.0 else -f.clock[0]
+        if abs(mean) > _SPEED_LIMIT and abs(place) > _PLACE_LIMIT and mean * place > 0.0:
+            is_wrong = True
+    if is_wrong and f.clock[0] - c["gyro_s"] > _STEPS_S:
+        c["gyro_s"] = f.clock[0]
+        _doubt_gyro(f, 0, gravity)
+        _doubt_gyro(f, 1, gravity)
+
+
+@compiled
+def _doubt_gyro(f: Filter, axis: int, gravity: float) -> None:
+    """Add the uncertainty of a gyro whose bias about an axis of the body has stepped some time ago.
+
+    Since then it has turned the attitude, and so the specific force of a vehicle that hardly accelerates: errors of
+    attitude, velocity and position are added as one with that of the bias. The filter learns it from each of them, and
+    stays as certain of the rest.
+    """
+    unit = Vector3(1.0 if axis == 0 else 0.0, 1.0 if axis == 1 else 0.0, 1.0 if axis == 2 else 0.0)
+    about, step = rotate(read_nominal(f.nominal).attitude, unit), f.h
+    turn, speed = -_STEP_S, 0.5 * gravity * _STEP_S * _STEP_S
+    place = speed * _STEP_S / 3.0
+    clear(step)
+    step[ATTITUDE], step[ATTITUDE + 1], step[ATTITUDE + 2] = turn * about.x, turn * about.y, turn * about.z
+    step[VELOCITY], step[VELOCITY + 1] = speed * about.y, -speed * about.x
+    step[POSITION], step[POSITION + 1] = place * about.y, -place * about.x
+    step[GYRO_BIAS + axis] = 1.0
+    for i in range(ERROR_STATES):
+        share = _STEP_RAD_S * _STEP_RAD_S * step[i]
+        if share != 0.0:
+            for j in range(i, ERROR_STATES):
+                f.covariance[i, j] += share * step[j]
+
+
+@compiled
+def take_field_innovations(c: ChecksRecord, f: Filter, rate_rad_s: float, gravity: float) -> None:
+    """Take the innovations of the magnetometer: if its yaw leaves the estimate without a turn, the gyro is wrong.
+
+    A disturbed field jumps, or changes along other axes too.
+    """
+    o, n = f.observations, read_nominal(f.nominal)
+    innovation = Vector3(o[MAG]["innovation"], o[MAG + 1]["innovation"], o[MAG + 2]["innovation"])
+    off, earth = rotate(n.attitude, innovation), n.earth_field_ned_gauss
+    level = math.sqrt(earth.x * earth.x + earth.y * earth.y) + _LEAST_VARIANCE
+    across = (earth.y * off.x - earth.x * off.y) / level
+    yaw_rad, change_s = across / level, min(max(f.clock[0] - c["field_s"], 0.0), _MEAN_S)
+    jumps = abs(yaw_rad - c["yaw_now_rad"]) > _YAW_LIMIT_RAD or change_s >= _MEAN_S
+    c["field_s"], c["yaw_now_rad"] = f.clock[0], yaw_rad
+    c["yaw_rad"] = yaw_rad if jumps else c["yaw_rad"] + change_s / _MEAN_S * (yaw_rad - c["yaw_rad"])
+    c["yaw_then_rad"] += change_s / _YAW_MEAN_S * (c["yaw_rad"] - c["yaw_then_rad"])
+    if jumps or abs(rate_rad_s) > _STRAIGHT_RAD_S:
+        c["yaw_then_rad"] = c["yaw_rad"]
+    grown, square = c["yaw_rad"] - c["yaw_then_rad"], off.x * off.x + off.y * off.y + off.z * off.z
+    is_turn = across * across > _TURN_SHARE * square and grown * c["yaw_rad"] > 0.0
+    if abs(grown) > _YAW_LIMIT_RAD and is_turn:
+        c["yaw_then_rad"] = c["yaw_rad"]
+        _doubt_gyro(f, 2, gravity)
 
 
 @compiled

@@ -17,6 +17,7 @@ from flightstack.estimation.error_state import (
 )
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.fusion import fuse_field_axis, speed_accuracy
+from flightstack.estimation.imu_input import mean_rate
 from flightstack.estimation.kalman import (
     DECLINATION,
     KNOWN_FIELD,
@@ -33,6 +34,7 @@ from flightstack.estimation.memory import (
 )
 from flightstack.estimation.prediction import DeltaSample, less_bias
 from flightstack.estimation.resets import count_yaw_reset, reset_position, reset_velocity
+from flightstack.estimation.source_checks import take_field_innovations
 from flightstack.estimation.yaw_estimator import (
     attitude_of,
     likeliest,
@@ -71,6 +73,9 @@ def take_field(m: MemoryRecord, f: Filter, row: FloatArray, axis: int, params: E
     if axis == 0:
         _start_field(m, f, field, params)
     fuse_field_axis(f, axis, field, params)
+    if axis == 2 and m["flags"]["landed"] == 0:
+        rate_rad_s = mean_rate(m["sums"]).z - f.nominal[12]
+        take_field_innovations(m["checks"], f, rate_rad_s, params.gravity_m_s2)
     return axis + 1 if axis < 2 else 0
 
 

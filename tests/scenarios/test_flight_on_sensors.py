@@ -220,6 +220,8 @@ def test_gnss_that_comes_back_is_not_suspected_of_spoofing() -> None:
         (0.0, "sensor:imu:vibration=10", 0.5, 1.5),  # 0.22, 0.58
         (10.0, "sensor:mag:turn=90", 0.5, 3.0),  # 0.20, 1.41
         (10.0, "sensor:accel:bias=0.5,0,0", 1.9, 2.5),  # 1.48, 1.52
+        (10.0, "sensor:gyro:bias=1,0,1", 1.3, 3.0),  # 0.87, 2.43
+        (10.0, "sensor:mag:bias=0.03,-0.03,0", 0.5, 1.5),  # 0.25, 0.89
     ],
 )
 def test_estimate_stays_true_with_a_faulty_sensor(

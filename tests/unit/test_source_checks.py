@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import math
 from collections import Counter
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -86,6 +87,23 @@ def test_drifting_barometer_is_contradicted_by_gnss_velocity(drift_m_s: float) -
 
     error, _ = errors_m(change)
     assert error[2] < 1.8  # measured 1.3 and 1.4, of a drift of 12 m
+
+
+def _turning(x_deg_s: float) -> Change:
+    def turning(sample: Any, _: float) -> Any:
+        if not isinstance(sample, ImuSample):
+            return sample
+        x, y, z = sample.gyro_frd_rad_s
+        return sample._replace(gyro_frd_rad_s=Vector3(x + math.radians(x_deg_s), y, z))
+
+    return turning
+
+
+@pytest.mark.parametrize(("bias_deg_s", "most_m"), [(1.0, 0.5), (3.0, 0.9)])  # measured 0.29, 0.55
+def test_gyro_bias_that_steps_in_flight_loses_no_position(bias_deg_s: float, most_m: float) -> None:
+    error, estimator = errors_m(_turning(bias_deg_s), 40.0, BUILT_IN)
+    assert max(error[:2]) < most_m
+    assert estimator.memory["resets"]["position"]["number"][0] == 0.0
 
 
 def test_stuck_barometer_is_left_out_until_it_changes() -> None:
@@ -257,6 +275,7 @@ def blamed(estimator: Estimator) -> set[str]:
     faults = set(checks["fault"][:2])
     signs = {
         "accelerometer": now_s < checks["accel_until_s"],
+        "gyro": 0.0 < checks["gyro_s"] > now_s - 2.0,
         "barometer drifts": now_s < checks["baro_until_s"],
         "barometer is stuck": memory["flags"]["has_baro"] == 0,
         "climb of GNSS": checks["fault"][2] == VELOCITY_IS_WRONG,
@@ -271,6 +290,7 @@ def blamed(estimator: Estimator) -> set[str]:
     ("change", "source"),
     [
         (_pushed, "accelerometer"),
+        (_turning(2.0), "gyro"),
         (_raised, "barometer drifts"),
         (_held, "barometer is stuck"),
         (_climbing, "climb of GNSS"),

@@ -166,7 +166,7 @@ static void end_gnss(fs_estimator_memory *m, fs_filter *f, const fs_real row[], 
     if (m->flags.landed == 0) {
         fs_take_gnss_innovations(c, f, elapsed_s, m->flags.has_baro == 1);
         if (first == 0) {
-            fs_take_horizontal_innovations(c, f, elapsed_s);
+            fs_take_horizontal_innovations(c, f, elapsed_s, params->gravity_m_s2);
         }
     }
     const fs_real dx = f->nominal[7] - before->place_m[0];

@@ -1,10 +1,13 @@
 /* Generated from Python by flightstack.firmware.generator: do not edit. */
 /*
- * Checks of the sensors against each other: accelerometer, barometer, GNSS velocity and GNSS position.
+ * Checks of the sensors against each other: accelerometer, gyro, barometer, GNSS velocity and GNSS position.
  * flightstack/estimation/source_checks.py
  */
 #include "fs_source_checks.h"
 
+#include "fs_error_state.h"
+#include "fs_geometry.h"
+#include "fs_kalman.h"
 #include "fs_math.h"
 
 #define FS_ACCEL_DENSITY FS_LIT(1.0)
@@ -15,11 +18,20 @@
 #define FS_BARO_BIAS 23
 #define FS_HEIGHT_DENSITY FS_LIT(0.1)
 #define FS_POSITION 6
+#define FS_MAG 7
+#define FS_LEAST_VARIANCE FS_LIT(1e-12)
+#define FS_MEAN_S FS_LIT(1.0)
+#define FS_YAW_LIMIT_RAD FS_LIT(0.0175)
+#define FS_YAW_MEAN_S FS_LIT(10.0)
+#define FS_STRAIGHT_RAD_S FS_LIT(0.05)
+#define FS_TURN_SHARE FS_LIT(0.8)
+#define FS_STEP_S FS_LIT(2.0)
+#define FS_ATTITUDE 0
+#define FS_GYRO_BIAS 9
+#define FS_STEP_RAD_S FS_LIT(0.025)
 #define FS_EQUAL_M FS_LIT(1e-09)
 #define FS_STUCK_S FS_LIT(1.0)
-#define FS_LEAST_VARIANCE FS_LIT(1e-12)
 #define FS_LARGEST FS_LIT(3.0)
-#define FS_MEAN_S FS_LIT(1.0)
 #define FS_BARO 6
 #define FS_MISSING_S FS_LIT(0.5)
 #define FS_LONGEST_GAP_S FS_LIT(2.0)
@@ -41,8 +53,11 @@
 #define FS_GNSS_POSITION 3
 #define FS_LIMIT FS_LIT(1.0)
 #define FS_ACCEL_HOLD_S FS_LIT(1.0)
+#define FS_SPEED_LIMIT FS_LIT(0.8)
+#define FS_PLACE_LIMIT FS_LIT(0.3)
+#define FS_STEPS_S FS_LIT(1.0)
 
-/* source_checks.py:133 */
+/* source_checks.py:225 */
 void fs_add_fault_noise(const fs_checks *c, fs_filter *f, fs_real dt_s)
 {
     if (f->clock[0] < c->accel_until_s) {
@@ -56,7 +71,79 @@ void fs_add_fault_noise(const fs_checks *c, fs_filter *f, fs_real dt_s)
     }
 }
 
-/* source_checks.py:145 */
+/*
+ * Add the uncertainty of a gyro whose bias about an axis of the body has stepped some time ago.
+ *
+ * Since then it has turned the attitude, and so the specific force of a vehicle that hardly accelerates: errors of
+ * attitude, velocity and position are added as one with that of the bias. The filter learns it from each of them, and
+ * stays as certain of the rest.
+ *
+ * source_checks.py:165
+ */
+static void doubt_gyro(fs_filter *f, int32_t axis, fs_real gravity)
+{
+    const fs_vector3 unit = {
+        .x = axis == 0 ? FS_LIT(1.0) : FS_LIT(0.0),
+        .y = axis == 1 ? FS_LIT(1.0) : FS_LIT(0.0),
+        .z = axis == 2 ? FS_LIT(1.0) : FS_LIT(0.0),
+    };
+    const fs_nominal read_nominal = fs_read_nominal(f->nominal);
+    const fs_vector3 about = fs_rotate(&read_nominal.attitude, &unit);
+    const fs_real turn = -FS_STEP_S;
+    const fs_real speed = FS_LIT(0.5) * gravity * FS_STEP_S * FS_STEP_S;
+    const fs_real place = speed * FS_STEP_S / FS_LIT(3.0);
+    fs_clear(f->h);
+    f->h[FS_ATTITUDE] = turn * about.x;
+    f->h[FS_ATTITUDE + 1] = turn * about.y;
+    f->h[FS_ATTITUDE + 2] = turn * about.z;
+    f->h[FS_VELOCITY] = speed * about.y;
+    f->h[FS_VELOCITY + 1] = -speed * about.x;
+    f->h[FS_POSITION] = place * about.y;
+    f->h[FS_POSITION + 1] = -place * about.x;
+    f->h[FS_GYRO_BIAS + axis] = FS_LIT(1.0);
+    for (int32_t i = 0; i < 27; i++) {
+        const fs_real share = FS_STEP_RAD_S * FS_STEP_RAD_S * f->h[i];
+        if (share != FS_LIT(0.0)) {
+            for (int32_t j = i; j < 27; j++) {
+                f->covariance[i][j] += share * f->h[j];
+            }
+        }
+    }
+}
+
+/* source_checks.py:189 */
+void fs_take_field_innovations(fs_checks *c, fs_filter *f, fs_real rate_rad_s, fs_real gravity)
+{
+    const fs_nominal n = fs_read_nominal(f->nominal);
+    const fs_vector3 innovation = {
+        .x = f->observations[FS_MAG].innovation,
+        .y = f->observations[FS_MAG + 1].innovation,
+        .z = f->observations[FS_MAG + 2].innovation,
+    };
+    const fs_vector3 off = fs_rotate(&n.attitude, &innovation);
+    const fs_vector3 *earth = &n.earth_field_ned_gauss;
+    const fs_real level = fs_sqrt(earth->x * earth->x + earth->y * earth->y) + FS_LEAST_VARIANCE;
+    const fs_real across = (earth->y * off.x - earth->x * off.y) / level;
+    const fs_real yaw_rad = across / level;
+    const fs_real change_s = fs_min(fs_max(f->clock[0] - c->field_s, FS_LIT(0.0)), FS_MEAN_S);
+    const bool jumps = fs_abs(yaw_rad - c->yaw_now_rad) > FS_YAW_LIMIT_RAD || change_s >= FS_MEAN_S;
+    c->field_s = f->clock[0];
+    c->yaw_now_rad = yaw_rad;
+    c->yaw_rad = jumps ? yaw_rad : c->yaw_rad + change_s / FS_MEAN_S * (yaw_rad - c->yaw_rad);
+    c->yaw_then_rad += change_s / FS_YAW_MEAN_S * (c->yaw_rad - c->yaw_then_rad);
+    if (jumps || fs_abs(rate_rad_s) > FS_STRAIGHT_RAD_S) {
+        c->yaw_then_rad = c->yaw_rad;
+    }
+    const fs_real grown = c->yaw_rad - c->yaw_then_rad;
+    const fs_real square = off.x * off.x + off.y * off.y + off.z * off.z;
+    const bool is_turn = across * across > FS_TURN_SHARE * square && grown * c->yaw_rad > FS_LIT(0.0);
+    if (fs_abs(grown) > FS_YAW_LIMIT_RAD && is_turn) {
+        c->yaw_then_rad = c->yaw_rad;
+        doubt_gyro(f, 2, gravity);
+    }
+}
+
+/* source_checks.py:237 */
 bool fs_is_stuck(fs_checks *c, fs_real altitude_m, fs_real now_s)
 {
     if (fs_abs(altitude_m - c->altitude_m) > FS_EQUAL_M) {
@@ -67,7 +154,7 @@ bool fs_is_stuck(fs_checks *c, fs_real altitude_m, fs_real now_s)
     return equal_s > FS_STUCK_S;
 }
 
-/* Return a mean of innovations upwards with the newest one of a row. source_checks.py:94 */
+/* Return a mean of innovations upwards with the newest one of a row. source_checks.py:126 */
 static fs_real mean_(fs_real mean, const fs_filter *f, int32_t row, fs_real sign, fs_real dt_s)
 {
     const fs_observed *o = &f->observations[row];
@@ -78,7 +165,7 @@ static fs_real mean_(fs_real mean, const fs_filter *f, int32_t row, fs_real sign
     return made;
 }
 
-/* source_checks.py:105 */
+/* source_checks.py:137 */
 void fs_take_pressure_innovation(fs_checks *c, const fs_filter *f, fs_real measured_s, fs_real altitude_m)
 {
     c->pressure = mean_(c->pressure, f, FS_BARO, FS_LIT(1.0), fs_max(FS_LIT(0.0), measured_s - c->altitude_s));
@@ -87,7 +174,7 @@ void fs_take_pressure_innovation(fs_checks *c, const fs_filter *f, fs_real measu
 }
 
 /*
- * Decide whether barometer or vertical GNSS velocity is wrong, beyond the noise of their drift. source_checks.py:205
+ * Decide whether barometer or vertical GNSS velocity is wrong, beyond the noise of their drift. source_checks.py:297
  */
 static void check_height(fs_checks *c, fs_real now_s, fs_real noise_m)
 {
@@ -107,7 +194,7 @@ static void check_height(fs_checks *c, fs_real now_s, fs_real noise_m)
     }
 }
 
-/* source_checks.py:183 */
+/* source_checks.py:275 */
 void fs_follow_height_drift(fs_checks *c, const fs_real row[], bool flies, fs_real accuracy_m_s)
 {
     const fs_real dt_s = row[0] - c->gnss_s;
@@ -140,7 +227,7 @@ void fs_follow_height_drift(fs_checks *c, const fs_real row[], bool flies, fs_re
  * not. A wrong velocity has moved position and velocity of the filter by as much as the drift, and has noise from now
  * on.
  *
- * source_checks.py:220
+ * source_checks.py:312
  */
 static void start_fault(fs_checks *c, fs_filter *f, int32_t axis)
 {
@@ -158,7 +245,7 @@ static void start_fault(fs_checks *c, fs_filter *f, int32_t axis)
 
 /*
  * Let the position become uncertain at the rate of the drift, for the velocity may be wrong instead.
- * source_checks.py:238
+ * source_checks.py:330
  */
 static void doubt_position(const fs_checks *c, fs_filter *f, int32_t axis, fs_real dt_s)
 {
@@ -167,7 +254,7 @@ static void doubt_position(const fs_checks *c, fs_filter *f, int32_t axis, fs_re
     f->covariance[at][at] = grown_m * grown_m;
 }
 
-/* source_checks.py:154 */
+/* source_checks.py:246 */
 void fs_follow_drift(fs_checks *c, fs_filter *f, const fs_real row[], fs_real eph_m)
 {
     const fs_real dt_s = row[0] - c->gnss_s;
@@ -202,7 +289,7 @@ void fs_follow_drift(fs_checks *c, fs_filter *f, const fs_real row[], fs_real ep
     c->gnss_s = row[0];
 }
 
-/* source_checks.py:122 */
+/* source_checks.py:214 */
 void fs_take_gnss_innovations(fs_checks *c, const fs_filter *f, fs_real dt_s, bool has_baro)
 {
     c->speed = mean_(c->speed, f, FS_GNSS_VELOCITY + 2, FS_LIT(-1.0), dt_s);
@@ -214,19 +301,30 @@ void fs_take_gnss_innovations(fs_checks *c, const fs_filter *f, fs_real dt_s, bo
     }
 }
 
-/* source_checks.py:112 */
-void fs_take_horizontal_innovations(fs_checks *c, const fs_filter *f, fs_real dt_s)
+/* source_checks.py:144 */
+void fs_take_horizontal_innovations(fs_checks *c, fs_filter *f, fs_real dt_s, fs_real gravity)
 {
+    bool is_wrong = false;
     for (int32_t axis = 0; axis < 2; axis++) {
         const fs_real mean = mean_(c->sideways[axis], f, FS_GNSS_VELOCITY + axis, FS_LIT(1.0), dt_s);
+        const fs_real place = mean_(c->places[axis], f, FS_GNSS_POSITION + axis, FS_LIT(1.0), dt_s);
         c->sideways[axis] = mean;
+        c->places[axis] = place;
         if (fs_abs(mean) > FS_LIMIT) {
             c->onset_s[axis] = mean > FS_LIT(0.0) ? f->clock[0] : -f->clock[0];
         }
+        if (fs_abs(mean) > FS_SPEED_LIMIT && fs_abs(place) > FS_PLACE_LIMIT && mean * place > FS_LIT(0.0)) {
+            is_wrong = true;
+        }
+    }
+    if (is_wrong && f->clock[0] - c->gyro_s > FS_STEPS_S) {
+        c->gyro_s = f->clock[0];
+        doubt_gyro(f, 0, gravity);
+        doubt_gyro(f, 1, gravity);
     }
 }
 
-/* source_checks.py:246 */
+/* source_checks.py:338 */
 bool fs_position_drifts(const fs_checks *c)
 {
     const fs_real north = c->fault[0];

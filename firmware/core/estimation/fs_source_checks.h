@@ -1,6 +1,6 @@
 /* Generated from Python by flightstack.firmware.generator: do not edit. */
 /*
- * Checks of the sensors against each other: accelerometer, barometer, GNSS velocity and GNSS position.
+ * Checks of the sensors against each other: accelerometer, gyro, barometer, GNSS velocity and GNSS position.
  * flightstack/estimation/source_checks.py
  */
 #ifndef FS_SOURCE_CHECKS_H
@@ -25,6 +25,12 @@ typedef struct {
     fs_real fault[3];
     fs_real baro_drift_m;
     fs_real sideways[2];
+    fs_real places[2];
+    fs_real gyro_s;
+    fs_real yaw_now_rad;
+    fs_real yaw_rad;
+    fs_real yaw_then_rad;
+    fs_real field_s;
     fs_real onset_s[2];
     fs_real altitude_s;
     fs_real altitude_then_m;
@@ -35,17 +41,26 @@ typedef struct {
 
 /*
  * Add the uncertainty of the sensors that count as wrong, so that the filter learns their error anew.
- * source_checks.py:133
+ * source_checks.py:225
  */
 void fs_add_fault_noise(const fs_checks *c, fs_filter *f, fs_real dt_s);
 
 /*
+ * Take the innovations of the magnetometer: if its yaw leaves the estimate without a turn, the gyro is wrong.
+ *
+ * A disturbed field jumps, or changes along other axes too.
+ *
+ * source_checks.py:189
+ */
+void fs_take_field_innovations(fs_checks *c, fs_filter *f, fs_real rate_rad_s, fs_real gravity);
+
+/*
  * Return True if the barometer has repeated its altitude for 1 s; its noise changes each measurement.
- * source_checks.py:145
+ * source_checks.py:237
  */
 bool fs_is_stuck(fs_checks *c, fs_real altitude_m, fs_real now_s);
 
-/* Take the barometer's newest innovation, of an altitude measured at measured_s. source_checks.py:105 */
+/* Take the barometer's newest innovation, of an altitude measured at measured_s. source_checks.py:137 */
 void fs_take_pressure_innovation(fs_checks *c, const fs_filter *f, fs_real measured_s, fs_real altitude_m);
 
 /*
@@ -53,7 +68,7 @@ void fs_take_pressure_innovation(fs_checks *c, const fs_filter *f, fs_real measu
  *
  * accuracy_m_s is that of the velocity, whose noise adds up.
  *
- * source_checks.py:183
+ * source_checks.py:275
  */
 void fs_follow_height_drift(fs_checks *c, const fs_real row[], bool flies, fs_real accuracy_m_s);
 
@@ -64,20 +79,23 @@ void fs_follow_height_drift(fs_checks *c, const fs_real row[], bool flies, fs_re
  * that. A jump counts as a change of one accuracy: the gate of the innovation refuses it. The barometer watches the
  * height.
  *
- * source_checks.py:154
+ * source_checks.py:246
  */
 void fs_follow_drift(fs_checks *c, fs_filter *f, const fs_real row[], fs_real eph_m);
 
-/* Take the vertical innovations of GNSS, and decide whether the accelerometer is wrong. source_checks.py:122 */
+/* Take the vertical innovations of GNSS, and decide whether the accelerometer is wrong. source_checks.py:214 */
 void fs_take_gnss_innovations(fs_checks *c, const fs_filter *f, fs_real dt_s, bool has_baro);
 
 /*
- * Take the horizontal innovations of GNSS velocity, and note when they contradict the prediction.
- * source_checks.py:112
+ * Take the horizontal innovations of GNSS, and note when those of the velocity contradict the prediction.
+ *
+ * If those of the position do so alike, the gyro is wrong.
+ *
+ * source_checks.py:144
  */
-void fs_take_horizontal_innovations(fs_checks *c, const fs_filter *f, fs_real dt_s);
+void fs_take_horizontal_innovations(fs_checks *c, fs_filter *f, fs_real dt_s, fs_real gravity);
 
-/* Return True if the GNSS position drifts from its velocity along an axis. source_checks.py:246 */
+/* Return True if the GNSS position drifts from its velocity along an axis. source_checks.py:338 */
 bool fs_position_drifts(const fs_checks *c);
 
 #endif

@@ -11,10 +11,12 @@
 #include "fs_estimation_math.h"
 #include "fs_fusion.h"
 #include "fs_geometry.h"
+#include "fs_imu_input.h"
 #include "fs_kalman.h"
 #include "fs_math.h"
 #include "fs_prediction.h"
 #include "fs_resets.h"
+#include "fs_source_checks.h"
 #include "fs_yaw_estimator.h"
 
 #define FS_NOTHING -1
@@ -32,7 +34,7 @@
 #define FS_CERTAIN_SQUARE FS_LIT(16.0)
 #define FS_REFUSED_S FS_LIT(1.0)
 
-/* yaw_sources.py:176 */
+/* yaw_sources.py:181 */
 void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_sample *step)
 {
     if (m->yaw_fix.updates > FS_LIT(0.0)) {
@@ -46,7 +48,7 @@ void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_s
 
 /*
  * Turn the Earth's field by a change of the declination; the yaw follows as far as it depends on it.
- * yaw_sources.py:158
+ * yaw_sources.py:163
  */
 static void fuse_declination(fs_filter *f, fs_real was_rad, fs_real change_rad)
 {
@@ -74,7 +76,7 @@ static void fuse_declination(fs_filter *f, fs_real was_rad, fs_real change_rad)
     f->nominal[17] = along * sine + across * cosine;
 }
 
-/* Align the yaw again, or fuse the declination; return the next stage. yaw_sources.py:130 */
+/* Align the yaw again, or fuse the declination; return the next stage. yaw_sources.py:135 */
 static int32_t begin_earth_field(fs_estimator_memory *m, fs_filter *f, const fs_estimator_params *params)
 {
     const fs_vector3 known = fs_read_vector(m->earth, 0);
@@ -96,7 +98,7 @@ static int32_t begin_earth_field(fs_estimator_memory *m, fs_filter *f, const fs_
     return 1;
 }
 
-/* Fuse a component of the Earth's field. yaw_sources.py:119 */
+/* Fuse a component of the Earth's field. yaw_sources.py:124 */
 static void fuse_known_field(const fs_estimator_memory *m, fs_filter *f, int32_t axis,
                              const fs_estimator_params *params)
 {
@@ -110,7 +112,7 @@ static void fuse_known_field(const fs_estimator_memory *m, fs_filter *f, int32_t
 
 /*
  * Count the turn since the attitude in pending as a reset of the yaw; the field is not new any more.
- * yaw_sources.py:146
+ * yaw_sources.py:151
  */
 static void count_turn(fs_estimator_memory *m, const fs_filter *f)
 {
@@ -128,7 +130,7 @@ static void count_turn(fs_estimator_memory *m, const fs_filter *f)
     }
 }
 
-/* yaw_sources.py:94 */
+/* yaw_sources.py:99 */
 int32_t fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, int32_t stage, const fs_estimator_params *params)
 {
     fs_flags *flags = &m->flags;
@@ -155,7 +157,7 @@ int32_t fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, int32_t stage,
     return stage + 1;
 }
 
-/* Note the field; set the states of the field, and an unknown yaw, by the first one. yaw_sources.py:78 */
+/* Note the field; set the states of the field, and an unknown yaw, by the first one. yaw_sources.py:83 */
 static void start_field(fs_estimator_memory *m, fs_filter *f, const fs_vector3 *field,
                         const fs_estimator_params *params)
 {
@@ -178,7 +180,7 @@ static void start_field(fs_estimator_memory *m, fs_filter *f, const fs_vector3 *
     }
 }
 
-/* yaw_sources.py:63 */
+/* yaw_sources.py:65 */
 int32_t fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t axis,
                       const fs_estimator_params *params)
 {
@@ -190,10 +192,15 @@ int32_t fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[],
         start_field(m, f, &field, params);
     }
     fs_fuse_field_axis(f, axis, &field, params);
+    if (axis == 2 && m->flags.landed == 0) {
+        const fs_vector3 mean_rate = fs_mean_rate(&m->sums);
+        const fs_real rate_rad_s = mean_rate.z - f->nominal[12];
+        fs_take_field_innovations(&m->checks, f, rate_rad_s, params->gravity_m_s2);
+    }
     return axis < 2 ? axis + 1 : 0;
 }
 
-/* Take tilt and yaw from the models, velocity and position from GNSS. yaw_sources.py:223 */
+/* Take tilt and yaw from the models, velocity and position from GNSS. yaw_sources.py:228 */
 static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 {
     m->yaw_fix.wrong_s = FS_LIT(0.0);
@@ -224,7 +231,7 @@ static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real 
 
 /*
  * Return True if the models have contradicted the yaw for a second, or do while GNSS velocities are refused.
- * yaw_sources.py:209
+ * yaw_sources.py:214
  */
 static bool is_wrong(fs_estimator_memory *m, fs_real time_s)
 {
@@ -242,7 +249,7 @@ static bool is_wrong(fs_estimator_memory *m, fs_real time_s)
     return lasts || (differs && is_refused);
 }
 
-/* yaw_sources.py:185 */
+/* yaw_sources.py:190 */
 void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 {
     fs_yaw_bank *bank = &m->yaw_bank;

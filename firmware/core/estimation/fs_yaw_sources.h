@@ -18,7 +18,7 @@
 #include "fs_types.h"
 #include "fs_yaw_estimator.h"
 
-/* Move the models over a step of the flight. yaw_sources.py:176 */
+/* Move the models over a step of the flight. yaw_sources.py:181 */
 void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_sample *step);
 
 /*
@@ -27,7 +27,7 @@ void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_s
  * On the ground, or if it is far off, the yaw is aligned again, and the measured field is fused. In flight the yaw
  * changes as far as it depends on the field: by its declination first, then by its three components.
  *
- * yaw_sources.py:94
+ * yaw_sources.py:99
  */
 int32_t fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, int32_t stage, const fs_estimator_params *params);
 
@@ -36,12 +36,12 @@ int32_t fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, int32_t stage,
  *
  * The first field after the alignment gives the yaw if that is unknown.
  *
- * yaw_sources.py:63
+ * yaw_sources.py:65
  */
 int32_t fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t axis,
                       const fs_estimator_params *params);
 
-/* Weigh the models with a GNSS velocity; reset the yaw if it is unknown, or wrong. yaw_sources.py:185 */
+/* Weigh the models with a GNSS velocity; reset the yaw if it is unknown, or wrong. yaw_sources.py:190 */
 void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[]);
 
 #endif
