@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flightstack.core.contract import FloatArray, Quaternion, RecordArray, Vector3
+from flightstack.core.contract import FloatArray, Quaternion, Record, RecordArray, Vector3
 from flightstack.estimation.error_state import turn_between
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.health import EstimateHealth, HealthMonitor
@@ -46,6 +46,7 @@ class _View:
 
     def __init__(self, memory: RecordArray) -> None:
         self.state: FloatArray = memory["state"][0]
+        self.checks: Record = memory["checks"][0]
         self.biases: FloatArray = memory["nominal"][0, 10:16]
         """Of the gyro and of the accelerometer."""
         self.output_s = memory["output"][0].data
@@ -195,7 +196,8 @@ def _facts_of(view: _View, lane: Lane, health: EstimateHealth, since_s: float) -
     x = view.biases.tolist()
     (p, q, r), (fx, fy, fz) = means
     rates, force = Vector3(p - x[0], q - x[1], r - x[2]), Vector3(fx - x[3], fy - x[4], fz - x[5])
-    return LaneFacts(True, ratio, rates, force, health.tilt_rad)
+    wrong_s = max(float(view.checks["gyro_s"]), float(view.checks["accel_until_s"]))
+    return LaneFacts(True, ratio, rates, force, health.tilt_rad, wrong_s)
 
 
 def _offset(new: FloatArray, old: FloatArray) -> StateOffset:

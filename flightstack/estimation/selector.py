@@ -22,6 +22,8 @@ LEAST_GAIN, ENOUGH = 0.2, 0.5
 MOST_RELATIVE = 1.0
 LESS_CERTAIN = 2.0
 """Ratio of the deviations of the tilt from which smaller test ratios do not count: they are those of a wide gate."""
+ALIKE_S, SUSPECT_S = 2.0, 60.0
+"""Difference in which two filters find their sensors wrong for the same reason, and time for which it counts."""
 BETWEEN_S = 10.0
 """Least time between two changes to a lane that is only better."""
 RATE_RAD_S, TURN_RAD = math.radians(1.5), math.radians(0.5)
@@ -44,6 +46,8 @@ class LaneFacts(NamedTuple):
     force_m_s2: Vector3
     tilt_rad: float = 0.0
     """Deviation."""
+    wrong_s: float = 0.0
+    """Time at which its filter has found the sensor wrong last, and learnt its biases anew."""
 
 
 class LaneRecord(NamedTuple):
@@ -107,7 +111,7 @@ def select(before: Selection, facts: Sequence[LaneFacts], time_s: float, dt_s: f
     """Return the selection at ``time_s``, ``dt_s`` after the last one."""
     here = before.selected
     compared = [
-        _compared(record, i, facts, _worse(facts[i], facts[here]), before.disagree, dt_s)
+        _compared(record, i, facts, _worse(facts[i], facts[here], time_s), before.disagree, dt_s)
         for i, record in enumerate(before.lanes)
     ]
     selection = before._replace(lanes=tuple(compared))
@@ -121,13 +125,15 @@ def select(before: Selection, facts: Sequence[LaneFacts], time_s: float, dt_s: f
     return _better(selection, facts, time_s)
 
 
-def _worse(lane: LaneFacts, here: LaneFacts) -> float:
+def _worse(lane: LaneFacts, here: LaneFacts, time_s: float) -> float:
     """Return by how much the test ratio of a lane is larger than that of the selected one.
 
-    A noisy sensor makes a filter uncertain, and so its test ratios small: it is not better for that.
+    A noisy sensor makes a filter uncertain, and so its test ratios small, as do biases that it has learnt anew: it is
+    not better for that.
     """
+    is_suspect = lane.wrong_s > max(here.wrong_s + ALIKE_S, time_s - SUSPECT_S)
     worse = lane.ratio - here.ratio
-    return max(worse, 0.0) if lane.tilt_rad > LESS_CERTAIN * here.tilt_rad else worse
+    return max(worse, 0.0) if is_suspect or lane.tilt_rad > LESS_CERTAIN * here.tilt_rad else worse
 
 
 def _better(selection: Selection, facts: Sequence[LaneFacts], time_s: float) -> Selection:

@@ -112,6 +112,16 @@ def test_lane_with_small_ratios_for_a_wide_gate_is_not_better(tilt_deg: float, i
     assert (first_change((here, GOOD._replace(tilt_rad=math.radians(tilt_deg)))) is not None) is is_better
 
 
+@pytest.mark.parametrize(
+    ("wrong_s", "is_better"), [((0.0, 0.0), True), ((0.0, 8.0), False), ((7.0, 8.0), True)]
+)
+def test_lane_that_found_its_sensor_wrong_is_not_better(
+    wrong_s: tuple[float, float], is_better: bool
+) -> None:
+    here, there = TURNED._replace(ratio=0.3, wrong_s=wrong_s[0]), GOOD._replace(wrong_s=wrong_s[1])
+    assert (first_change((here, there)) is not None) is is_better
+
+
 def test_sensors_that_agree_again_are_trusted_after_a_time() -> None:
     selection = start()
     for tick in range(100):
