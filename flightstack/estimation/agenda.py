@@ -48,7 +48,7 @@ from flightstack.estimation.rings import (
     pop,
     read_row,
 )
-from flightstack.estimation.source_checks import add_fault_noise
+from flightstack.estimation.source_checks import add_fault_noise, take_rest_innovation
 from flightstack.estimation.yaw_sources import predict_yaw, take_earth_field, take_field, take_velocity
 
 (
@@ -276,10 +276,18 @@ def _rest(m: MemoryRecord, f: Filter, r: Rings, stage: int, params: EstimatorPar
     if axis < 3:
         fuse_rest_velocity(f, axis, params)
     else:
-        noise = noise_of(m["sums"]).gyro
-        density = max(noise.x, noise.y, noise.z)
-        fuse_rest_rate(f, axis - 3, mean_rate(m["sums"]), density / _REST_MEAN_S, params)
+        _rest_rate(m, f, axis - 3, params)
     return axis + 1 if axis < 5 else 0
+
+
+@compiled
+def _rest_rate(m: MemoryRecord, f: Filter, axis: int, params: EstimatorParams) -> None:
+    """Fuse the rate at rest; a platform that moves turns too, so slowly that it looks like a bias."""
+    noise = noise_of(m["sums"]).gyro
+    density = noise.x if axis == 0 else noise.y if axis == 1 else noise.z
+    sways = 0.0 if is_platform_at_rest(m, f) else params.rest_rate_noise_rad_s
+    fuse_rest_rate(f, axis, mean_rate(m["sums"]), density / _REST_MEAN_S + sways * sways, params)
+    take_rest_innovation(m["checks"], f, axis)
 
 
 @compiled

@@ -80,6 +80,7 @@ class EstimatorParams(NamedTuple):
     # at rest
     rest_velocity_noise_m_s: float = 0.02
     rest_rate_noise_rad_s: float = 0.003
+    """The most by which a vehicle at rest sways."""
     # timing
     delay_s: float = horizon_s(
         estimator_default("period_s"), gnss_delay_s, baro_delay_s, range_delay_s, mag_delay_s

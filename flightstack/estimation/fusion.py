@@ -274,10 +274,11 @@ def fuse_rest_rate(
 ) -> None:
     """Fuse zero rate about an axis of a vehicle that stands.
 
-    ``rate_rad_s``, with this variance of noise, is the bias of the gyro.
+    ``rate_rad_s``, with this variance of noise, is the bias of the gyro, and the motion of a vehicle that sways.
     """
-    deviation = params.rest_rate_noise_rad_s + math.sqrt(variance)
-    noise = Noise(deviation, deviation, deviation, 3.0, WHITE)
+    least = math.sqrt(variance)
+    largest = params.rest_rate_noise_rad_s + least
+    noise = Noise(least, largest, largest, 3.0, CORRELATED)
     clear(f.h)
     f.h[GYRO_BIAS + axis] = 1.0
     value = rate_rad_s.x if axis == 0 else rate_rad_s.y if axis == 1 else rate_rad_s.z

@@ -186,6 +186,14 @@ def _hold(gain: ErrorVector, holds: float) -> None:
 
 
 @compiled
+def correlation_factor(o: ObservedRecord) -> float:
+    """Return the factor by which the noise of a mean is larger than that of independent measurements."""
+    correlation = min(max(o["lagged"] / o["variance"], 0.0), _LARGEST_CORRELATION)
+    factor: float = (1.0 + correlation) / (1.0 - correlation)
+    return factor
+
+
+@compiled
 def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> bool:
     """Fuse a scalar measurement with the Jacobian ``f.h``; return True if it is within its gate.
 
@@ -200,12 +208,12 @@ def fuse(f: Filter, row: int, innovation: float, noise: Noise, holds: float) -> 
     projected = _project(f)
     expected = projected + r
     variance = expected
+    o["variance"] = expected
     if noise.kind != WHITE:
-        correlation = min(max(o["lagged"] / expected, 0.0), _LARGEST_CORRELATION)
-        variance = projected + r * (1.0 + correlation) / (1.0 - correlation)
+        variance = projected + r * correlation_factor(o)
     last = o["innovation"]
     ratio = innovation * innovation / (noise.gate * noise.gate * variance)
-    o["innovation"], o["variance"], o["test_ratio"] = innovation, expected, ratio
+    o["innovation"], o["test_ratio"] = innovation, ratio
     if not ratio <= 1.0:
         o["refused"] += 1.0
         if noise.kind == SLOW and abs(innovation) < noise.start:

@@ -14,7 +14,7 @@ import math
 from typing import Annotated, NamedTuple, TypeAlias
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray, Record, Vector3
+from flightstack.core.contract import FloatArray, Quaternion, Record, Vector3
 from flightstack.core.geometry import rotate
 from flightstack.estimation.error_state import (
     ACCEL_BIAS,
@@ -24,15 +24,16 @@ from flightstack.estimation.error_state import (
     GYRO_BIAS,
     POSITION,
     VELOCITY,
-    read_nominal,
 )
 from flightstack.estimation.kalman import (
     BARO,
     GNSS_POSITION,
     GNSS_VELOCITY,
     MAG,
+    REST_RATE,
     Filter,
     clear,
+    correlation_factor,
 )
 
 CONSISTENT, POSITION_DRIFTS, VELOCITY_IS_WRONG = 0.0, 1.0, 2.0
@@ -60,6 +61,8 @@ _STEP_RAD_S, _STEP_S, _STEPS_S = 0.025, 2.0, 1.0
 _YAW_MEAN_S, _YAW_LIMIT_RAD, _STRAIGHT_RAD_S, _TURN_SHARE = 10.0, 0.0175, 0.05, 0.8
 """Time in which the yaw of the magnetometer leaves the estimate if the gyro is wrong about the vertical, and the limit;
 rate of a turn, in which soft iron does the same; least share of a turn in the square of the innovations."""
+_REST_SHARE, _MOVED_RAD_S = 0.02, 0.01
+"""Share of a rate at rest in their mean, over 5 s: a vehicle sways faster; the rate from which it is moved."""
 _STUCK_S, _EQUAL_M = 1.0, 1e-9
 _DRIFT_S, _LONGEST_GAP_S, _DRIFT_ACCURACIES, _LEAST_ACCURACY_M = 20.0, 2.0, 4.0, 0.5
 """The least accuracy keeps the errors of the velocity of a receiver with centimetres from counting as a drift."""
@@ -98,6 +101,8 @@ class Checks(NamedTuple):
     """The same of GNSS position."""
     gyro_s: float
     """Time at which the gyro was found wrong last."""
+    rates: Annotated[FloatArray, 3]
+    """Means of the innovations of the rate at rest."""
     yaw_now_rad: float
     """Yaw of the magnetometer beyond the estimate."""
     yaw_rad: float
@@ -157,8 +162,28 @@ def take_horizontal_innovations(c: ChecksRecord, f: Filter, dt_s: float, gravity
             is_wrong = True
     if is_wrong and f.clock[0] - c["gyro_s"] > _STEPS_S:
         c["gyro_s"] = f.clock[0]
-        _doubt_gyro(f, 0, gravity)
-        _doubt_gyro(f, 1, gravity)
+        for axis in range(2):
+            _doubt_gyro(f, axis, gravity)
+
+
+@compiled
+def take_rest_innovation(c: ChecksRecord, f: Filter, axis: int) -> None:
+    """Take the innovation of the rate at rest: if its mean is beyond the noise, the bias is learnt anew.
+
+    The bias is known no better than the mean of all rates with their present noise: a vehicle that sways looks like one
+    that stands, at first.
+    """
+    o, at, p = f.observations[REST_RATE + axis], GYRO_BIAS + axis, f.covariance
+    p[at, at] = max(p[at, at], o["noise"] * correlation_factor(o) / max(o["fused"], 1.0))
+    c["rates"][axis] = _mean(c["rates"][axis], f, REST_RATE + axis, 1.0, _REST_SHARE * _MEAN_S)
+    if abs(c["rates"][axis]) > _LIMIT and abs(o["innovation"]) < _MOVED_RAD_S:
+        c["rates"][axis] = 0.0
+        p[at, at] += _MOVED_RAD_S * _MOVED_RAD_S
+
+
+@compiled
+def _attitude(f: Filter) -> Quaternion:
+    return Quaternion(f.nominal[0], f.nominal[1], f.nominal[2], f.nominal[3])
 
 
 @compiled
@@ -170,7 +195,7 @@ def _doubt_gyro(f: Filter, axis: int, gravity: float) -> None:
     stays as certain of the rest.
     """
     unit = Vector3(1.0 if axis == 0 else 0.0, 1.0 if axis == 1 else 0.0, 1.0 if axis == 2 else 0.0)
-    about, step = rotate(read_nominal(f.nominal).attitude, unit), f.h
+    about, step = rotate(_attitude(f), unit), f.h
     turn, speed = -_STEP_S, 0.5 * gravity * _STEP_S * _STEP_S
     place = speed * _STEP_S / 3.0
     clear(step)
@@ -191,11 +216,11 @@ def take_field_innovations(c: ChecksRecord, f: Filter, rate_rad_s: float, gravit
 
     A disturbed field jumps, or changes along other axes too.
     """
-    o, n = f.observations, read_nominal(f.nominal)
+    o, x = f.observations, f.nominal
     innovation = Vector3(o[MAG]["innovation"], o[MAG + 1]["innovation"], o[MAG + 2]["innovation"])
-    off, earth = rotate(n.attitude, innovation), n.earth_field_ned_gauss
-    level = math.sqrt(earth.x * earth.x + earth.y * earth.y) + _LEAST_VARIANCE
-    across = (earth.y * off.x - earth.x * off.y) / level
+    off = rotate(_attitude(f), innovation)
+    level = math.sqrt(x[16] * x[16] + x[17] * x[17]) + _LEAST_VARIANCE
+    across = (x[17] * off.x - x[16] * off.y) / level
     yaw_rad, change_s = across / level, min(max(f.clock[0] - c["field_s"], 0.0), _MEAN_S)
     jumps = abs(yaw_rad - c["yaw_now_rad"]) > _YAW_LIMIT_RAD or change_s >= _MEAN_S
     c["field_s"], c["yaw_now_rad"] = f.clock[0], yaw_rad

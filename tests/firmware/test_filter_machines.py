@@ -17,7 +17,7 @@ AVR_EVENTS = 3000 if NIGHTLY else 500
 MEAN_INSTRUCTIONS = {"hop": 3890, "square": 4000}
 MOST_INSTRUCTIONS, OUTPUT_INSTRUCTIONS = 14_130, 940
 MOST_OF_PART = {
-    "predict": 395, "predict errors": 3860, "predict yaw models": 1500, "drift of GNSS": 435,
+    "predict": 395, "predict errors": 3860, "predict yaw models": 1790, "drift of GNSS": 435,
     "fuse GNSS velocity": 4910, "fuse GNSS position": 5110, "fuse field": 6430, "fuse barometer": 5100,
     "fuse range": 4830, "fuse drag": 6940, "fuse rest velocity": 4950, "fuse rest rate": 4960, "fuse hold": 4950,
     "update yaw models": 6180, "follow": 3170,

@@ -188,17 +188,17 @@ def test_vehicle_does_not_tilt_for_a_reset_of_its_position(bias: str) -> None:
 def test_log_has_an_invalid_position_after_dead_reckoning() -> None:
     with World(vehicle="x_quad", state="estimated") as world:
         world.wait_until_ready()
-        world.takeoff(5.0)
+        world.takeoff(15.0)
         world.run_until("mode == 'HOLD'")
         world.fault("sensor:gnss:off")
-        world.run_for(8.0)
+        world.run_for(15.0)
         log = ULog(io.BytesIO(world.engine.newest_log()))
     position = log.get_dataset("vehicle_local_position").data
     for name in ("xy_valid", "v_xy_valid", "xy_global"):
         assert (position[name][KNOWN_ROW], position[name][-1]) == (1, 0)
     assert (position["z_valid"] == 1).all()
     assert (position["dead_reckoning"][KNOWN_ROW], position["dead_reckoning"][-1]) == (0, 1)
-    assert position["eph"][-1] > 2.0 * position["eph"][KNOWN_ROW]
+    assert position["eph"][-1] > 2.0 * position["eph"][KNOWN_ROW]  # measured 2.3, and 1.2 after 8 s
 
 
 def test_gnss_that_comes_back_is_not_suspected_of_spoofing() -> None:

@@ -245,6 +245,43 @@ def _tumbling(events: Events) -> list[Event]:
     return made
 
 
+def _wrong_gyro(events: Events, begin_s: float, rate_rad_s: float) -> list[Event]:
+    """Add a rate about x and z to those of the gyro from ``begin_s`` on."""
+    made = []
+    for kind, row in events:
+        changed = row.copy()
+        if kind == IMU and row[0] > begin_s:
+            changed[2] += rate_rad_s
+            changed[4] += rate_rad_s
+        made.append(Event(kind, changed))
+    return made
+
+
+def _standing(events: Events, seconds: float) -> list[Event]:
+    """Return the events of a rest, whose first second is followed by its second half again and again."""
+    first = list(events[: next(i for i, e in enumerate(events) if _time_of(e) > 1.0)])
+    made = list(first)
+    for number in range(round(2.0 * seconds)):
+        for kind, row in first:
+            if _time_of(Event(kind, row)) > 0.5:
+                changed = row.copy()
+                changed[0] += 0.5 * (number + 1)
+                made.append(Event(kind, changed))
+    return made
+
+
+def _on_boat(events: Events, north_m_s: float) -> list[Event]:
+    """Add the motion of a boat to positions and velocities of GNSS."""
+    made = []
+    for kind, row in events:
+        changed = row.copy()
+        if kind == GNSS_RING:
+            changed[1] += north_m_s * row[0]
+            changed[4] += north_m_s
+        made.append(Event(kind, changed))
+    return made
+
+
 def _checked(events: Events) -> list[Event]:
     """Ask for the health ten times a second, and at the end for functions at and beyond the ends of their range."""
     made = []
@@ -305,6 +342,11 @@ STREAMS: dict[str, Callable[[], Events]] = {
     ),
     "accelerometer slightly wrong": lambda: _wrong_accelerometer(_LONG(), 0.4),
     "accelerometer wrong": lambda: _wrong_accelerometer(_LONG(), 0.8),
+    "gyro steps": lambda: _wrong_gyro(_LONG(), _CLIMB_S, 0.02),
+    "gyro steps at rest": lambda: _wrong_gyro(
+        _wrong_gyro(_standing(flown(), 8.0), 1.0, 0.006), 5.0, 0.03
+    ),
+    "boat": lambda: _on_boat(flown(), 0.5),
     "barometer stuck": lambda: _stuck_barometer(_LONG()),
     "barometer drifts": lambda: _wrong_barometer(_LONG(), 0.0, 1.0),
     "barometer jumps without GNSS": lambda: _with_params(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -18,14 +19,17 @@ from flightstack.estimation.error_state import (
     VELOCITY,
 )
 from flightstack.estimation.estimator_params import EstimatorParams
-from flightstack.estimation.fusion import fuse_baro, fuse_field_axis
-from flightstack.estimation.kalman import BARO, GNSS_VELOCITY, MAG, Filter
+from flightstack.estimation.fusion import fuse_baro, fuse_field_axis, fuse_rest_rate
+from flightstack.estimation.kalman import BARO, GNSS_VELOCITY, MAG, REST_RATE, Filter
 from flightstack.estimation.memory import MEMORY
 from flightstack.estimation.prediction import ImuNoise, predict_errors
+from flightstack.estimation.source_checks import take_rest_innovation
 
 PARAMS = EstimatorParams(mag_noise_gauss=0.001)
 FIELD = Vector3(0.2, 0.0, 0.4)
 """Of the Earth, and so that of a level vehicle that heads north."""
+NOISE_RAD_S = 2.2e-4
+"""Of the mean rate over 0.1 s, of a consumer's gyro."""
 QUIET = ImuNoise(Vector3(0.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.0))
 
 
@@ -160,3 +164,47 @@ def test_gusts_weigh_less_than_white_noise_of_the_barometer() -> None:
         assert o["nis_sum"] / o["fused"] == pytest.approx(1.0, abs=0.15)
         weights.append(f.gain[POSITION + 2])
     assert weights[1] / weights[0] < 0.1  # measured 0.045; (1 − 0.9) / (1 + 0.9) = 0.053
+
+
+def rested(f: Filter, rate_rad_s: Callable[[float], float], seconds: float = 10.0) -> float:
+    """Return the deviation of the gyro's bias about x after a rest with this rate, measured ten times a second."""
+    memory = np.zeros(1, MEMORY)[0]
+    f.covariance[:] = 0.0
+    f.covariance[GYRO_BIAS, GYRO_BIAS] = 0.02**2
+    for step in range(round(10.0 * seconds)):
+        fuse_rest_rate(f, 0, Vector3(rate_rad_s(0.1 * step), 0.0, 0.0), NOISE_RAD_S**2, PARAMS)
+        take_rest_innovation(memory["checks"], f, 0)
+    return math.sqrt(f.covariance[GYRO_BIAS, GYRO_BIAS])
+
+
+def test_gyro_bias_at_rest_is_known_as_well_as_the_noise_permits() -> None:
+    rng = np.random.default_rng(5)
+    deviations, errors = [], []
+    for _ in range(40):
+        f = level()
+        f.nominal[10] = 0.0
+        deviations.append(rested(f, lambda _: 0.004 + rng.normal(0.0, NOISE_RAD_S)))
+        errors.append(f.nominal[10] - 0.004)
+    assert np.sqrt(np.mean(np.square(errors))) < 4e-5  # measured 2.5e-5
+    assert np.mean(deviations) == pytest.approx(NOISE_RAD_S / 10.0, rel=0.3)  # measured 1.2 times that
+
+
+def test_gyro_noise_of_a_vehicle_that_sways_is_that_of_its_motion() -> None:
+    f = level()
+    f.nominal[10] = 0.0
+    deviation = rested(f, lambda time_s: 0.002 * math.sin(2.0 * math.pi * 0.3 * time_s))
+    assert math.sqrt(f.observations[REST_RATE]["noise"]) > 5.0 * NOISE_RAD_S  # measured 6.6
+    assert abs(f.nominal[10]) < deviation < 5e-4  # measured 3e-6, 2.9e-4
+
+
+def test_gyro_bias_that_steps_at_rest_is_learnt_within_four_seconds() -> None:
+    f, rng = level(), np.random.default_rng(7)
+    f.nominal[10] = 0.0
+    rested(f, lambda _: rng.normal(0.0, NOISE_RAD_S))
+    before = f.covariance.copy()
+    memory = np.zeros(1, MEMORY)[0]
+    for _ in range(40):
+        fuse_rest_rate(f, 0, Vector3(0.005 + rng.normal(0.0, NOISE_RAD_S), 0.0, 0.0), NOISE_RAD_S**2, PARAMS)
+        take_rest_innovation(memory["checks"], f, 0)
+    assert f.nominal[10] == pytest.approx(0.005, abs=2.0 * NOISE_RAD_S)  # measured 0.0049
+    assert f.covariance[GYRO_BIAS, GYRO_BIAS] > before[GYRO_BIAS, GYRO_BIAS]

@@ -110,6 +110,18 @@ static bool stands(const fs_estimator_memory *m, const fs_estimator_params *para
     return fs_abs(off) < FS_STILL_FORCE_M_S2 && largest < FS_STILL_RATE_RAD_S;
 }
 
+/* Fuse the rate at rest; a platform that moves turns too, so slowly that it looks like a bias. agenda.py:284 */
+static void rest_rate(fs_estimator_memory *m, fs_filter *f, int32_t axis, const fs_estimator_params *params)
+{
+    const fs_imu_noise noise_of = fs_noise_of(&m->sums);
+    const fs_vector3 noise = noise_of.gyro;
+    const fs_real density = axis == 0 ? noise.x : (axis == 1 ? noise.y : noise.z);
+    const fs_real sways = fs_is_platform_at_rest(m, f) ? FS_LIT(0.0) : params->rest_rate_noise_rad_s;
+    const fs_vector3 mean_rate = fs_mean_rate(&m->sums);
+    fs_fuse_rest_rate(f, axis, &mean_rate, density / FS_REST_MEAN_S + sways * sways, params);
+    fs_take_rest_innovation(&m->checks, f, axis);
+}
+
 /* Fuse rest ten times a second: three axes of the velocity, three of the rate. agenda.py:267 */
 static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t stage,
                     const fs_estimator_params *params)
@@ -128,16 +140,12 @@ static int32_t rest(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int
     if (axis < 3) {
         fs_fuse_rest_velocity(f, axis, params);
     } else {
-        const fs_imu_noise noise_of = fs_noise_of(&m->sums);
-        const fs_vector3 noise = noise_of.gyro;
-        const fs_real density = fs_max(fs_max(noise.x, noise.y), noise.z);
-        const fs_vector3 mean_rate = fs_mean_rate(&m->sums);
-        fs_fuse_rest_rate(f, axis - 3, &mean_rate, density / FS_REST_MEAN_S, params);
+        rest_rate(m, f, axis - 3, params);
     }
     return axis < 5 ? axis + 1 : 0;
 }
 
-/* Fuse drag in flight while the velocity over ground is measured, twenty times a second. agenda.py:286 */
+/* Fuse drag in flight while the velocity over ground is measured, twenty times a second. agenda.py:294 */
 static int32_t drag(fs_estimator_memory *m, fs_filter *f, const fs_rings *r, int32_t axis,
                     const fs_estimator_params *params)
 {

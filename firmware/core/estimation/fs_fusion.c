@@ -17,6 +17,7 @@
 #define FS_WHITE FS_LIT(0.0)
 #define FS_VELOCITY 3
 #define FS_REST_VELOCITY 11
+#define FS_CORRELATED FS_LIT(1.0)
 #define FS_GYRO_BIAS 9
 #define FS_REST_RATE 14
 #define FS_POSITION 6
@@ -25,7 +26,6 @@
 #define FS_AIR_KG_M3 FS_LIT(1.225)
 #define FS_DRAG 23
 #define FS_BARO_BIAS 23
-#define FS_CORRELATED FS_LIT(1.0)
 #define FS_BARO 6
 #define FS_HOLDS_HORIZONTAL FS_LIT(2.0)
 #define FS_RANGE 10
@@ -105,15 +105,16 @@ void fs_fuse_rest_velocity(fs_filter *f, int32_t axis, const fs_estimator_params
 void fs_fuse_rest_rate(fs_filter *f, int32_t axis, const fs_vector3 *rate_rad_s, fs_real variance,
                        const fs_estimator_params *params)
 {
-    const fs_real deviation = params->rest_rate_noise_rad_s + fs_sqrt(variance);
-    const fs_noise noise = {deviation, deviation, deviation, FS_LIT(3.0), FS_WHITE};
+    const fs_real least = fs_sqrt(variance);
+    const fs_real largest = params->rest_rate_noise_rad_s + least;
+    const fs_noise noise = {least, largest, largest, FS_LIT(3.0), FS_CORRELATED};
     fs_clear(f->h);
     f->h[FS_GYRO_BIAS + axis] = FS_LIT(1.0);
     const fs_real value = axis == 0 ? rate_rad_s->x : (axis == 1 ? rate_rad_s->y : rate_rad_s->z);
     (void)fs_fuse(f, FS_REST_RATE + axis, value - f->nominal[10 + axis], &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:288 */
+/* fusion.py:289 */
 void fs_fuse_hold(fs_filter *f, int32_t axis, fs_real held_m, const fs_estimator_params *params)
 {
     const fs_noise noise = {

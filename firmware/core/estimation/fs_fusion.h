@@ -26,7 +26,7 @@ void fs_fuse_rest_velocity(fs_filter *f, int32_t axis, const fs_estimator_params
 /*
  * Fuse zero rate about an axis of a vehicle that stands.
  *
- * rate_rad_s, with this variance of noise, is the bias of the gyro.
+ * rate_rad_s, with this variance of noise, is the bias of the gyro, and the motion of a vehicle that sways.
  *
  * fusion.py:272
  */
@@ -34,7 +34,7 @@ void fs_fuse_rest_rate(fs_filter *f, int32_t axis, const fs_vector3 *rate_rad_s,
                        const fs_estimator_params *params);
 
 /*
- * Fuse a horizontal position that is held without a measurement of it, which bounds velocity and tilt. fusion.py:288
+ * Fuse a horizontal position that is held without a measurement of it, which bounds velocity and tilt. fusion.py:289
  */
 void fs_fuse_hold(fs_filter *f, int32_t axis, fs_real held_m, const fs_estimator_params *params);
 

@@ -16,7 +16,7 @@
 #define FS_HOLDS_HORIZONTAL FS_LIT(2.0)
 #define FS_HOLDS_TILT_AND_GYRO FS_LIT(3.0)
 
-/* kalman.py:226 */
+/* kalman.py:234 */
 void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
 {
     for (int32_t i = at; i < at + count; i++) {
@@ -56,6 +56,14 @@ static fs_real project(fs_filter *f)
         }
     }
     return total;
+}
+
+/* kalman.py:189 */
+fs_real fs_correlation_factor(const fs_observed *o)
+{
+    const fs_real correlation = fs_min(fs_max(o->lagged / o->variance, FS_LIT(0.0)), FS_LARGEST_CORRELATION);
+    const fs_real factor = (FS_LIT(1.0) + correlation) / (FS_LIT(1.0) - correlation);
+    return factor;
 }
 
 /*
@@ -142,7 +150,7 @@ static void correct(fs_filter *f, fs_real innovation)
     fs_correct(f->nominal, f->gain, innovation);
 }
 
-/* kalman.py:189 */
+/* kalman.py:197 */
 bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *noise, fs_real holds)
 {
     fs_observed *o = &f->observations[row];
@@ -152,14 +160,13 @@ bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *nois
     const fs_real projected = project(f);
     const fs_real expected = projected + r;
     fs_real variance = expected;
+    o->variance = expected;
     if (noise->kind != FS_WHITE) {
-        const fs_real correlation = fs_min(fs_max(o->lagged / expected, FS_LIT(0.0)), FS_LARGEST_CORRELATION);
-        variance = projected + r * (FS_LIT(1.0) + correlation) / (FS_LIT(1.0) - correlation);
+        variance = projected + r * fs_correlation_factor(o);
     }
     const fs_real last = o->innovation;
     const fs_real ratio = innovation * innovation / (noise->gate * noise->gate * variance);
     o->innovation = innovation;
-    o->variance = expected;
     o->test_ratio = ratio;
     if (!(ratio <= FS_LIT(1.0))) {
         o->refused += FS_LIT(1.0);
@@ -180,7 +187,7 @@ bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *nois
     return true;
 }
 
-/* kalman.py:237 */
+/* kalman.py:245 */
 fs_real fs_deviation(const fs_filter *f, int32_t at, int32_t count)
 {
     fs_real total = FS_LIT(0.0);

@@ -43,11 +43,14 @@ typedef struct {
     fs_real kind;
 } fs_noise;
 
-/* Make count states from at independent of all others, each with variance. kalman.py:226 */
+/* Make count states from at independent of all others, each with variance. kalman.py:234 */
 void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real variance);
 
 /* Set every item to zero. kalman.py:102 */
 void fs_clear(fs_real x[27]);
+
+/* Return the factor by which the noise of a mean is larger than that of independent measurements. kalman.py:189 */
+fs_real fs_correlation_factor(const fs_observed *o);
 
 /*
  * Fuse a scalar measurement with the Jacobian f.h; return True if it is within its gate.
@@ -57,11 +60,11 @@ void fs_clear(fs_real x[27]);
  *
  * With holds other than zero, these states keep their values and their uncertainty: a Schmidt-Kalman update.
  *
- * kalman.py:189
+ * kalman.py:197
  */
 bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *noise, fs_real holds);
 
-/* Return the root of the summed variances of count states from at. kalman.py:237 */
+/* Return the root of the summed variances of count states from at. kalman.py:245 */
 fs_real fs_deviation(const fs_filter *f, int32_t at, int32_t count);
 
 #endif

@@ -5,7 +5,6 @@
  */
 #include "fs_source_checks.h"
 
-#include "fs_error_state.h"
 #include "fs_geometry.h"
 #include "fs_kalman.h"
 #include "fs_math.h"
@@ -18,20 +17,24 @@
 #define FS_BARO_BIAS 23
 #define FS_HEIGHT_DENSITY FS_LIT(0.1)
 #define FS_POSITION 6
-#define FS_MAG 7
+#define FS_REST_RATE 14
+#define FS_GYRO_BIAS 9
 #define FS_LEAST_VARIANCE FS_LIT(1e-12)
+#define FS_LARGEST FS_LIT(3.0)
 #define FS_MEAN_S FS_LIT(1.0)
+#define FS_REST_SHARE FS_LIT(0.02)
+#define FS_LIMIT FS_LIT(1.0)
+#define FS_MOVED_RAD_S FS_LIT(0.01)
+#define FS_MAG 7
 #define FS_YAW_LIMIT_RAD FS_LIT(0.0175)
 #define FS_YAW_MEAN_S FS_LIT(10.0)
 #define FS_STRAIGHT_RAD_S FS_LIT(0.05)
 #define FS_TURN_SHARE FS_LIT(0.8)
 #define FS_STEP_S FS_LIT(2.0)
 #define FS_ATTITUDE 0
-#define FS_GYRO_BIAS 9
 #define FS_STEP_RAD_S FS_LIT(0.025)
 #define FS_EQUAL_M FS_LIT(1e-09)
 #define FS_STUCK_S FS_LIT(1.0)
-#define FS_LARGEST FS_LIT(3.0)
 #define FS_BARO 6
 #define FS_MISSING_S FS_LIT(0.5)
 #define FS_LONGEST_GAP_S FS_LIT(2.0)
@@ -51,13 +54,12 @@
 #define FS_POSITION_DRIFTS FS_LIT(1.0)
 #define FS_GNSS_VELOCITY 0
 #define FS_GNSS_POSITION 3
-#define FS_LIMIT FS_LIT(1.0)
 #define FS_ACCEL_HOLD_S FS_LIT(1.0)
 #define FS_SPEED_LIMIT FS_LIT(0.8)
 #define FS_PLACE_LIMIT FS_LIT(0.3)
 #define FS_STEPS_S FS_LIT(1.0)
 
-/* source_checks.py:225 */
+/* source_checks.py:250 */
 void fs_add_fault_noise(const fs_checks *c, fs_filter *f, fs_real dt_s)
 {
     if (f->clock[0] < c->accel_until_s) {
@@ -71,6 +73,37 @@ void fs_add_fault_noise(const fs_checks *c, fs_filter *f, fs_real dt_s)
     }
 }
 
+/* Return a mean of innovations upwards with the newest one of a row. source_checks.py:131 */
+static fs_real mean_(fs_real mean, const fs_filter *f, int32_t row, fs_real sign, fs_real dt_s)
+{
+    const fs_observed *o = &f->observations[row];
+    const fs_real variance = fs_max(o->variance, FS_LEAST_VARIANCE); /* 0 before the first fusion */
+    fs_real value = sign * o->innovation / fs_sqrt(variance);
+    value = fs_min(fs_max(value, -FS_LARGEST), FS_LARGEST);
+    const fs_real made = mean + fs_min(dt_s / FS_MEAN_S, FS_LIT(1.0)) * (value - mean);
+    return made;
+}
+
+/* source_checks.py:170 */
+void fs_take_rest_innovation(fs_checks *c, fs_filter *f, int32_t axis)
+{
+    fs_observed *o = &f->observations[FS_REST_RATE + axis];
+    const int32_t at = FS_GYRO_BIAS + axis;
+    f->covariance[at][at] = fs_max(f->covariance[at][at],
+                                   o->noise * fs_correlation_factor(o) / fs_max(o->fused, FS_LIT(1.0)));
+    c->rates[axis] = mean_(c->rates[axis], f, FS_REST_RATE + axis, FS_LIT(1.0), FS_REST_SHARE * FS_MEAN_S);
+    if (fs_abs(c->rates[axis]) > FS_LIMIT && fs_abs(o->innovation) < FS_MOVED_RAD_S) {
+        c->rates[axis] = FS_LIT(0.0);
+        f->covariance[at][at] += FS_MOVED_RAD_S * FS_MOVED_RAD_S;
+    }
+}
+
+/* source_checks.py:185 */
+static fs_quaternion attitude(const fs_filter *f)
+{
+    return (fs_quaternion){f->nominal[0], f->nominal[1], f->nominal[2], f->nominal[3]};
+}
+
 /*
  * Add the uncertainty of a gyro whose bias about an axis of the body has stepped some time ago.
  *
@@ -78,7 +111,7 @@ void fs_add_fault_noise(const fs_checks *c, fs_filter *f, fs_real dt_s)
  * attitude, velocity and position are added as one with that of the bias. The filter learns it from each of them, and
  * stays as certain of the rest.
  *
- * source_checks.py:165
+ * source_checks.py:190
  */
 static void doubt_gyro(fs_filter *f, int32_t axis, fs_real gravity)
 {
@@ -87,8 +120,8 @@ static void doubt_gyro(fs_filter *f, int32_t axis, fs_real gravity)
         .y = axis == 1 ? FS_LIT(1.0) : FS_LIT(0.0),
         .z = axis == 2 ? FS_LIT(1.0) : FS_LIT(0.0),
     };
-    const fs_nominal read_nominal = fs_read_nominal(f->nominal);
-    const fs_vector3 about = fs_rotate(&read_nominal.attitude, &unit);
+    const fs_quaternion attitude_ = attitude(f);
+    const fs_vector3 about = fs_rotate(&attitude_, &unit);
     const fs_real turn = -FS_STEP_S;
     const fs_real speed = FS_LIT(0.5) * gravity * FS_STEP_S * FS_STEP_S;
     const fs_real place = speed * FS_STEP_S / FS_LIT(3.0);
@@ -111,19 +144,19 @@ static void doubt_gyro(fs_filter *f, int32_t axis, fs_real gravity)
     }
 }
 
-/* source_checks.py:189 */
+/* source_checks.py:214 */
 void fs_take_field_innovations(fs_checks *c, fs_filter *f, fs_real rate_rad_s, fs_real gravity)
 {
-    const fs_nominal n = fs_read_nominal(f->nominal);
     const fs_vector3 innovation = {
         .x = f->observations[FS_MAG].innovation,
         .y = f->observations[FS_MAG + 1].innovation,
         .z = f->observations[FS_MAG + 2].innovation,
     };
-    const fs_vector3 off = fs_rotate(&n.attitude, &innovation);
-    const fs_vector3 *earth = &n.earth_field_ned_gauss;
-    const fs_real level = fs_sqrt(earth->x * earth->x + earth->y * earth->y) + FS_LEAST_VARIANCE;
-    const fs_real across = (earth->y * off.x - earth->x * off.y) / level;
+    const fs_quaternion attitude_ = attitude(f);
+    const fs_vector3 off = fs_rotate(&attitude_, &innovation);
+    const fs_real level = fs_sqrt(f->nominal[16] * f->nominal[16] + f->nominal[17] * f->nominal[17]) +
+                          FS_LEAST_VARIANCE;
+    const fs_real across = (f->nominal[17] * off.x - f->nominal[16] * off.y) / level;
     const fs_real yaw_rad = across / level;
     const fs_real change_s = fs_min(fs_max(f->clock[0] - c->field_s, FS_LIT(0.0)), FS_MEAN_S);
     const bool jumps = fs_abs(yaw_rad - c->yaw_now_rad) > FS_YAW_LIMIT_RAD || change_s >= FS_MEAN_S;
@@ -143,7 +176,7 @@ void fs_take_field_innovations(fs_checks *c, fs_filter *f, fs_real rate_rad_s, f
     }
 }
 
-/* source_checks.py:237 */
+/* source_checks.py:262 */
 bool fs_is_stuck(fs_checks *c, fs_real altitude_m, fs_real now_s)
 {
     if (fs_abs(altitude_m - c->altitude_m) > FS_EQUAL_M) {
@@ -154,18 +187,7 @@ bool fs_is_stuck(fs_checks *c, fs_real altitude_m, fs_real now_s)
     return equal_s > FS_STUCK_S;
 }
 
-/* Return a mean of innovations upwards with the newest one of a row. source_checks.py:126 */
-static fs_real mean_(fs_real mean, const fs_filter *f, int32_t row, fs_real sign, fs_real dt_s)
-{
-    const fs_observed *o = &f->observations[row];
-    const fs_real variance = fs_max(o->variance, FS_LEAST_VARIANCE); /* 0 before the first fusion */
-    fs_real value = sign * o->innovation / fs_sqrt(variance);
-    value = fs_min(fs_max(value, -FS_LARGEST), FS_LARGEST);
-    const fs_real made = mean + fs_min(dt_s / FS_MEAN_S, FS_LIT(1.0)) * (value - mean);
-    return made;
-}
-
-/* source_checks.py:137 */
+/* source_checks.py:142 */
 void fs_take_pressure_innovation(fs_checks *c, const fs_filter *f, fs_real measured_s, fs_real altitude_m)
 {
     c->pressure = mean_(c->pressure, f, FS_BARO, FS_LIT(1.0), fs_max(FS_LIT(0.0), measured_s - c->altitude_s));
@@ -174,7 +196,7 @@ void fs_take_pressure_innovation(fs_checks *c, const fs_filter *f, fs_real measu
 }
 
 /*
- * Decide whether barometer or vertical GNSS velocity is wrong, beyond the noise of their drift. source_checks.py:297
+ * Decide whether barometer or vertical GNSS velocity is wrong, beyond the noise of their drift. source_checks.py:322
  */
 static void check_height(fs_checks *c, fs_real now_s, fs_real noise_m)
 {
@@ -194,7 +216,7 @@ static void check_height(fs_checks *c, fs_real now_s, fs_real noise_m)
     }
 }
 
-/* source_checks.py:275 */
+/* source_checks.py:300 */
 void fs_follow_height_drift(fs_checks *c, const fs_real row[], bool flies, fs_real accuracy_m_s)
 {
     const fs_real dt_s = row[0] - c->gnss_s;
@@ -227,7 +249,7 @@ void fs_follow_height_drift(fs_checks *c, const fs_real row[], bool flies, fs_re
  * not. A wrong velocity has moved position and velocity of the filter by as much as the drift, and has noise from now
  * on.
  *
- * source_checks.py:312
+ * source_checks.py:337
  */
 static void start_fault(fs_checks *c, fs_filter *f, int32_t axis)
 {
@@ -245,7 +267,7 @@ static void start_fault(fs_checks *c, fs_filter *f, int32_t axis)
 
 /*
  * Let the position become uncertain at the rate of the drift, for the velocity may be wrong instead.
- * source_checks.py:330
+ * source_checks.py:355
  */
 static void doubt_position(const fs_checks *c, fs_filter *f, int32_t axis, fs_real dt_s)
 {
@@ -254,7 +276,7 @@ static void doubt_position(const fs_checks *c, fs_filter *f, int32_t axis, fs_re
     f->covariance[at][at] = grown_m * grown_m;
 }
 
-/* source_checks.py:246 */
+/* source_checks.py:271 */
 void fs_follow_drift(fs_checks *c, fs_filter *f, const fs_real row[], fs_real eph_m)
 {
     const fs_real dt_s = row[0] - c->gnss_s;
@@ -289,7 +311,7 @@ void fs_follow_drift(fs_checks *c, fs_filter *f, const fs_real row[], fs_real ep
     c->gnss_s = row[0];
 }
 
-/* source_checks.py:214 */
+/* source_checks.py:239 */
 void fs_take_gnss_innovations(fs_checks *c, const fs_filter *f, fs_real dt_s, bool has_baro)
 {
     c->speed = mean_(c->speed, f, FS_GNSS_VELOCITY + 2, FS_LIT(-1.0), dt_s);
@@ -301,7 +323,7 @@ void fs_take_gnss_innovations(fs_checks *c, const fs_filter *f, fs_real dt_s, bo
     }
 }
 
-/* source_checks.py:144 */
+/* source_checks.py:149 */
 void fs_take_horizontal_innovations(fs_checks *c, fs_filter *f, fs_real dt_s, fs_real gravity)
 {
     bool is_wrong = false;
@@ -319,12 +341,13 @@ void fs_take_horizontal_innovations(fs_checks *c, fs_filter *f, fs_real dt_s, fs
     }
     if (is_wrong && f->clock[0] - c->gyro_s > FS_STEPS_S) {
         c->gyro_s = f->clock[0];
-        doubt_gyro(f, 0, gravity);
-        doubt_gyro(f, 1, gravity);
+        for (int32_t axis = 0; axis < 2; axis++) {
+            doubt_gyro(f, axis, gravity);
+        }
     }
 }
 
-/* source_checks.py:338 */
+/* source_checks.py:363 */
 bool fs_position_drifts(const fs_checks *c)
 {
     const fs_real north = c->fault[0];
