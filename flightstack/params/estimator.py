@@ -45,7 +45,7 @@ ESTIMATOR_PARAMS = (
     # process
     _param("EKF2_GYR_NOISE", 0.005, 1e-4, 0.1, "rad/s", "Gyro noise for the prediction", "gyro_noise", _STEP, 4),
     _param("EKF2_ACC_NOISE", 0.35, 0.01, 1.0, "m/s^2", "Accelerometer noise for the prediction", "accel_noise", _STEP),
-    _param("EKF2_GYR_B_NOISE", 0.0034, 0.0, 0.01, "rad/s^2", "Process noise of the gyro bias", "gyro_bias_walk", _STEP,
+    _param("EKF2_GYR_B_NOISE", 0.0045, 0.0, 0.01, "rad/s^2", "Process noise of the gyro bias", "gyro_bias_walk", _STEP,
            4),
     _param("EKF2_ACC_B_NOISE", 0.011, 0.0, 0.1, "m/s^3", "Process noise of the accelerometer bias", "accel_bias_walk",
            _STEP),
