@@ -77,10 +77,9 @@ class Engine:
         """Machine time of the exchanges: what passes while the simulator's clock stands still."""
         self.was_ready = False
         """True once the vehicle was ready to fly on its state since its boot."""
-        self.loses_states = False
-        """If True, ticks go on without states, as in real time when a simulator hangs."""
-        self.owes_step = False
-        """True if the simulator has yet to advance after the newest tick, which ``run`` and ``settle`` make up for."""
+        self._loses_states = False
+        self.step_is_pending = False
+        """True if the simulator is to advance after the newest tick, which ``run`` or ``settle`` does."""
         self._changes_bytes = any(getattr(type(self), name) is not getattr(Engine, name) for name in _BYTES)
         self._begin()
 
@@ -119,6 +118,16 @@ class Engine:
     @simulator.setter
     def simulator(self, simulator: Simulator) -> None:
         self._simulator = simulator
+
+    @property
+    def loses_states(self) -> bool:
+        """If True, ticks go on without states from the next one on, as in real time when a simulator hangs."""
+        return self._loses_states
+
+    @loses_states.setter
+    def loses_states(self, loses_states: bool) -> None:
+        self.settle()
+        self._loses_states = loses_states
 
     @property
     def time_s(self) -> float:
@@ -173,9 +182,9 @@ class Engine:
         """Run a tick and the quiet ones that follow it, ``most`` at most, up to the end of the outer period.
 
         If nothing happens, run on up to the end of the period at ``until_s``. Return their number, and True after an
-        outer tick. As after ``tick``, the newest answer is not applied yet: the caller sets ``owes_step``.
+        outer tick. As after ``tick``, the newest answer is not applied yet: the caller sets ``step_is_pending``.
         """
-        if self._changes_bytes or self.loses_states or self._missed_us > 0:
+        if self._changes_bytes or self._loses_states or self._missed_us > 0:
             self.settle()
             return 1, self.tick()
         done = self._run_quiet(self._most(most, until_s))
@@ -213,15 +222,15 @@ class Engine:
         return min(most, periods * self._divisor)
 
     def _run_quiet(self, most: int) -> int:
-        """Run the owed step and the ticks that follow it while nothing happens; return their number, or 0."""
-        if not (self.owes_step and self._endpoint.answers_exactly):
+        """Run the pending step and the ticks that follow it while nothing happens; return their number, or 0."""
+        if not (self.step_is_pending and self._endpoint.answers_exactly):
             return 0
-        self.owes_step = False
+        self.step_is_pending = False
         done = self._quiet.run_on(self._simulator, self.actuators, most)
         if done:
             self._count(done, done)
         else:
-            self.owes_step = True
+            self.step_is_pending = True
         return done
 
     def _run_from_outer(self, most: int) -> int:
@@ -244,16 +253,16 @@ class Engine:
         self.stack.recorder.timing(time_us, **fields)
 
     def settle(self) -> None:
-        """Make the step of the simulator that is owed."""
-        if self.owes_step:
+        """Let the simulator make the pending step."""
+        if self.step_is_pending:
             self.advance()
 
     def advance(self) -> None:
         """Advance the simulator by one interval with the newest actuators, and send the stack its state."""
-        self.owes_step = False
+        self.step_is_pending = False
         self._simulator.apply(self.actuators)
         self.machine_ns += self._interval_us * 1000
-        if self.loses_states:
+        if self._loses_states:
             self._missed_us += self._interval_us
         elif self._changes_bytes or not self._send_directly():
             self._send_states(self._endpoint)

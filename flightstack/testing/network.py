@@ -157,7 +157,7 @@ class EngineRunner:
                 engine.pass_requests()
                 self._network.exchange(engine.stack.ground, engine.time_s)
                 self._call_due()
-            engine.owes_step = True
+            engine.step_is_pending = True
             if is_outer:
                 break
         return most - left

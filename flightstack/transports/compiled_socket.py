@@ -87,7 +87,7 @@ class CompiledSocket:
     def clear(self, limit_ns: int = 0) -> None:
         """Forget what was sent and received, and wait for bytes for ``limit_ns`` at most from now on; 0: no limit."""
         self._record["sent"], self._record["received"] = -1, -1
-        self._record["is_limited"], self._limit[1] = int(limit_ns > 0), limit_ns
+        self._record["is_limited"], self._limit[:] = int(limit_ns > 0), divmod(limit_ns, _NS_PER_S)
 
 
 @compiled
@@ -119,7 +119,7 @@ def receive_into(line: Any) -> int:
     record, inbox = line[0][0], line[2]
     if record["is_limited"] != 0:
         ready = call_c(record["poll"], (record["polled_at"], 1, record["limit_at"], 0))
-        if ready & _INT == 0:
+        if ready & _INT != 1:  # no bytes in time, or a signal
             record["received"] = -1
             return -1
     count = call_c(record["receive"], (record["descriptor"], record["in_at"], len(inbox), 0))

@@ -60,16 +60,17 @@ def _tuning(values: Mapping[str, float]) -> tuple[EstimatorParams, GnssLimits]:
 
 
 class _SensorFault(NamedTuple):
-    """A condition of a sensor, with the texts at its begin and end."""
+    """A condition of a sensor, with the texts at its begin and end; no end is reported during ``unless``."""
 
     bit: int
     begins: str
-    ends: str
+    ends: str = ""
+    unless: int = 0
 
 
 _SENSOR_FAULTS = (
-    _SensorFault(MAG_FAULT, "Compass disagrees with GNSS and is no longer used", ""),
-    _SensorFault(MAG_MISSING, "Compass is missing and not used", "Compass is back"),
+    _SensorFault(MAG_FAULT, "Compass disagrees with GNSS and is no longer used"),
+    _SensorFault(MAG_MISSING, "Compass is missing and not used", "Compass is used again", MAG_FAULT),
     _SensorFault(BARO_FAULT, "Barometer is stuck or missing and not used", "Barometer is used again"),
 )
 
@@ -126,7 +127,7 @@ class Estimation:
         self._time_us = 0  # of the newest message of the sensors
         self._read_selected()
         self._seen, self._counts = sum_of_resets(self.estimator.memory), (0.0, 0.0, 0.0)
-        self._told, self._spare_has_failed = 0, False
+        self._reported, self._spare_has_failed = 0, False
 
     def _read_selected(self) -> None:
         """Read resets and the fault of the magnetometer of the selected estimator from now on."""
@@ -327,21 +328,21 @@ class Estimation:
             self.health, limits_of(now.behaviour), self._mag_fault[0], now.flying
         )
         users.failsafes.take_health(self.health, self._conditions)
-        self._tell_of_sensors()
+        self._report_sensors()
         failsafes = users.failsafes
         changed = users.navigator.set_known(failsafes.position_is_known, failsafes.velocity_is_known)
         if changed and now.flying:  # reference and integrators hold what followed from the position
             users.navigator.reset_reference(now.state)
             self._reset_loops()
 
-    def _tell_of_sensors(self) -> None:
-        """Report sensors that fail, and, in flight, their return."""
-        began, ended = self._conditions & ~self._told, self._told & ~self._conditions
-        self._told = self._conditions
+    def _report_sensors(self) -> None:
+        """Report sensors that fail, and, in flight, their return. A rejected magnetometer stays unused."""
+        faults = self._conditions | self._reported & MAG_FAULT
+        began, ended, self._reported = faults & ~self._reported, self._reported & ~faults, faults
         for fault in _SENSOR_FAULTS:
             if began & fault.bit:
                 self._users.journal.say(Severity.WARNING, fault.begins)
-            elif ended & fault.bit and fault.ends and self._now.flying:
+            elif ended & fault.bit and not (faults & fault.unless) and self._now.flying:
                 self._users.journal.say(Severity.NOTICE, fault.ends)
 
 

@@ -95,6 +95,11 @@ def test_magnetometer_turned_at_boot_is_replaced_by_gnss_velocity() -> None:
         assert sum("Compass disagrees with GNSS" in text for text in world.texts) == 1
         error = turn_between(Quaternion(*truth[6:10].tolist()), estimator.state().attitude)
         assert abs(math.degrees(error)) < 8.0  # measured 2; 50 if the filter follows alone
+        world.fault("sensor:mag:off", for_s=2.0)
+        world.run_for(4.0)
+        assert "Compass is missing and not used" in world.texts
+        assert "Compass is used again" not in world.texts
+        assert sum("Compass disagrees with GNSS" in text for text in world.texts) == 1
 
 
 def test_flights_on_sensors_of_one_seed_are_equal_to_the_byte() -> None:
@@ -144,7 +149,7 @@ def test_magnetometer_that_goes_silent_in_the_air_is_reported_and_so_is_its_retu
         world.run_for(2.0)
         assert world.texts.count("Compass is missing and not used") == 1
         world.run_for(3.0)
-        assert world.texts[-1] == "Compass is back"
+        assert world.texts[-1] == "Compass is used again"
 
 
 @pytest.mark.parametrize(

@@ -343,9 +343,7 @@ STREAMS: dict[str, Callable[[], Events]] = {
     "accelerometer slightly wrong": lambda: _wrong_accelerometer(_LONG(), 0.4),
     "accelerometer wrong": lambda: _wrong_accelerometer(_LONG(), 0.8),
     "gyro steps": lambda: _wrong_gyro(_LONG(), _CLIMB_S, 0.02),
-    "gyro steps at rest": lambda: _wrong_gyro(
-        _wrong_gyro(_standing(flown(), 8.0), 1.0, 0.006), 5.0, 0.03
-    ),
+    "gyro steps at rest": lambda: _wrong_gyro(_wrong_gyro(_standing(flown(), 8.0), 1.0, 0.006), 5.0, 0.03),
     "boat": lambda: _on_boat(flown(), 0.5),
     "barometer stuck": lambda: _stuck_barometer(_LONG()),
     "barometer drifts": lambda: _wrong_barometer(_LONG(), 0.0, 1.0),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import signal
 import socket
 import time
 from collections.abc import Iterator
@@ -226,6 +227,21 @@ def test_a_wait_for_a_state_ends_at_its_limit() -> None:
         vehicle.steps.begin(time.monotonic_ns(), LATER_NS, 10_000_000_000)
         others.send(vehicle.next_state())
         assert vehicle.exchange() == 0
+
+
+def test_a_signal_ends_a_wait_for_a_state() -> None:
+    ours, others = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)  # no limit of their own
+    before = signal.signal(signal.SIGALRM, lambda _number, _frame: None)
+    try:
+        with World(make_engine=BytesEngine, state="truth") as world, ours, others:
+            vehicle = Vehicle(world, ours)
+            vehicle.steps.begin(time.monotonic_ns(), LATER_NS, 10_000_000_000)
+            signal.setitimer(signal.ITIMER_REAL, 0.02, 0.02)  # again, if the first one comes before the wait
+            assert vehicle.exchange() == -1
+            assert vehicle.steps.socket.received is None
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
 
 
 def test_the_rest_of_an_answer_that_is_not_accepted_is_left_to_python() -> None:

@@ -1,7 +1,7 @@
 """Hub of all ground stations and companions: links, services and telemetry. No I/O.
 
 Each peer has its own link (sequence numbers, message rates). Times are on the link clock: wall time in a process,
-simulated time in tests. Telemetry rates count simulated time too (``telemetry.telemetry``).
+simulated time in tests. Telemetry rates count simulated time too (``telemetry.streams``).
 """
 
 from __future__ import annotations
