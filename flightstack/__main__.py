@@ -7,21 +7,22 @@ from __future__ import annotations
 
 import sys
 
-from flightstack.process import interrupts
+from flightstack.process.interrupts import report, signals
 
 
 def main() -> None:
     """Run the command."""
-    signals = interrupts.Interrupts()  # the main loop has its own handlers
     try:
+        signals.catch()  # the main loop has its own handlers
         from flightstack.process.command import run_command  # noqa: PLC0415  # an interrupt of it ends in order
 
         code = run_command()
+        signals.reported = True
     except KeyboardInterrupt:
         signals.reported = True
-        interrupts.report("flightstack: stopped")
+        report("flightstack: stopped")
         code = 0
-    sys.exit(interrupts.end_with(code))
+    sys.exit(signals.end_with(code))
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import sys
 
-from flightstack.process import interrupts
+from flightstack.process.interrupts import report, signals
 from gcs_cli.help_generated import HELP, WIDTH
 
 _INTERRUPTED = 130
@@ -17,23 +17,28 @@ _INTERRUPTED = 130
 
 def main(argv: list[str] | None = None) -> int:
     """Run the command line; return the exit code."""
-    signals = interrupts.Interrupts()
     words = sys.argv[1:] if argv is None else argv
-    if len(words) == 1 and words[0] in ("-h", "--help") and _columns() >= WIDTH and _prints(HELP):
-        return 0
     try:
-        from gcs_cli.program import run
-
-        code = run(words)
+        signals.catch()
+        code = _run(words)
+        signals.reported = True
     except KeyboardInterrupt:  # outside the command: `run` reports those of the command
         signals.reported = True
         code = _report_interrupt("--json" in words)
-    return interrupts.end_with(code)
+    return signals.end_with(code)
+
+
+def _run(words: list[str]) -> int:
+    if len(words) == 1 and words[0] in ("-h", "--help") and _columns() >= WIDTH and _prints(HELP):
+        return 0
+    from gcs_cli.program import run
+
+    return run(words)
 
 
 def _report_interrupt(as_json: bool) -> int:
     """Report an interrupt as ``gcs_cli.output.run_command`` does, without its imports."""
-    interrupts.report("gcs: interrupted")
+    report("gcs: interrupted")
     if as_json:
         import json  # noqa: PLC0415  # signals are caught before these imports
 

@@ -14,6 +14,7 @@ import typer
 from flightstack.core.errors import ConfigError
 from flightstack.process.command_line import UsageError, usage_sentence
 from flightstack.process.console import complain, drop, say
+from flightstack.process.interrupts import signals
 from gcs_cli.errors import DONE, FAILED, INTERRUPTED, USAGE, CliError
 
 
@@ -84,6 +85,7 @@ def run_command(run: Callable[[], int | None], as_json: bool) -> int:
         sentence, code = str(error), error.exit_code
     except ConfigError as error:
         sentence, code = str(error), USAGE
+    signals.reported = True  # a second one neither replaces nor repeats the sentence
     if not sentence:
         return code
     complain(f"gcs: {sentence}")

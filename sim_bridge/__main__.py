@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 
-from flightstack.process import interrupts
+from flightstack.process.interrupts import report, signals
 
 _ON_FILES = {"open-loop", "export-mjcf", "render"}
 _INTERRUPTED = 130
@@ -16,17 +16,18 @@ _INTERRUPTED = 130
 def main(argv: list[str] | None = None) -> int:
     """Run the command; return the exit code."""
     words = sys.argv[1:] if argv is None else argv
-    signals = interrupts.Interrupts()  # the server has its own handlers
     try:
+        signals.catch()  # the server has its own handlers
         from sim_bridge.command import run_command  # noqa: PLC0415  # an interrupt of it ends in order
 
         code = run_command(words)
+        signals.reported = True
     except KeyboardInterrupt:
         signals.reported = True
         is_unfinished = not _ON_FILES.isdisjoint(words)
-        interrupts.report("sim-bridge: interrupted" if is_unfinished else "sim-bridge: stopped")
+        report("sim-bridge: interrupted" if is_unfinished else "sim-bridge: stopped")
         code = _INTERRUPTED if is_unfinished else 0
-    return interrupts.end_with(code)
+    return signals.end_with(code)
 
 
 if __name__ == "__main__":

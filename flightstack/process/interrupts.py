@@ -12,76 +12,103 @@ import signal
 import sys
 from types import FrameType
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_ENDING = (signal.SIGINT, signal.SIGTERM)
 _IMPORTER = "<frozen importlib._bootstrap>"
-_AGAIN_S = 0.01
-"""Time after which a signal is repeated that could not raise."""
+_LIMIT_S = 1.0
+"""Longest time for which a signal waits for the end of an import, which may hang."""
 
 
 class Interrupts:
-    """Raises KeyboardInterrupt on SIGINT and SIGTERM, as soon as no import runs.
+    """Raises KeyboardInterrupt on SIGINT and SIGTERM: at once, or right after the import that runs.
 
-    When Python itself ends, the signals are ignored: its default action would replace the exit code.
+    A second signal, or the limit of time, does not wait for the import. A signal that the parent ignores, such as
+    SIGINT of a shell's background job, stays ignored. When Python itself ends, all are ignored: their default action
+    would replace the exit code.
     """
 
     def __init__(self) -> None:
         self.reported = False
-        """Set to True to ignore further signals. No function: Python may run a handler where one begins."""
+        """Set it to True to ignore further signals. An assignment: a signal could interrupt the call of a function."""
+        self._waits = False
+        self._may_interrupt_imports = False
+
+    def catch(self) -> None:
+        """Begin to raise."""
+        self.reported = self._waits = False
         atexit.register(_ignore)
-        sys.unraisablehook = self._repeat_ignored
-        for number in _SIGNALS:
+        sys.unraisablehook = self._keep_ignored
+        signal.signal(signal.SIGALRM, self._on_signal)
+        for number in _caught():
             signal.signal(number, self._on_signal)
 
-    def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        if self.reported:
-            return
-        if not _can_raise(frame):
-            _repeat(number)
-            return
-        signal.setitimer(signal.ITIMER_REAL, 0.0)  # nothing is left to repeat
-        raise KeyboardInterrupt
+    def end_with(self, code: int) -> int:
+        """Return the program's exit code; from now on a signal ends the process with it at once."""
+        self.reported = True
+        signal.signal(signal.SIGALRM, signal.SIG_IGN)
+        exec(
+            ""
+        )  # else Python ends with SIGINT after a KeyboardInterrupt in another `exec`, as that of a dataclass
+        for number in _caught():
+            signal.signal(number, lambda *_: os._exit(code))
+        return code
 
-    def _repeat_ignored(self, ignored: sys.UnraisableHookArgs) -> None:
-        """Repeat a KeyboardInterrupt that Python ignores; print any other exception."""
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        if self._waits:
+            self._may_interrupt_imports = True
+        elif number != signal.SIGALRM and not self.reported:
+            self._wait()
+        self._raise_if_possible(frame)
+
+    def _wait(self) -> None:
+        """Keep a signal: raise at the first call or return of a function where that is possible."""
+        self._waits, self._may_interrupt_imports = True, False
+        signal.setitimer(signal.ITIMER_REAL, _LIMIT_S)
+        sys.setprofile(self._raise_if_possible)
+
+    def _raise_if_possible(self, frame: FrameType | None, *_: object) -> None:
+        if not self._waits or not (self.reported or _can_raise(frame, self._may_interrupt_imports)):
+            return
+        sys.setprofile(None)
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        self._waits = False
+        if not self.reported:
+            raise KeyboardInterrupt
+
+    def _keep_ignored(self, ignored: sys.UnraisableHookArgs) -> None:
+        """Raise a KeyboardInterrupt again that Python ignores; print any other exception."""
         if issubclass(ignored.exc_type, KeyboardInterrupt):
-            _repeat(signal.SIGINT)
+            self._wait()
         else:
             sys.__unraisablehook__(ignored)
 
 
-def report(line: object) -> None:
-    """Print the line of a KeyboardInterrupt to stderr, and end with the program's exit code after it.
+signals = Interrupts()
+"""The signals of this process."""
 
-    If it interrupted an ``exec``, such as that of a dataclass, Python would end with the signal instead.
-    """
+
+def report(line: object) -> None:
+    """Print the line of a KeyboardInterrupt to stderr."""
     from flightstack.process.console import complain  # noqa: PLC0415  # signals are caught before it is imported
 
-    exec("")  # the next one resets that
     complain(line)
 
 
-def end_with(code: int) -> int:
-    """Return the program's exit code; from now on a signal ends the process with it at once."""
-    for number in _SIGNALS:
-        signal.signal(number, lambda *_: os._exit(code))
-    return code
+def _caught() -> list[signal.Signals]:
+    return [number for number in _ENDING if signal.getsignal(number) is not signal.SIG_IGN]
 
 
 def _ignore() -> None:
-    for number in _SIGNALS:
+    for number in (*_ENDING, signal.SIGALRM):
         signal.signal(number, signal.SIG_IGN)
 
 
-def _can_raise(frame: FrameType | None) -> bool:
-    """Return False within an import or the ``__set_name__`` of a class."""
+def _can_raise(frame: FrameType | None, in_import: bool) -> bool:
+    """Return False within the ``__set_name__`` of a class, what Python calls on an ignored exception, or an import."""
     while frame is not None:
-        if frame.f_code.co_filename == _IMPORTER or frame.f_code.co_name == "__set_name__":
+        code = frame.f_code
+        if code.co_name in ("__set_name__", "_keep_ignored"):
+            return False
+        if code.co_filename == _IMPORTER and not in_import:
             return False
         frame = frame.f_back
     return True
-
-
-def _repeat(number: int) -> None:
-    """Send a signal again a little later."""
-    signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(number))
-    signal.setitimer(signal.ITIMER_REAL, _AGAIN_S)

@@ -15,6 +15,7 @@ import typer
 
 from flightstack.process.command_line import UsageError, expand_options, make_app
 from flightstack.process.console import complain
+from flightstack.process.interrupts import signals
 from gcs_cli.commands.confirmation import kept_alive
 from gcs_cli.errors import DONE, INTERRUPTED, USAGE, CliError
 from gcs_cli.link.connection import Connection
@@ -138,6 +139,7 @@ def _interact(runner: _Runner, connection: Connection) -> int:
             if line.strip() in _ENDS:
                 return DONE
             runner.run(line)
+            signals.reported = False  # by that command
 
 
 def _prompt(connection: Connection) -> str:
