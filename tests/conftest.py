@@ -112,7 +112,7 @@ def _never_hangs() -> Iterator[None]:
 @pytest.fixture(autouse=True)
 def _keeps_the_signals() -> Iterator[None]:
     """Restore what a program that ran in the test process does on a signal."""
-    numbers = (signal.SIGINT, signal.SIGTERM)
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGALRM)
     handlers, hook = [signal.getsignal(number) for number in numbers], sys.unraisablehook
     yield
     for number, handler in zip(numbers, handlers, strict=True):

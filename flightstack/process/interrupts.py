@@ -44,10 +44,7 @@ class Interrupts:
     def end_with(self, code: int) -> int:
         """Return the program's exit code; from now on a signal ends the process with it at once."""
         self.reported = True
-        signal.signal(signal.SIGALRM, signal.SIG_IGN)
-        exec(
-            ""
-        )  # else Python ends with SIGINT after a KeyboardInterrupt in another `exec`, as that of a dataclass
+        exec("")  # else Python ends with SIGINT after one in another `exec`, such as that of a dataclass
         for number in _caught():
             signal.signal(number, lambda *_: os._exit(code))
         return code
