@@ -201,3 +201,11 @@ def check_output_file(flag: str, path: Path | None, suffixes: tuple[str, ...]) -
         raise CliError(f"{flag} {path}: give the file a name that ends in {suffixes[0]}", USAGE)
     if not path.parent.is_dir():
         raise CliError(f"{flag} {path}: there is no directory {path.parent}", USAGE)
+
+
+def check_page(page: Path) -> None:
+    """Raise CliError (usage) for a page of ``--out`` that is no page, or in a directory that does not exist."""
+    if page.suffix.lower() not in (".html", ".htm"):
+        raise CliError(f"--out {page}: give the page a name that ends in .html", USAGE)
+    if not page.parent.is_dir():
+        raise CliError(f"--out {page}: there is no directory {page.parent}", USAGE)

@@ -13,11 +13,11 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.process.command_line import make_app
 from flightstack.process.console import complain
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly.fly_display import FlyConsole
+from gcs_cli.output import write_page
 from gcs_cli.report.compare import (
     ComparedRun,
     Row,
@@ -29,7 +29,7 @@ from gcs_cli.report.compare import (
 )
 from gcs_cli.report.poses import find_run
 from gcs_cli.run_directory import COMPARISON_NAME as PAGE_NAME
-from gcs_cli.settings import JsonOption, OverwriteOption
+from gcs_cli.settings import JsonOption, OverwriteOption, check_page
 
 app = make_app(add_completion=False)
 
@@ -56,21 +56,19 @@ def compare(
         raise CliError("give two flights or more to compare", USAGE)
     found = [find_run(path) for path in runs]
     page = found[0].log.with_name(PAGE_NAME) if out is None else out
-    if page.suffix.lower() not in (".html", ".htm"):
-        raise CliError(f"--out {page}: give the page a name that ends in .html", USAGE)
-    if not page.parent.is_dir():
-        raise CliError(f"--out {page}: there is no directory {page.parent}", USAGE)
+    check_page(page)
     read = read_runs(found)
     for run in read:
         if run.flight.damaged:
             complain(f"gcs: warning: {run.log}: the log is damaged; read up to {run.flight.duration_s:.1f} s")
-    is_written = overwrite or not page.is_file()
+    failure = write_page(page, render_comparison(read), overwrite)
     if as_json:
-        print(json.dumps(comparison(read, page if is_written else None), allow_nan=False), flush=True)
+        facts = comparison(read, page if failure is None else None)
+        print(json.dumps(facts, allow_nan=False), flush=True)
     else:
         FlyConsole(highlight=False).print(comparison_table(read))
-    check_new(page, overwrite)
-    write_text_atomically(page, render_comparison(read))
+    if failure is not None:
+        raise failure
     if not as_json:
         print(f"page written to {page}", flush=True)
     if open_page:

@@ -10,7 +10,6 @@ from typing import Annotated
 
 import typer
 
-from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.core.errors import ConfigError
 from flightstack.params.estimator import ESTIMATOR_SPECS
 from flightstack.params.store import read_assignment
@@ -19,7 +18,8 @@ from gcs_cli.errors import USAGE, CliError
 from gcs_cli.estimate.log_samples import DECLINATION
 from gcs_cli.estimate.result import Result, estimate_log, quantities, render, rows_of
 from gcs_cli.logs.reader import log_file, read_log
-from gcs_cli.settings import JsonOption, OpenOption, OverwriteOption, output_of
+from gcs_cli.output import write_page
+from gcs_cli.settings import JsonOption, OpenOption, OverwriteOption, check_page, output_of
 
 app = make_app(add_completion=False)
 
@@ -57,18 +57,18 @@ def estimate(
     _NSATS; a log of this flight stack gives all.
     """
     page = out if out is not None or not open_page else log_file(log).with_suffix(".html")
-    if page is not None and page.suffix.lower() not in (".html", ".htm"):
-        raise CliError(f"--out {page}: give the page a name that ends in .html", USAGE)
+    if page is not None:
+        check_page(page)
     given = _given(param or ())
     recording = read_log(log)
     result = estimate_log(recording, given)
-    is_written = page is not None and (overwrite or not page.is_file())
-    output, file = output_of(context, as_json), str(page) if is_written else None
+    failure = None if page is None else write_page(page, render(result, recording), overwrite)
+    output, file = output_of(context, as_json), None if page is None or failure else str(page)
     output.say("estimate", "\n".join(_lines(result)), log=str(log), file=file, **result.summary)
+    if failure is not None:
+        raise failure
     if page is None:
         return
-    check_new(page, overwrite)
-    write_text_atomically(page, render(result, recording))
     if not output.as_json:
         print(f"report written to {page}", flush=True)
     if open_page:

@@ -216,3 +216,12 @@ def test_page_is_written_to_no_other_file(runs: list[Path], name: str, capfd: An
     assert gcs("compare", *runs, "--out", runs[0].parent / name, "--overwrite") == USAGE
     assert "--out" in capfd.readouterr().err
     assert log.read_bytes() == before
+
+
+def test_json_names_no_page_that_cannot_be_written(runs: list[Path], tmp_path: Path, capsys: Any) -> None:
+    page = tmp_path / "page.html"
+    page.mkdir()
+    assert gcs("compare", *runs, "--json", "--out", page) != 0
+    printed = capsys.readouterr()
+    assert json.loads(printed.out.splitlines()[0])["page"] is None
+    assert "page.html" in printed.err

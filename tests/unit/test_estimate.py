@@ -77,6 +77,24 @@ def test_result_is_printed_beside_a_report_that_is_not_replaced(
     assert page.read_text() == "mine"
 
 
+def test_json_names_no_report_that_cannot_be_written(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "page.html"
+    page.mkdir()
+    assert main(["estimate", str(log), "--json", "--out", str(page)]) != 0
+    assert json.loads(capsys.readouterr().out.splitlines()[0])["file"] is None
+
+
+def test_report_in_a_missing_folder_is_refused_before_the_estimate(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["estimate", str(log), "--out", str(tmp_path / "nodir" / "page.html")]) == USAGE
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert "there is no directory" in printed.err
+
+
 def test_compressed_log_is_read_in_place(log: Path, tmp_path: Path) -> None:
     path = tmp_path / "flight.ulg.xz"
     path.write_bytes(lzma.compress(log.read_bytes()))
