@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import pytest
+
+from gcs_cli.scenarios import flying
 from gcs_cli.scenarios.flying import fly_case
 from gcs_cli.scenarios.result import Wanted
 from gcs_cli.scenarios.selection import find_scenarios, select
@@ -31,3 +36,26 @@ def test_each_fact_of_a_failed_flight_is_told_once(tmp_path: Path) -> None:
     ]
     assert "fault" in texts
     assert [time_s for time_s, _ in result.texts] == sorted(time_s for time_s, _ in result.texts)
+
+
+@pytest.mark.parametrize(
+    ("event", "text", "shown"),
+    [
+        ("failsafe_GCS_LOST", "Compass is back", True),
+        ("takeoff", "Compass is back", True),
+        ("item_1", "Mission item 10 reached", True),
+        ("failsafe_GCS_LOST", "Manual control lost", True),
+        ("failsafe_GCS_LOST", "Ground station lost: returning", False),
+        ("failsafe", "Failsafe: returning (ground station lost)", False),
+        ("mode_RETURN", "Ground station lost: returning", False),
+        ("item_1", "Mission item 1 reached", False),
+        ("landing", "Landing detected", False),
+    ],
+)
+def test_an_event_is_left_out_only_beside_its_own_text(event: str, text: str, shown: bool) -> None:
+    flight: Any = SimpleNamespace(
+        log=SimpleNamespace(texts=[SimpleNamespace(time_s=10.0, text=text)]),
+        events=[SimpleNamespace(time_s=10.02, name=event), SimpleNamespace(time_s=30.0, name=event)],
+    )
+    told = [fact for _, fact in flying._facts(flight)]
+    assert told == [text, *([event] if shown else []), event]
