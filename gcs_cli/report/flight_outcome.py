@@ -18,6 +18,8 @@ _ON_GROUND = 1  # MAV_LANDED_STATE
 GROUND_ENDS = (Command.NAV_LAND, Command.NAV_RETURN_TO_LAUNCH)
 _TERMINATED = NAVIGATION_STATE[Mode.TERMINATION]
 _MOST_WARNINGS = 3
+_ARMED = ("Armed", "Arming")
+"""Beginnings of the text with which a vehicle says that it armed."""
 
 
 class Code(StrEnum):
@@ -96,8 +98,13 @@ def _item(view: VehicleView, items: Sequence[MissionItem]) -> str:
 
 
 def _warnings(view: VehicleView) -> str:
-    """Return the first critical text, which is the cause, and the newest warnings, to end a sentence."""
-    warnings = [entry for entry in view.texts if entry.severity <= Severity.WARNING]
+    """Return the first critical text, which is the cause, and the newest warnings, to end a sentence.
+
+    Texts from before the last arming are about no flight, or about another one.
+    """
+    armings = [index for index, entry in enumerate(view.texts) if entry.text.startswith(_ARMED)]
+    texts = view.texts[armings[-1] :] if armings else view.texts
+    warnings = [entry for entry in texts if entry.severity <= Severity.WARNING]
     cause = next((entry for entry in warnings if entry.severity <= Severity.CRITICAL), None)
     shown = warnings[-_MOST_WARNINGS:]
     if cause is not None and cause not in shown:

@@ -160,6 +160,23 @@ def test_a_lost_flight_is_explained_by_its_first_critical_text(
     assert outcome.reason == f"the vehicle disarmed, before the mission was done{shown}"
 
 
+def test_a_text_from_before_the_arming_is_no_cause() -> None:
+    texts = [
+        (2, "old"),
+        (6, "Armed"),
+        (2, "other"),
+        (6, "Disarmed"),
+        (6, "Armed"),
+        (4, "a"),
+        (4, "b"),
+        (4, "c"),
+    ]
+    said = tuple(StatusText(number, *text, 0.0, None) for number, text in enumerate(texts))
+    assert outcome_of(VehicleView(texts=said), ()).reason.endswith(": a; b; c")
+    late = (*said, StatusText(8, 2, "d", 0.0, None), StatusText(9, 4, "e", 0.0, None))
+    assert outcome_of(VehicleView(texts=late), ()).reason.endswith(": c; d; e")
+
+
 def test_disarming_on_the_way_is_a_failure_with_the_vehicles_last_warning() -> None:
     story = Story(FakeVehicle(stop_at_item=1)).run()
     assert (
