@@ -82,17 +82,17 @@ def listen(host: str, port: int) -> socket.socket:
     return listener
 
 
-def hold(listener: socket.socket) -> socket.socket:
-    """Hold the address of a listener until the returned socket is closed; raise OSError if another process does.
+def hold(listener: socket.socket) -> contextlib.AbstractContextManager[object]:
+    """Hold the port of a listener until the returned context ends; raise OSError if another process holds it.
 
-    A simulator closes its listener when its client has connected, and a second one could listen on the address. The
+    A simulator closes its listener when its client has connected, and a second one could listen on the port. The
     name is one of Linux's, without a file; elsewhere nothing is held.
     """
-    host, port = listener.getsockname()[:2]
+    if sys.platform != "linux":
+        return contextlib.nullcontext()
     held = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     try:
-        if sys.platform == "linux":
-            held.bind(f"\0sim-bridge {host}:{port}")
+        held.bind(f"\0sim-bridge {listener.getsockname()[1]}")
     except OSError:
         held.close()
         listener.close()
