@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 from pathlib import Path
 
 from flightstack.core.geodesy import GeoPoint
@@ -28,6 +27,7 @@ from gcs_cli.transfers.plan_parts import plan_problem
 from gcs_cli.vehicle.param_info import load_parameters
 from sim_bridge.command import check_arguments as check_simulator
 from sim_bridge.errors import UsageProblemError
+from sim_bridge.server.connection import hold, listen
 
 GCS_LOSS_S = 5.0
 _RETURN = Command.NAV_RETURN_TO_LAUNCH
@@ -122,14 +122,12 @@ def check_ports(options: FlyOptions) -> None:
             UdpSocket(LOOPBACK, port).close()
     except PortBusyError as error:
         raise _port_error(error) from None
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((LOOPBACK, options.simulator_port))
-            probe.listen(1)
-        except OSError:
-            problem = PortBusyError("TCP", (LOOPBACK, options.simulator_port), "is in use")
-            raise _port_error(problem) from None
+    try:  # as the simulator does
+        with listen(LOOPBACK, options.simulator_port) as listener, hold(listener):
+            pass
+    except OSError:
+        problem = PortBusyError("TCP", (LOOPBACK, options.simulator_port), "is in use")
+        raise _port_error(problem) from None
 
 
 def _port_error(error: PortBusyError) -> CliError:
