@@ -13,6 +13,7 @@ from flightstack.core.errors import ConfigError
 
 OWNER_ONLY = 0o600
 _OPEN_TO_ALL = 0o666  # reduced by the umask
+_LONGEST_NAME_BYTES = 255
 _LONGEST_TAIL = 60
 """Characters of the file name, suffix included, that end the name of its temporary file."""
 
@@ -25,9 +26,13 @@ def check_new(path: Path, overwrite: bool) -> None:
 
 def check_creatable(path: Path, *, is_folder: bool = False) -> None:
     """Raise ConfigError if a file, or a folder for files, in folders that may be missing, cannot be written."""
-    nearest = next(place for place in (path, *path.absolute().parents) if place.exists())
+    nearest = next(place for place in (path, *path.absolute().parents) if os.path.lexists(place))
     has_entries = nearest.is_dir()
-    if nearest == path and has_entries and not is_folder:
+    if any(len(os.fsencode(part)) > _LONGEST_NAME_BYTES for part in path.parts):
+        code = errno.ENAMETOOLONG
+    elif not os.path.exists(nearest):
+        code = _link_error(nearest)
+    elif nearest == path and has_entries and not is_folder:
         code = errno.EISDIR
     elif not has_entries and (nearest != path or is_folder):
         code = errno.ENOTDIR
@@ -36,6 +41,15 @@ def check_creatable(path: Path, *, is_folder: bool = False) -> None:
     else:
         return
     raise ConfigError(path, "", f"cannot be written: {os.strerror(code)}")
+
+
+def _link_error(link: Path) -> int:
+    """Return the error code of a link to a missing file, to itself, or to a place that cannot be read."""
+    try:
+        link.stat()
+    except OSError as error:
+        return error.errno or errno.ENOENT
+    return errno.ENOENT
 
 
 def write_text_atomically(path: Path, text: str) -> None:

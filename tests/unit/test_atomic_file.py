@@ -153,5 +153,25 @@ def test_a_file_that_cannot_be_created_is_refused(
         check_creatable(tmp_path / free, is_folder=is_one)
 
 
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("dangling", "No such file or directory"),
+        ("loop", "Too many levels of symbolic links"),
+        ("dangling/new.txt", "No such file or directory"),
+        ("loop/new.txt", "Too many levels of symbolic links"),
+        ("é" * 128, "File name too long"),
+        (f"new/{'a' * 256}/b.txt", "File name too long"),
+    ],
+)
+def test_a_bad_link_and_a_long_name_are_refused(name: str, reason: str, tmp_path: Path) -> None:
+    (tmp_path / "dangling").symlink_to("missing")
+    (tmp_path / "loop").symlink_to("loop")
+    for is_folder in (False, True):
+        with pytest.raises(ConfigError, match=f"cannot be written: {reason}$"):
+            check_creatable(tmp_path / name, is_folder=is_folder)
+    check_creatable(tmp_path / ("a" * 255))
+
+
 def test_a_device_can_be_written() -> None:
     check_creatable(Path(os.devnull))
