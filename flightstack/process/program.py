@@ -121,7 +121,7 @@ def _print_warnings(given: RunOptions) -> None:
             complain(text)
     file = given.named_params
     if file is not None and not file.exists():
-        complain(f"warning: {file}: no such file, starting with the defaults")
+        complain(f"warning: {file}: no such file, starting with the defaults; it will keep changes")
 
 
 def _check(config: StackConfig) -> None:

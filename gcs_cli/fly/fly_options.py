@@ -88,7 +88,8 @@ def check_options(options: FlyOptions, home: GeoPoint) -> None:
     except UsageProblemError as error:
         raise CliError(str(error), USAGE) from None
     if options.params is not None and not options.params.is_file():
-        raise CliError(f"--params {options.params}: no such file", USAGE)
+        problem = "is a directory" if options.params.is_dir() else "no such file"
+        raise CliError(f"--params {options.params}: {problem}", USAGE)
     if runs_freely(options) and options.speed_factor != 1.0:
         raise CliError(
             f"--loops {options.loops}: a free-running target flies in real time: add --speed 1", USAGE

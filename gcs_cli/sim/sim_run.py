@@ -167,9 +167,8 @@ class Fleet:
 def check_vehicle(vehicle: SimOptions) -> None:
     """Check options, files and ports as simulator and flight stack do at their start; raise CliError, ConfigError."""
     params = None if vehicle.params == Path(NONE) else vehicle.params
-    if params is not None and not params.exists():  # the flight stack creates it
+    if params is not None and not params.exists():  # the flight stack says so, and creates it
         check_creatable(params)
-        complain(f"gcs: note: {params} does not exist yet: it will keep the parameters that are changed")
         params = None
     check_options(replace(vehicle, params=params), start_of(vehicle))
     if vehicle.log not in (None, NONE):

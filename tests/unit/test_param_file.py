@@ -355,7 +355,8 @@ def test_a_file_that_is_named_and_missing_is_mentioned_and_begun(tmp_path: Path)
     path = tmp_path / "new" / "my.params"
     done = flightstack_command("--check", "--params", path)
     assert done.returncode == 0
-    assert done.stderr == f"flightstack: warning: {path}: no such file, starting with the defaults\n"
+    sentence = f"{path}: no such file, starting with the defaults; it will keep changes"
+    assert done.stderr == f"flightstack: warning: {sentence}\n"
     assert not path.exists()  # a check changes nothing
     begin_param_file(path, 3)
     assert read_param_file(path) == []
