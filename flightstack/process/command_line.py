@@ -94,7 +94,7 @@ def _about_extra(words: str, context: Any) -> str:
     takes_link = any("--connect" in param.opts for param in context.command.params)
     return (
         f"{sentence}: give a recording as --connect {words}"
-        if takes_link and words.endswith(".tlog")
+        if takes_link and words.endswith(".tlog") and len(words.split()) == 1
         else sentence
     )
 

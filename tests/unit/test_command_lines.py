@@ -144,6 +144,7 @@ def test_missing_argument_of_a_group_of_options_is_named(command: str, words: st
     ("words", "said"),
     [
         ("perf a.tlog", "perf takes no argument a.tlog: give a recording as --connect a.tlog"),
+        ("perf b a.tlog", "perf takes no argument b a.tlog"),
         ("param set A 1 2", "param set takes no argument 2"),
         ("sim x", "sim takes no argument x"),
     ],
