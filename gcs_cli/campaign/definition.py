@@ -117,6 +117,14 @@ class Campaign:
             raise ConfigError(self.path, f"vary.{name}", error.args[0]) from None
 
 
+def is_campaign(path: Path) -> bool:
+    """Return True for a TOML file with a table ``[campaign]``."""
+    try:
+        return "campaign" in read_toml(path).values()
+    except ConfigError:
+        return False
+
+
 def load_campaign(path: Path) -> Campaign:
     """Read a campaign file; raise ConfigError, which names the key and what is allowed."""
     values = dict(read_toml(path).values())

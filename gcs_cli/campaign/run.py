@@ -12,7 +12,7 @@ from typing import Any
 from rich.console import Console
 
 from flightstack.core.atomic_file import write_bytes_atomically, write_text_atomically
-from gcs_cli.campaign.definition import Campaign, load_campaign
+from gcs_cli.campaign.definition import Campaign, is_campaign, load_campaign
 from gcs_cli.campaign.display import inputs_text, make_display
 from gcs_cli.campaign.flyer import FlightPool, Flyer, case_of, check_flights
 from gcs_cli.campaign.journal import (
@@ -43,7 +43,7 @@ def run_campaign(pool: FlightPool, options: CampaignOptions, console: Console) -
     """Fly what is not flown yet, write the table and the report; return the exit code. Raise ConfigError, CliError."""
     library("pyarrow", "gcs campaign")  # missing: say so before the flights
     if not options.file.exists():
-        raise missing_error(options.file)
+        raise missing_error(options.file, is_campaign)
     campaign = load_campaign(options.file)
     if options.seek is not None and options.only is not None:
         flight = flown_before(options.folder, options.only)

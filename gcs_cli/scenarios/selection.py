@@ -6,7 +6,7 @@ import ast
 import os
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,7 +46,7 @@ def find_scenarios(paths: Sequence[Path]) -> list[Path]:
     found: dict[Path, Path] = {}
     for path in paths:
         if not path.exists():
-            raise missing_error(path)
+            raise missing_error(path, is_scenario)
         for file in _in_folder(path) if path.is_dir() else (path,):
             found.setdefault(file.resolve(), file)
     if not found:
@@ -55,11 +55,11 @@ def find_scenarios(paths: Sequence[Path]) -> list[Path]:
     return list(found.values())
 
 
-def missing_error(path: Path) -> ConfigError:
-    """Return the error of a missing file, with the file whose name lacks its suffix or its folder."""
+def missing_error(path: Path, is_wanted: Callable[[Path], bool]) -> ConfigError:
+    """Return the error of a missing file, with the wanted file whose name lacks its suffix or its folder."""
     name = f"{path.name.removesuffix('.toml')}.toml"
     places = (path.parent / name, Path("missions", name), examples_folder() / name)
-    near = next((place for place in places if place.is_file()), None)
+    near = next((place for place in places if place.is_file() and is_wanted(place)), None)
     hint = "" if near is None else f"; did you mean {near}?"
     return ConfigError(path, "", f"there is no such file or folder{hint}")
 

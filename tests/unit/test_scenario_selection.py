@@ -55,9 +55,13 @@ def test_a_missing_path_names_the_file_that_is_meant(folder: Path, name: str, ne
         ConfigError, match=f"{name}: there is no such file or folder; did you mean {near}\\?$"
     ):
         find_scenarios([Path(name)])
-    assert gcs("campaign", name).stderr.startswith(
-        f"gcs: {name}: there is no such file or folder; did you mean"
-    )
+    assert gcs("campaign", name).stderr == f"gcs: {name}: there is no such file or folder\n"
+
+
+def test_a_missing_campaign_names_a_campaign(folder: Path) -> None:
+    (folder / "sweep.toml").write_text(TEXT + "[campaign]\nflights = 3\n[vary]\n")
+    assert "folder; did you mean sweep.toml?" in gcs("campaign", "sweep").stderr
+    assert gcs("test", "sweep").stderr == "gcs: sweep: there is no such file or folder\n"
 
 
 def test_a_campaign_among_the_scenarios_is_named(folder: Path) -> None:
