@@ -49,7 +49,7 @@ def test_fault_is_parsed(text: str, fault: Fault) -> None:
         ("rotor:1:weak=2", "0 to 1"),
         ("rotor:1:weak=much", "not a number"), ("rotor:1:stuck=nan", "0 to 100000"), ("rotor:1:weak=1_0", "0 to 1"),
         ("rotor:1:off@", "a time is missing after @"), ("rotor:1:off@-3", "the begin must be 0 to 1e+06 s"),
-        ("rotor:1:off@5-", "not a number"),
+        ("rotor:1:off@5-", "a time is missing after -"), ("rotor:1:off@-", "a time is missing after @"),
         ("rotor:1:off@5-5", "not after its begin"), ("rotor:1:off@5-4", "not after its begin"),
         ("rotor:1:off@inf", "0 to 1e+06"), ("battery:level=0.5@3-4", "give no end"), ("battery:level=-1", "0 to 1"),
         ("rotor 5 dead", "rotors 1 to 4"), ("rotor 1 delayed 3", "SECONDS must be 0.0001 to 2 s"),

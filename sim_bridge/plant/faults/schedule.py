@@ -125,8 +125,8 @@ def _allowed(row: Row) -> str:
 def _with_times(fault: Fault, begin: str | None, end: str | None) -> Fault:
     """Return the fault with its begin and end [s]; raise ValueError."""
     span = Range(0.0, LONGEST_S, "s")
-    if begin == "":
-        raise ValueError("a time is missing after @")
+    if begin in ("", "-") or end == "":
+        raise ValueError(f"a time is missing after {'-' if end == '' else '@'}")
     begin_s = 0.0 if begin is None else _parse_number(begin, "the begin", span)
     fault = fault._replace(begin_us=round(begin_s * 1e6))
     if end is None:
