@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from flightstack.core.contract import Vector3
 from flightstack.core.errors import INSTALL_MULTIBODY
 from flightstack.core.geodesy import GeoPoint
-from flightstack.params.config import ESTIMATED, STATES
+from flightstack.params.config import CLOCKS, ESTIMATED, STATES
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.plant.battery import BatteryOptions
@@ -172,8 +172,13 @@ def parse_faults(texts: list[str], vehicle: Vehicle, plant: str, options: PlantO
 
 
 def check_client(faults: tuple[Fault, ...], state: str | None, clock: str | None) -> None:
-    """Check that each fault can act on the flight stack, if its state and clock are known."""
-    if state not in STATES or clock is None:
+    """Check state and clock of the flight stack, and that each fault can act on it, if both are known."""
+    if state is not None and state not in STATES:
+        problem = f"is not one of {', '.join(STATES)}; the directory is --state-dir"
+        raise UsageProblemError(f"--state: {state}: {problem}")
+    if clock is not None and clock not in CLOCKS:
+        raise UsageProblemError(f"--clock: {clock}: is not one of {', '.join(CLOCKS)}")
+    if state is None or clock is None:
         return
     on_sensors = state == ESTIMATED
     refusal = client_refusal(faults, Client(on_sensors, on_sensors, clock == "lockstep"))

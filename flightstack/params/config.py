@@ -19,6 +19,8 @@ DEFAULT_OUTER_HZ = 100.0
 ESTIMATED, TRUTH = "estimated", "truth"
 STATES = (ESTIMATED, TRUTH)
 """Sources of the state: the vehicle's sensors, or the simulator."""
+CLOCKS = ("lockstep", "realtime")
+"""Sources of the time: the simulator, or the computer."""
 FLOWN_ON = {ESTIMATED: "on its sensors", TRUTH: "on the true state"}
 """Description of the vehicle's configuration, for people."""
 DEFAULT_STATE = ESTIMATED

@@ -13,7 +13,7 @@ from flightstack.core.atomic_file import check_creatable, check_new
 from flightstack.core.errors import ConfigError, TargetError
 from flightstack.core.port_numbers import simulator_port, system_id
 from flightstack.firmware.choice import PYTHON
-from flightstack.params.config import DEFAULT_HOME, ESTIMATED, FLOWN_ON, StackConfig, parse_home
+from flightstack.params.config import CLOCKS, DEFAULT_HOME, ESTIMATED, FLOWN_ON, StackConfig, parse_home
 from flightstack.params.gains_file import hidden_gains
 from flightstack.params.param_file import begin_param_file
 from flightstack.params.vehicle import hidden_vehicle
@@ -75,8 +75,8 @@ def _later(config: StackConfig) -> tuple[str, ...]:
 
 
 def _check_combinations(given: RunOptions) -> None:
-    if given.clock not in ("lockstep", "realtime"):
-        raise ConfigError("--clock", given.clock, "is not one of lockstep, realtime")
+    if given.clock not in CLOCKS:
+        raise ConfigError("--clock", given.clock, f"is not one of {', '.join(CLOCKS)}")
     if given.allow_unsigned and given.signing_key is None:
         raise ConfigError("--allow-unsigned", "", "needs --signing-key")
 
