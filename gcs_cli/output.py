@@ -12,7 +12,6 @@ from typing import Any
 
 import typer
 
-from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.core.errors import ConfigError
 from flightstack.process.command_line import UsageError, usage_sentence
 from flightstack.process.console import complain, drop, say
@@ -53,6 +52,8 @@ def plain(value: Any) -> Any:
 
 def write_page(page: Path, text: str, overwrite: bool) -> ConfigError | OSError | None:
     """Write a page; return the error if it is not written, so that the caller can print its figures first."""
+    from flightstack.core.atomic_file import check_new, write_text_atomically
+
     try:
         check_new(page, overwrite)
         write_text_atomically(page, text)

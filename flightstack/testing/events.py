@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
-from flightstack.commander.failsafe import Failsafe
+from flightstack.commander.failsafe import RULE_OF, Failsafe
+from flightstack.commander.failsafe_step import VERB
 from flightstack.core.enums import Mode
 from flightstack.core.errors import ConfigError
 from flightstack.testing.faults import LINK_FAULTS
@@ -40,6 +41,15 @@ EVENTS = (
 )
 
 
+_TEXT_OF_EVENT = {
+    "takeoff": "takeoff detected",
+    "landing": "landing detected",
+    **{f"failsafe_{failsafe.name}": rule.begins.lower() for failsafe, rule in RULE_OF.items()},
+    **{f"mode_{action.name}": verb for action, verb in VERB.items() if action.name in Mode.__members__},
+}
+"""Words of the status text that describes an event, in small letters."""
+
+
 def check_event(name: str, *, is_live: bool = False) -> None:
     """Raise ConfigError for a name that no event has; with ``is_live``, none that is known in flight."""
     allowed = [event for event in EVENTS if event.is_live or not is_live]
@@ -48,3 +58,13 @@ def check_event(name: str, *, is_live: bool = False) -> None:
         raise ConfigError(
             "event", "", f"{name} is no event{' that is known in flight' if is_live else ''}: {forms}"
         )
+
+
+def describes(text: str, event: str) -> bool:
+    """Return True if a status text says that an event happened."""
+    said = text.lower()
+    if event == "failsafe":  # the first that acts, whichever it is
+        return any(rule.begins.lower() in said for rule in RULE_OF.values())
+    if event.startswith("item_"):
+        return said == f"mission item {event.removeprefix('item_')} reached"
+    return event in _TEXT_OF_EVENT and _TEXT_OF_EVENT[event] in said

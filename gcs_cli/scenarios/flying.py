@@ -6,11 +6,9 @@ import hashlib
 import time
 import traceback
 
-from flightstack.commander.failsafe import RULE_OF
-from flightstack.commander.failsafe_step import VERB
-from flightstack.core.enums import Mode
 from flightstack.core.errors import ConfigError, TargetError
 from flightstack.testing import Verdict, run_scenario
+from flightstack.testing.events import describes
 from flightstack.testing.flight import Flight
 from gcs_cli.report.page import render_report
 from gcs_cli.report.summary import RunInfo, summarise
@@ -20,13 +18,6 @@ from gcs_cli.scenarios.selection import Case
 
 _EXPECTED = (AssertionError, ConfigError, TargetError, OSError)
 """Errors of a flight whose text is enough; of any other the place is shown too."""
-_TEXT_OF_EVENT = {
-    "takeoff": "takeoff detected",
-    "landing": "landing detected",
-    **{f"failsafe_{failsafe.name}": rule.begins.lower() for failsafe, rule in RULE_OF.items()},
-    **{f"mode_{action.name}": verb for action, verb in VERB.items() if action.name in Mode.__members__},
-}
-"""Words of the status text that describes an event, in small letters."""
 _LONGEST_TO_TEXT_S = 0.25
 """Largest time between an event and the text that describes it, with a slow outer loop too."""
 
@@ -72,21 +63,11 @@ def _facts(flight: Flight) -> tuple[tuple[float, str], ...]:
         (round(event.time_s, 6), event.name)
         for event in flight.events
         if not any(
-            abs(event.time_s - at_s) <= _LONGEST_TO_TEXT_S and _describes(text, event.name)
+            abs(event.time_s - at_s) <= _LONGEST_TO_TEXT_S and describes(text, event.name)
             for at_s, text in texts
         )
     ]
     return tuple(sorted(events + texts, key=lambda fact: fact[0]))
-
-
-def _describes(text: str, event: str) -> bool:
-    """Return True if a status text says that an event happened."""
-    said = text.lower()
-    if event == "failsafe":  # the first that acts, whichever it is
-        return any(rule.begins.lower() in said for rule in RULE_OF.values())
-    if event.startswith("item_"):
-        return said == f"mission item {event.removeprefix('item_')} reached"
-    return event in _TEXT_OF_EVENT and _TEXT_OF_EVENT[event] in said
 
 
 def _report(case: Case, verdict: Verdict) -> str:
