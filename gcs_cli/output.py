@@ -7,7 +7,6 @@ import math
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import typer
@@ -48,18 +47,6 @@ def plain(value: Any) -> Any:
         listed = value.tolist() if hasattr(value, "tolist") else value
         return [plain(entry) for entry in listed] if isinstance(listed, Sequence) else plain(listed)
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def write_page(page: Path, text: str, overwrite: bool) -> ConfigError | OSError | None:
-    """Write a page; return the error if it is not written, so that the caller can print its figures first."""
-    from flightstack.core.atomic_file import check_new, write_text_atomically
-
-    try:
-        check_new(page, overwrite)
-        write_text_atomically(page, text)
-    except (ConfigError, OSError) as error:
-        return error
-    return None
 
 
 def can_draw() -> bool:

@@ -25,6 +25,7 @@ from flightstack.process.command_line import (
 from sim_bridge import options
 from sim_bridge.errors import PlantDivergedError, UsageProblemError
 from sim_bridge.output import complain
+from sim_bridge.server.connection import hold, listen
 
 app = make_app(name="sim-bridge", cls=PanelGroup)
 
@@ -50,6 +51,12 @@ def run(
 def check_arguments(given: Sequence[str]) -> None:
     """Check a command line of the simulator; raise UsageError, UsageProblemError, ConfigError, KeyboardInterrupt."""
     run_app(app, "sim-bridge", [*given, "--check"])
+
+
+def check_port(host: str, port: int) -> None:
+    """Raise OSError if the simulator cannot listen on the port."""
+    with listen(host, port) as listener, hold(listener):
+        pass
 
 
 @app.command("open-loop", cls=PanelCommand)

@@ -17,7 +17,6 @@ from flightstack.process.command_line import make_app
 from flightstack.process.console import complain
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly.fly_display import FlyConsole
-from gcs_cli.output import write_page
 from gcs_cli.report.compare import (
     ComparedRun,
     Row,
@@ -28,6 +27,7 @@ from gcs_cli.report.compare import (
     render_comparison,
 )
 from gcs_cli.report.poses import find_run
+from gcs_cli.report.written_page import write_page
 from gcs_cli.run_directory import COMPARISON_NAME as PAGE_NAME
 from gcs_cli.settings import JsonOption, OverwriteOption, check_page
 

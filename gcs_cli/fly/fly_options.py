@@ -26,8 +26,8 @@ from gcs_cli.run_directory import LOG_NAME
 from gcs_cli.transfers.plan_parts import plan_problem
 from gcs_cli.vehicle.param_info import load_parameters
 from sim_bridge.command import check_arguments as check_simulator
+from sim_bridge.command import check_port as check_simulator_port
 from sim_bridge.errors import UsageProblemError
-from sim_bridge.server.connection import hold, listen
 
 GCS_LOSS_S = 5.0
 _RETURN = Command.NAV_RETURN_TO_LAUNCH
@@ -124,8 +124,7 @@ def check_ports(options: FlyOptions) -> None:
     except PortBusyError as error:
         raise _port_error(error) from None
     try:  # as the simulator does
-        with listen(LOOPBACK, options.simulator_port) as listener, hold(listener):
-            pass
+        check_simulator_port(LOOPBACK, options.simulator_port)
     except OSError:
         problem = PortBusyError("TCP", (LOOPBACK, options.simulator_port), "is in use")
         raise _port_error(problem) from None
