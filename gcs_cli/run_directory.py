@@ -1,4 +1,4 @@
-"""The directory of a flight: ``runs/<stamp>-<plan>/``, never one that holds another flight."""
+"""The directory of a flight: ``runs/<stamp>-<plan>/``, never one that holds another flight; and pages of flights."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from flightstack.core.atomic_file import check_new, write_text_atomically
+from flightstack.core.errors import ConfigError
 from flightstack.firmware.pil.record import LINK_FILE, STEPS_FILE
 from gcs_cli.errors import USAGE, CliError
 
@@ -89,3 +91,13 @@ def _fresh(base: Path, name: str) -> Path:
             attempt += 1
             continue
         return folder
+
+
+def write_page(page: Path, text: str, overwrite: bool) -> ConfigError | OSError | None:
+    """Write a page; return the error if it is not written, so that the caller can print its figures first."""
+    try:
+        check_new(page, overwrite)
+        write_text_atomically(page, text)
+    except (ConfigError, OSError) as error:
+        return error
+    return None

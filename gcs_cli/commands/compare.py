@@ -27,8 +27,8 @@ from gcs_cli.report.compare import (
     render_comparison,
 )
 from gcs_cli.report.poses import find_run
-from gcs_cli.report.written_page import write_page
 from gcs_cli.run_directory import COMPARISON_NAME as PAGE_NAME
+from gcs_cli.run_directory import write_page
 from gcs_cli.settings import JsonOption, OverwriteOption, check_page
 
 app = make_app(add_completion=False)

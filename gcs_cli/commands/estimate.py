@@ -18,7 +18,7 @@ from gcs_cli.errors import USAGE, CliError
 from gcs_cli.estimate.log_samples import DECLINATION
 from gcs_cli.estimate.result import Result, estimate_log, quantities, render, rows_of
 from gcs_cli.logs.reader import log_file, read_log
-from gcs_cli.report.written_page import write_page
+from gcs_cli.run_directory import write_page
 from gcs_cli.settings import JsonOption, OpenOption, OverwriteOption, check_page, output_of
 
 app = make_app(add_completion=False)

@@ -48,7 +48,7 @@ def _result(case: Case, verdict: Verdict, wanted: Wanted, began_s: float) -> Res
         duration_s=flight.duration_s,
         wall_s=time.perf_counter() - began_s,
         log_sha256=hashlib.sha256(content).hexdigest() if content else None,
-        texts=_facts(flight),
+        texts=facts_of(flight),
         figures=figures_of(flight) if wanted.figures else (),
         metrics=metrics_of(flight) if wanted.metrics else {},
         log=content if has_files else b"",
@@ -56,7 +56,7 @@ def _result(case: Case, verdict: Verdict, wanted: Wanted, began_s: float) -> Res
     )
 
 
-def _facts(flight: Flight) -> tuple[tuple[float, str], ...]:
+def facts_of(flight: Flight) -> tuple[tuple[float, str], ...]:
     """Return times and names of events and status texts; an event that a text describes is left out."""
     texts = [(round(text.time_s, 6), text.text) for text in flight.log.texts]
     events = [

@@ -57,5 +57,5 @@ def test_an_event_is_left_out_only_beside_its_own_text(event: str, text: str, sh
         log=SimpleNamespace(texts=[SimpleNamespace(time_s=10.0, text=text)]),
         events=[SimpleNamespace(time_s=10.02, name=event), SimpleNamespace(time_s=30.0, name=event)],
     )
-    told = [fact for _, fact in flying._facts(flight)]
+    told = [fact for _, fact in flying.facts_of(flight)]
     assert told == [text, *([event] if shown else []), event]
