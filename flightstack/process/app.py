@@ -244,7 +244,7 @@ class App:
                 if is_over and loop.ends_period:
                     return
                 may_run_on = until is None and not owes_ground
-                data = loop.run(self._next_ground_ns, self._next_log_us, may_run_on, self._serves_pauses)
+                data = loop.run(self._next_ground_ns, self._next_log_us, may_run_on)
                 owes_ground = owes_ground or loop.serves_ground
                 if loop.ends_period:
                     self._end_period()

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from flightstack.core.contract import FloatArray
 from flightstack.process.assembly import Stack
-from flightstack.process.connections import PAUSE_NS, SimulatorPace
+from flightstack.process.connections import SimulatorPace
 from flightstack.process.quiet_block import QuietBlock, compiles, estimators_of
 from flightstack.process.quiet_exchange import ExchangedSteps
 from flightstack.transports import compiled_socket
@@ -76,16 +76,15 @@ class QuietLockstep:
         assert self._steps is not None
         return int(self._steps.record["ended_ns"][0])
 
-    def run(self, now_ns: int, deadline_ns: int, wait_ns: int, most: Callable[[int], int]) -> Ran:
+    def run(self, now_ns: int, deadline_ns: int, most: Callable[[int], int]) -> Ran:
         """Run the tick of the newest state and those that follow, up to ``deadline_ns``.
 
-        ``wait_ns`` is the longest wait for a state, if not 0. ``most`` returns how many more may follow a number of
-        ticks. Times are those of the monotonic clock.
+        ``most`` returns how many more may follow a number of them. Times are those of the monotonic clock.
         """
         steps, block = self._steps, self._block
         assert steps is not None
         assert block is not None
-        steps.begin(now_ns, deadline_ns, wait_ns)
+        steps.begin(now_ns, deadline_ns)
         link = self._stack.simulator
         stamp_us = link.stamp_us
         if self._autopilot.next_outer == 0 and self._lockstep.is_due:
@@ -123,21 +122,17 @@ class LockstepLoop:
         """True after the last state of an outer period, and at the start."""
         return self._answered % self._divisor == 0
 
-    def run(
-        self, deadline_ns: int, next_log_us: int, may_run_on: bool, serves_pauses: bool = False
-    ) -> memoryview | None:
+    def run(self, deadline_ns: int, next_log_us: int, may_run_on: bool) -> memoryview | None:
         """Run the tick of the newest state, which was received, and answer it.
 
         With ``may_run_on``, receive and answer more states up to ``deadline_ns`` of the monotonic clock, and up to the
-        end of the outer period after ``next_log_us`` of the vehicle's. With ``serves_pauses``, the caller makes use of
-        a pause of the simulator that may come: it ends the ticks. Return bytes that were received besides; raise
+        end of the outer period after ``next_log_us`` of the vehicle's. Return bytes that were received besides; raise
         LinkClosedError.
         """
         began_ns = time.monotonic_ns()
         self.pace.note_tick(began_ns)
-        if may_run_on and self._quiet.is_ready():
-            wait_ns = PAUSE_NS if serves_pauses and self.pace.may_pause() else 0
-            return self._run_on(began_ns, deadline_ns, wait_ns, next_log_us)
+        if may_run_on and not self.pace.may_pause() and self._quiet.is_ready():
+            return self._run_on(began_ns, deadline_ns, next_log_us)
         stack = self._stack
         commands = self._lockstep.tick(began_ns)
         self._simulator.send(stack.simulator.answer(commands, stack.now.status.armed))
@@ -146,9 +141,9 @@ class LockstepLoop:
         self.serves_ground = self.ends_period
         return None
 
-    def _run_on(self, began_ns: int, deadline_ns: int, wait_ns: int, next_log_us: int) -> memoryview | None:
+    def _run_on(self, began_ns: int, deadline_ns: int, next_log_us: int) -> memoryview | None:
         stack, quiet = self._stack, self._quiet
-        ran = quiet.run(began_ns, deadline_ns, wait_ns, partial(self._most, next_log_us))
+        ran = quiet.run(began_ns, deadline_ns, partial(self._most, next_log_us))
         self._answered += ran.ticks
         self.serves_ground = True
         if ran.unsent is None:

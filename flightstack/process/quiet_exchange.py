@@ -49,12 +49,9 @@ class ExchangedSteps:
         self.world: tuple[Any, ...] = (self.socket.arguments, self.record, frame, self._took_ns, taking)
         self.step = address_of(exchange, self.world, 0, 0)
 
-    def begin(self, began_ns: int, deadline_ns: int, wait_ns: int = 0) -> None:
-        """Prepare for ticks from ``began_ns`` on, with no exchange after ``deadline_ns``.
-
-        They end if a state does not come within ``wait_ns``, if that is not 0.
-        """
-        self.socket.clear(wait_ns)
+    def begin(self, began_ns: int, deadline_ns: int) -> None:
+        """Prepare for ticks from ``began_ns`` on, with no exchange after ``deadline_ns``."""
+        self.socket.clear()
         record = self.record
         record["deadline_ns"], record["ended_ns"] = deadline_ns, began_ns
         record["waited_ns"], record["began"] = 0, 0

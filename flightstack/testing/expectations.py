@@ -104,7 +104,7 @@ def _outcome(expect: Expect, flight: Flight, last: State, events: Sequence[Event
         ending = f"ended in mode {last.mode} without a landing" if mode is None else f"landed in mode {mode}"
         return Check(name, mode == wanted, f"it {ending}")
     if wanted in tuple(Code):
-        return Check(name, flight.outcome == wanted, f"{flight.outcome}\n{flight.outcome_text}")
+        return Check(name, flight.outcome == wanted, f"{flight.outcome}: {flight.outcome_text}")
     failsafes = [
         event.name.removeprefix("failsafe_") for event in events if event.name.startswith("failsafe_")
     ]

@@ -1,13 +1,12 @@
 """A connected socket and the clock for compiled code: system calls without Python between them.
 
-Compiled code calls the C library at its addresses. It waits for ``RECEIVE_TIMEOUT_S`` of ``tcp``, or a shorter time,
-and leaves to Python what it cannot do: a message that is not accepted whole, a timeout, a signal, a closed connection.
+Compiled code calls the C library at its addresses. It waits for ``RECEIVE_TIMEOUT_S`` of ``tcp``, and leaves to Python
+what it cannot do: a message that is not accepted whole, a timeout, a signal, a closed connection.
 """
 
 from __future__ import annotations
 
 import ctypes
-import select
 import socket
 import sys
 import time
@@ -25,8 +24,6 @@ IS_AVAILABLE = sys.platform == "linux" and sys.maxsize > 1 << 32 and not IS_DISA
 """True if the C library has the functions under the names and with the types of this module."""
 _MONOTONIC = getattr(time, "CLOCK_MONOTONIC", 0)
 _NS_PER_S = 1_000_000_000
-_INT = 0xFFFFFFFF
-"""Bits of an ``int`` that a function returns."""
 
 
 class Socket(NamedTuple):
@@ -36,22 +33,15 @@ class Socket(NamedTuple):
     send: int
     receive: int
     clock: int
-    poll: int
     time_at: int
     in_at: int
-    polled_at: int
-    limit_at: int
     sent: int
     """Bytes of the newest message that were sent; −1 without one."""
     received: int
     """Bytes that wait in the inbox; 0 if the peer closed the connection, −1 without any (timeout, signal, reset)."""
-    is_limited: int
-    """1 if it waits for the time at ``limit_at`` at most."""
 
 
 SOCKET = dtype_of(Socket)
-_POLLED = np.dtype([("descriptor", np.int32), ("events", np.int16), ("found", np.int16)])
-"""``struct pollfd``."""
 _FLAGS = int(getattr(socket, "MSG_DONTWAIT", 0)) | int(getattr(socket, "MSG_NOSIGNAL", 0))
 
 
@@ -60,16 +50,15 @@ class CompiledSocket:
 
     def __init__(self, descriptor: int) -> None:
         library = ctypes.CDLL(None)
-        functions = (
+        send, receive, clock = (
             ctypes.cast(function, ctypes.c_void_p).value
-            for function in (library.send, library.recv, library.clock_gettime, library.ppoll)
+            for function in (library.send, library.recv, library.clock_gettime)
         )
         self.inbox = np.zeros(BUFFER_SIZE, np.uint8)
         """Received bytes."""
-        self._time, self._limit = np.zeros(2, np.int64), np.zeros(2, np.int64)
-        self._polled = np.array([(descriptor, select.POLLIN, 0)], _POLLED)
-        places = (memory.ctypes.data for memory in (self._time, self.inbox, self._polled, self._limit))
-        self._record: RecordArray = np.array([(descriptor, *functions, *places, -1, -1, 0)], SOCKET)
+        self._time = np.zeros(2, np.int64)
+        addresses = send, receive, clock, self._time.ctypes.data, self.inbox.ctypes.data
+        self._record: RecordArray = np.array([(descriptor, *addresses, -1, -1)], SOCKET)
         self.arguments: tuple[Any, ...] = (self._record, self._time, self.inbox)
         """Argument ``line`` of the compiled functions."""
 
@@ -84,10 +73,9 @@ class CompiledSocket:
         count = int(self._record["received"][0])
         return None if count < 0 else self.inbox[:count].data
 
-    def clear(self, limit_ns: int = 0) -> None:
-        """Forget what was sent and received, and wait for bytes for ``limit_ns`` at most from now on; 0: no limit."""
+    def clear(self) -> None:
+        """Forget what was sent and received."""
         self._record["sent"], self._record["received"] = -1, -1
-        self._record["is_limited"], self._limit[:] = int(limit_ns > 0), divmod(limit_ns, _NS_PER_S)
 
 
 @compiled
@@ -116,12 +104,7 @@ def send_from(line: Any, address: int, size: int) -> bool:
 @compiled
 def receive_into(line: Any) -> int:
     """Wait for bytes in the inbox; return their number, 0 at the end of the connection, −1 for none."""
-    record, inbox = line[0][0], line[2]
-    if record["is_limited"] != 0:
-        ready = call_c(record["poll"], (record["polled_at"], 1, record["limit_at"], 0))
-        if ready & _INT != 1:  # no bytes in time, or a signal
-            record["received"] = -1
-            return -1
-    count = call_c(record["receive"], (record["descriptor"], record["in_at"], len(inbox), 0))
-    record["received"] = count
+    record, _time, inbox = line
+    count = call_c(record[0]["receive"], (record[0]["descriptor"], record[0]["in_at"], len(inbox), 0))
+    record[0]["received"] = count
     return int(count)

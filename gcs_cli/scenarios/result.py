@@ -149,11 +149,10 @@ def _event(at_s: float, text: str) -> dict[str, Any]:
 
 def _check(check: Check) -> dict[str, Any]:
     finite = check.share is not None
-    is_outcome = check.name.startswith("outcome ")  # code and sentence
     return {
         "expectation": check.name,
         "passed": check.passed,
-        "found": check.found.replace("\n", ": ", 1) if is_outcome else check.found,
+        "found": check.found,
         "time_s": None if check.time_s is None else round(check.time_s, 3),
         "margin": check.margin if finite else None,
         "limit": check.limit if finite else None,

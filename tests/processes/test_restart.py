@@ -140,7 +140,7 @@ def test_a_damaged_file_is_told_and_kept_and_nothing_of_it_is_flown(tmp_path: Pa
         wait_for_file(kept, '"checksum"')
         errors = kill(there)
     assert errors == (
-        "flightstack: plans not restored: state/plans.json: is damaged or truncated; "
+        "flightstack: warning: plans not restored: state/plans.json: is damaged or truncated; "
         "the file is now state/plans.refused.json\n"
     )
     assert (tmp_path / "state" / "plans.refused.json").read_text().endswith('"chec')

@@ -43,7 +43,7 @@ def check_of(square: Verdict, **expected: object) -> Check:
 
 
 EXPECTATIONS: list[tuple[dict[str, object], dict[str, object], str]] = [
-    ({"outcome": "completed"}, {"outcome": "failsafe"}, "outcome failsafe: completed\nthe mission was flown"),
+    ({"outcome": "completed"}, {"outcome": "failsafe"}, "outcome failsafe: completed: the mission was flown"),
     ({"outcome": "MISSION"}, {"outcome": "RETURN"}, "outcome RETURN: it landed in mode MISSION"),
     ({}, {"outcome": "GCS_LOST"}, "outcome GCS_LOST: active failsafes: none"),
     ({}, {"refusal": "no home"}, "refused: no home: the mission was flown to its end"),

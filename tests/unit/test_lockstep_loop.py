@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import socket
-import time
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import pytest
 
 from flightstack.core.compiled import IS_DISABLED
-from flightstack.process.connections import MOST_NS
 from flightstack.process.lockstep_loop import LockstepLoop
 from flightstack.testing import World
 from flightstack.transports.compiled_socket import IS_AVAILABLE
@@ -61,23 +59,6 @@ def test_ticks_in_lockstep_run_on_up_to_the_deadline(sockets: Any) -> None:
         other.run_for(0.04)
         assert other.engine.stack.now.time_us == stack.now.time_us
         assert other.engine.stack.now.row.tolist() == stack.now.row.tolist()
-
-
-@pytest.mark.parametrize("serves_pauses", [False, True])
-def test_a_simulator_that_pauses_is_answered_by_compiled_ticks_too(serves_pauses: bool, sockets: Any) -> None:
-    """It waits for a clock, or another program has its processor. A pause that the caller serves ends the ticks."""
-    ours, others = sockets
-    with World(make_engine=BytesEngine, state="truth") as world:
-        simulator, engine = world.engine.simulator, world.engine
-        loop = LockstepLoop(world.engine.stack, Peer(ours))
-        loop.pace.begin_wait(time.monotonic_ns() - 2 * MOST_NS)
-        loop.pace.note_tick(time.monotonic_ns())
-        assert loop.pace.may_pause()
-        for _ in range(2 if serves_pauses else 4):
-            simulator.apply(engine.actuators)
-            others.send(bytes(simulator.outgoing()))
-        assert loop.run(LATER_NS, 0, may_run_on=True, serves_pauses=serves_pauses) is None
-        assert len(messages(others)) == (3 if serves_pauses else 5)
 
 
 def test_a_tick_alone_is_run_where_more_may_not(sockets: Any) -> None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import math
-import signal
 import socket
 import time
 from collections.abc import Iterator
@@ -214,34 +213,6 @@ def test_silence_a_closed_connection_and_a_deadline_are_left_to_python(sockets: 
         others.shutdown(socket.SHUT_WR)
         assert vehicle.exchange() == -1
         assert vehicle.steps.socket.received == b""
-
-
-def test_a_wait_for_a_state_ends_at_its_limit() -> None:
-    ours, others = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)  # no limit of their own
-    others.setblocking(False)
-    with World(make_engine=BytesEngine, state="truth") as world, ours, others:
-        vehicle = Vehicle(world, ours)
-        vehicle.steps.begin(time.monotonic_ns(), LATER_NS, 1_000_000)
-        assert vehicle.exchange() == -1
-        assert (vehicle.steps.socket.sent, vehicle.steps.socket.received) == (len(messages(others)[0]), None)
-        vehicle.steps.begin(time.monotonic_ns(), LATER_NS, 10_000_000_000)
-        others.send(vehicle.next_state())
-        assert vehicle.exchange() == 0
-
-
-def test_a_signal_ends_a_wait_for_a_state() -> None:
-    ours, others = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)  # no limit of their own
-    before = signal.signal(signal.SIGALRM, lambda _number, _frame: None)
-    try:
-        with World(make_engine=BytesEngine, state="truth") as world, ours, others:
-            vehicle = Vehicle(world, ours)
-            vehicle.steps.begin(time.monotonic_ns(), LATER_NS, 10_000_000_000)
-            signal.setitimer(signal.ITIMER_REAL, 0.02, 0.02)  # again, if the first one comes before the wait
-            assert vehicle.exchange() == -1
-            assert vehicle.steps.socket.received is None
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
 
 
 def test_the_rest_of_an_answer_that_is_not_accepted_is_left_to_python() -> None:

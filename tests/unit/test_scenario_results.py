@@ -83,13 +83,6 @@ def test_infinite_margins_are_null_in_the_document() -> None:
     json.dumps(document, allow_nan=False)
 
 
-def test_an_outcome_is_one_line_of_the_document() -> None:
-    failed = Check("outcome failsafe", False, "completed\nthe mission was flown to its end")
-    document = as_json([Row(case("a"), Result((failed, BAD)))], 1.0, False)
-    found = [check["found"] for check in document["flights"][0]["checks"]]
-    assert found == ["completed: the mission was flown to its end", BAD.found]
-
-
 def test_junit_has_a_test_case_for_each_flight() -> None:
     root = ElementTree.fromstring(junit_xml(ROWS, 3.0))
     assert root.tag == "testsuites"
