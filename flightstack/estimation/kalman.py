@@ -82,6 +82,8 @@ class Filter(NamedTuple):
     """What the covariance has not followed yet: time, rotation vector of the body, velocity change NED by forces."""
     turn: Annotated[FloatArray, 3]
     """Rotation of about the last 5 s, in the body frame."""
+    drag: Annotated[FloatArray, 2]
+    """Specific force along x and y of the body, mean of about the last 5 s."""
     covariance: Covariance
     """Only the elements on and above the diagonal count."""
     observations: Annotated[RecordArray, Observed, OBSERVATIONS]

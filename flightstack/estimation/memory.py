@@ -192,6 +192,7 @@ def filter_of(m: MemoryRecord) -> Filter:
         m["clock"],
         m["behind"],
         m["turn"],
+        m["drag"],
         m["covariance"],
         m["observations"],
     )

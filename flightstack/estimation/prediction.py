@@ -29,8 +29,8 @@ from flightstack.estimation.error_state import (
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.kalman import BEHIND_SIZE, Filter
 
-_TURN_S = 5.0
-"""Time constant with which rotations are forgotten."""
+_REMEMBERED_S = 5.0
+"""Time constant with which rotations and drag are forgotten."""
 _GUST_S, _LEAST_S = 1.0, 1e-3
 """Time for which a change of the airspeed lasts, and the least step."""
 _WIND_M_S = 2.0
@@ -140,7 +140,7 @@ def _turn_variances(f: Filter, angle: Vector3, dt_s: float, params: EstimatorPar
     e φ, of the rotation of the last T, has noise of the density 2 (e φ)² / T. Rotation about the body's z axis moves
     the tilt too, in step with the heading: ``_keep_misaligned`` counts that.
     """
-    turn, share = f.turn, min(dt_s / _TURN_S, 1.0)
+    turn, share = f.turn, min(dt_s / _REMEMBERED_S, 1.0)
     turn[0] += angle.x - share * turn[0]
     turn[1] += angle.y - share * turn[1]
     turn[2] += angle.z - share * turn[2]
@@ -170,6 +170,20 @@ def _keep_misaligned(p: Covariance, at: int, axis: Vector3, params: EstimatorPar
 
 
 @compiled
+def _keep_inclined(f: Filter, force: Vector3, dt_s: float, params: EstimatorParams) -> None:
+    """Keep the accelerometer's vertical bias as uncertain as the alignment of its axes leaves it.
+
+    Drag along the body shows in a vertical axis that is off by e, as a bias of e times its mean. ``force`` is the
+    velocity change in the body frame.
+    """
+    p, drag, share = f.covariance, f.drag, min(dt_s / _REMEMBERED_S, 1.0)
+    drag[0] += force.x / _REMEMBERED_S - share * drag[0]
+    drag[1] += force.y / _REMEMBERED_S - share * drag[1]
+    square = params.gyro_scale_error * params.gyro_scale_error * (drag[0] * drag[0] + drag[1] * drag[1])
+    p[ACCEL_BIAS + 2, ACCEL_BIAS + 2] = max(p[ACCEL_BIAS + 2, ACCEL_BIAS + 2], square)
+
+
+@compiled
 def _pressure_variance(f: Filter, change: Vector3, dt_s: float, params: EstimatorParams) -> float:
     """Return the variance that a change of the airspeed in a step adds to the barometer's bias.
 
@@ -189,6 +203,7 @@ def _add_process_noise(
     q: Quaternion,
     angle: Vector3,
     change: Vector3,
+    force: Vector3,
     dt_s: float,
     noise: ImuNoise,
     params: EstimatorParams,
@@ -210,6 +225,7 @@ def _add_process_noise(
     _add(p, ACCEL_BIAS, 3, params.accel_bias_walk * params.accel_bias_walk * dt_s)
     _keep_misaligned(p, ACCEL_BIAS, x, params)
     _keep_misaligned(p, ACCEL_BIAS + 1, y, params)
+    _keep_inclined(f, force, dt_s, params)
     _add(p, EARTH_FIELD, 3, params.earth_field_walk * params.earth_field_walk * dt_s)
     _add(p, BODY_FIELD, 3, params.body_field_walk * params.body_field_walk * dt_s)
     _add(p, WIND, 2, params.wind_walk * params.wind_walk * dt_s)
@@ -242,8 +258,9 @@ def predict_errors(f: Filter, noise: ImuNoise, params: EstimatorParams) -> None:
     dt_s, angle, change = f.behind[0], read_vector(f.behind, 1), read_vector(f.behind, 4)
     attitude = Quaternion(f.nominal[0], f.nominal[1], f.nominal[2], f.nominal[3])
     middle = quaternion_product(attitude, rotation_over(angle, -0.5))
-    predict_covariance(f.covariance, middle, rotate(conjugate(middle), change), dt_s)
-    _add_process_noise(f, middle, angle, change, dt_s, noise, params)
+    force = rotate(conjugate(middle), change)
+    predict_covariance(f.covariance, middle, force, dt_s)
+    _add_process_noise(f, middle, angle, change, force, dt_s, noise, params)
     for i in range(BEHIND_SIZE):
         f.behind[i] = 0.0
 

@@ -82,7 +82,7 @@ ESTIMATOR_PARAMS = (
     _param("EKF2_MCOEF", 0.15, 0.0, 1.0, "1/s", "Drag of the rotors' momentum, per m/s", "momentum_drag_1_s"),
     # magnetometer
     _param("EKF2_MAG_DELAY", 0.0, 0.0, 300.0, "ms", "Delay of the magnetometer", "mag_delay_s", _MS, 1),
-    _param("EKF2_MAG_NOISE", 0.002, 0.001, 1.0, "gauss", "Least noise of the magnetometer; it starts at 25 times"
+    _param("EKF2_MAG_NOISE", 0.002, 0.0005, 1.0, "gauss", "Least noise of the magnetometer; it starts at 25 times"
            " that, at most 0.05", "mag_noise_gauss"),
     _param("EKF2_MAG_GATE", 3.0, 1.0, 100.0, "SD", "Gate of the magnetometer", "mag_gate", 1.0, 1),
     # first fix

@@ -39,12 +39,20 @@ def test_filter_in_c_has_the_bits_of_python(name: str) -> None:
 
 def test_single_precision_follows_double_within_centimetres() -> None:
     double, single = InC(), InC("float")
-    apart = np.zeros(13)
+    apart, settled, aligned_s = np.zeros(13), np.zeros(13), np.inf
     for event in STREAMS["as flown"]():
         double.take(event)
         if event.kind != NUMBERS:
             single.take(event)
-        apart = np.maximum(apart, np.abs(double.filter.memory[0]["state"] - single.filter.memory[0]["state"]))
+        memory = double.filter.memory[0]
+        time_s = float(memory["last_imu_s"])
+        if memory["flags"]["aligned"] == 1:
+            aligned_s = min(aligned_s, time_s)
+        difference = np.abs(memory["state"] - single.filter.memory[0]["state"])
+        apart = np.maximum(apart, difference)
+        if time_s > aligned_s + 2.0:
+            settled = np.maximum(settled, difference)
     assert max(apart[:3]) < 0.04  # m; measured: 0.0195, in the step that fuses the first height
     assert max(apart[3:6]) < 0.01  # m/s; measured: 0.0038
-    assert max(apart[6:10]) < 1e-3  # measured: 2.7e-4, in the first step after the alignment
+    assert max(apart[6:10]) < 1e-2  # measured: 4.3e-3, while one fuses the first fields a step later than the other
+    assert max(settled[6:10]) < 1e-3  # measured: 2.4e-4

@@ -16,7 +16,7 @@
 #define FS_HOLDS_HORIZONTAL FS_LIT(2.0)
 #define FS_HOLDS_TILT_AND_GYRO FS_LIT(3.0)
 
-/* kalman.py:234 */
+/* kalman.py:236 */
 void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real variance)
 {
     for (int32_t i = at; i < at + count; i++) {
@@ -30,7 +30,7 @@ void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real var
     }
 }
 
-/* kalman.py:102 */
+/* kalman.py:104 */
 void fs_clear(fs_real x[27])
 {
     for (int32_t i = 0; i < 27; i++) {
@@ -38,7 +38,7 @@ void fs_clear(fs_real x[27])
     }
 }
 
-/* Write P h' to ph and return h P h'. kalman.py:115 */
+/* Write P h' to ph and return h P h'. kalman.py:117 */
 static fs_real project(fs_filter *f)
 {
     fs_clear(f->ph);
@@ -58,7 +58,7 @@ static fs_real project(fs_filter *f)
     return total;
 }
 
-/* kalman.py:189 */
+/* kalman.py:191 */
 fs_real fs_correlation_factor(const fs_observed *o)
 {
     const fs_real correlation = fs_min(fs_max(o->lagged / o->variance, FS_LIT(0.0)), FS_LARGEST_CORRELATION);
@@ -74,7 +74,7 @@ fs_real fs_correlation_factor(const fs_observed *o)
  * model, which both have, does not count. Correlated errors have the whole variance, as their correlation is counted
  * apart.
  *
- * kalman.py:152
+ * kalman.py:154
  */
 static void adapt_noise(fs_observed *o, fs_real r, fs_real projected, fs_real last, const fs_noise *noise)
 {
@@ -94,7 +94,7 @@ static void adapt_noise(fs_observed *o, fs_real r, fs_real projected, fs_real la
     o->noise = fs_min(fs_max(r + share * (estimate - r), least), largest);
 }
 
-/* Make the gains of the states that are held zero. kalman.py:173 */
+/* Make the gains of the states that are held zero. kalman.py:175 */
 static void hold(fs_real gain[27], fs_real holds)
 {
     if (holds == FS_HOLDS_HORIZONTAL) {
@@ -126,7 +126,7 @@ static void hold(fs_real gain[27], fs_real holds)
  * Joseph's form with such a gain subtracts P h' h P / variance from the covariance, except between two states that
  * both keep their values: one product for each element instead of two.
  *
- * kalman.py:131
+ * kalman.py:133
  */
 static void correct(fs_filter *f, fs_real innovation)
 {
@@ -150,7 +150,7 @@ static void correct(fs_filter *f, fs_real innovation)
     fs_correct(f->nominal, f->gain, innovation);
 }
 
-/* kalman.py:197 */
+/* kalman.py:199 */
 bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *noise, fs_real holds)
 {
     fs_observed *o = &f->observations[row];
@@ -187,7 +187,7 @@ bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *nois
     return true;
 }
 
-/* kalman.py:245 */
+/* kalman.py:247 */
 fs_real fs_deviation(const fs_filter *f, int32_t at, int32_t count)
 {
     fs_real total = FS_LIT(0.0);

@@ -30,6 +30,7 @@ typedef struct {
     fs_real clock[2];
     fs_real behind[7];
     fs_real turn[3];
+    fs_real drag[2];
     fs_real covariance[27][27];
     fs_observed observations[25];
 } fs_filter;
@@ -43,13 +44,13 @@ typedef struct {
     fs_real kind;
 } fs_noise;
 
-/* Make count states from at independent of all others, each with variance. kalman.py:234 */
+/* Make count states from at independent of all others, each with variance. kalman.py:236 */
 void fs_reset_variance(fs_real p[27][27], int32_t at, int32_t count, fs_real variance);
 
-/* Set every item to zero. kalman.py:102 */
+/* Set every item to zero. kalman.py:104 */
 void fs_clear(fs_real x[27]);
 
-/* Return the factor by which the noise of a mean is larger than that of independent measurements. kalman.py:189 */
+/* Return the factor by which the noise of a mean is larger than that of independent measurements. kalman.py:191 */
 fs_real fs_correlation_factor(const fs_observed *o);
 
 /*
@@ -60,11 +61,11 @@ fs_real fs_correlation_factor(const fs_observed *o);
  *
  * With holds other than zero, these states keep their values and their uncertainty: a Schmidt-Kalman update.
  *
- * kalman.py:197
+ * kalman.py:199
  */
 bool fs_fuse(fs_filter *f, int32_t row, fs_real innovation, const fs_noise *noise, fs_real holds);
 
-/* Return the root of the summed variances of count states from at. kalman.py:245 */
+/* Return the root of the summed variances of count states from at. kalman.py:247 */
 fs_real fs_deviation(const fs_filter *f, int32_t at, int32_t count);
 
 #endif

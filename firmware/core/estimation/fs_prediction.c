@@ -10,7 +10,7 @@
 #include "fs_geometry.h"
 #include "fs_math.h"
 
-#define FS_TURN_S FS_LIT(5.0)
+#define FS_REMEMBERED_S FS_LIT(5.0)
 #define FS_ATTITUDE 0
 #define FS_VELOCITY 3
 #define FS_POSITION 6
@@ -79,7 +79,7 @@ fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion)
     };
 }
 
-/* prediction.py:221 */
+/* prediction.py:237 */
 void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_params *params)
 {
     const fs_nominal n = fs_read_nominal(f->nominal);
@@ -114,7 +114,7 @@ void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_
 static fs_vector3 turn_variances(fs_filter *f, const fs_vector3 *angle, fs_real dt_s,
                                  const fs_estimator_params *params)
 {
-    const fs_real share = fs_min(dt_s / FS_TURN_S, FS_LIT(1.0));
+    const fs_real share = fs_min(dt_s / FS_REMEMBERED_S, FS_LIT(1.0));
     f->turn[0] += angle->x - share * f->turn[0];
     f->turn[1] += angle->y - share * f->turn[1];
     f->turn[2] += angle->z - share * f->turn[2];
@@ -167,12 +167,32 @@ static void keep_misaligned(fs_real p[27][27], int32_t at, const fs_vector3 *axi
 }
 
 /*
+ * Keep the accelerometer's vertical bias as uncertain as the alignment of its axes leaves it.
+ *
+ * Drag along the body shows in a vertical axis that is off by e, as a bias of e times its mean. force is the velocity
+ * change in the body frame.
+ *
+ * prediction.py:173
+ */
+static void keep_inclined(fs_filter *f, const fs_vector3 *force, fs_real dt_s, const fs_estimator_params *params)
+{
+    const fs_real share = fs_min(dt_s / FS_REMEMBERED_S, FS_LIT(1.0));
+    f->drag[0] += force->x / FS_REMEMBERED_S - share * f->drag[0];
+    f->drag[1] += force->y / FS_REMEMBERED_S - share * f->drag[1];
+    const fs_real square = params->gyro_scale_error * params->gyro_scale_error *
+                           (f->drag[0] * f->drag[0] + f->drag[1] * f->drag[1]);
+    f->covariance[FS_ACCEL_BIAS + 2][FS_ACCEL_BIAS + 2] =
+                                                          fs_max(f->covariance[FS_ACCEL_BIAS + 2][FS_ACCEL_BIAS + 2],
+            square);
+}
+
+/*
  * Return the variance that a change of the airspeed in a step adds to the barometer's bias.
  *
  * The port feels a share of the dynamic pressure: an altitude of share u^2 / 2 g for the airspeed u, which changes by
  * share u du / g, as white noise. The wind is not known.
  *
- * prediction.py:173
+ * prediction.py:187
  */
 static fs_real pressure_variance(const fs_filter *f, const fs_vector3 *change, fs_real dt_s,
                                  const fs_estimator_params *params)
@@ -186,9 +206,10 @@ static fs_real pressure_variance(const fs_filter *f, const fs_vector3 *change, f
     return fs_min(variance, FS_MOST_PRESSURE);
 }
 
-/* prediction.py:187 */
+/* prediction.py:201 */
 static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vector3 *angle, const fs_vector3 *change,
-                              fs_real dt_s, const fs_imu_noise *noise, const fs_estimator_params *params)
+                              const fs_vector3 *force, fs_real dt_s, const fs_imu_noise *noise,
+                              const fs_estimator_params *params)
 {
     const fs_real share = f->clock[1];
     const fs_real gyro = params->gyro_noise;
@@ -210,6 +231,7 @@ static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vec
     add(f->covariance, FS_ACCEL_BIAS, 3, params->accel_bias_walk * params->accel_bias_walk * dt_s);
     keep_misaligned(f->covariance, FS_ACCEL_BIAS, &x, params);
     keep_misaligned(f->covariance, FS_ACCEL_BIAS + 1, &y, params);
+    keep_inclined(f, force, dt_s, params);
     add(f->covariance, FS_EARTH_FIELD, 3, params->earth_field_walk * params->earth_field_walk * dt_s);
     add(f->covariance, FS_BODY_FIELD, 3, params->body_field_walk * params->body_field_walk * dt_s);
     add(f->covariance, FS_WIND, 2, params->wind_walk * params->wind_walk * dt_s);
@@ -217,7 +239,7 @@ static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vec
     add(f->covariance, FS_BARO_BIAS, 1, params->baro_walk * params->baro_walk * dt_s + pressure);
 }
 
-/* prediction.py:237 */
+/* prediction.py:253 */
 void fs_predict_errors(fs_filter *f, const fs_imu_noise *noise, const fs_estimator_params *params)
 {
     const fs_real dt_s = f->behind[0];
@@ -232,15 +254,15 @@ void fs_predict_errors(fs_filter *f, const fs_imu_noise *noise, const fs_estimat
     const fs_quaternion rotation_over = fs_rotation_over(&angle, FS_LIT(-0.5));
     const fs_quaternion middle = fs_quaternion_product(&attitude, &rotation_over);
     const fs_quaternion conjugate = fs_conjugate(&middle);
-    const fs_vector3 rotate = fs_rotate(&conjugate, &change);
-    fs_predict_covariance(f->covariance, &middle, &rotate, dt_s);
-    add_process_noise(f, &middle, &angle, &change, dt_s, noise, params);
+    const fs_vector3 force = fs_rotate(&conjugate, &change);
+    fs_predict_covariance(f->covariance, &middle, &force, dt_s);
+    add_process_noise(f, &middle, &angle, &change, &force, dt_s, noise, params);
     for (int32_t i = 0; i < 7; i++) {
         f->behind[i] = FS_LIT(0.0);
     }
 }
 
-/* prediction.py:252 */
+/* prediction.py:269 */
 void fs_add_unknown(fs_filter *f, const fs_delta_sample *step)
 {
     const fs_real half_s = FS_LIT(0.5) * step->dt_s;
