@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from flightstack.core.compiled import IS_DISABLED
-from flightstack.core.contract import FloatArray, RecordArray, SingleArray
+from flightstack.core.contract import ByteArray, FloatArray, RecordArray, SingleArray
 from flightstack.core.kernel_calls import address_of, as_bytes
 from flightstack.simulator_link.frame_kernels import SENSOR_NEWS
+from flightstack.simulator_link.gps_kernels import GPS_SIZE
 from flightstack.simulator_link.sensor_frames import BARO as BARO_FIELDS
 from flightstack.simulator_link.sensor_frames import HIL_VALUES, VALUES
 from flightstack.simulator_link.sensor_frames import MAG as MAG_FIELDS
@@ -18,16 +19,21 @@ from sim_bridge.plant.layout import CONTACT
 from sim_bridge.plant.near_ground import airspeed
 from sim_bridge.sensors.barometer import Barometer, measure_baro
 from sim_bridge.sensors.faults import NEVER_US
+from sim_bridge.sensors.gnss import receive_gnss
 from sim_bridge.sensors.imu import measure_imu
 from sim_bridge.sensors.layout import IMU, MOTION
 from sim_bridge.sensors.magnetometer import Magnetometer, measure_mag
-from sim_bridge.sensors.suite import BARO_SLOT, MAG_SLOT
+from sim_bridge.sensors.suite import BARO_SLOT, GNSS_SLOT, MAG_SLOT, QUIET_SLOTS
 from sim_bridge.simulator import Simulator
-from sim_bridge.step_kernel import BARO, MAG, STEP_CALLS, StepCalls, simulate
+from sim_bridge.step_kernel import BARO, GNSS, MAG, STEP_CALLS, StepCalls, simulate
 
-assert (MAG_SLOT, BARO_SLOT) == (MAG, BARO)
+assert (MAG_SLOT, BARO_SLOT, GNSS_SLOT) == (MAG, BARO, GNSS)
 _NO_BYTES = np.zeros(0, np.uint8)
+_NO_TIMES = np.zeros(0, np.int64)
 _NO_SENSOR: tuple[Any, ...] = (_NO_BYTES, np.zeros(3), np.zeros((0, 0)), np.zeros(1, np.int64))
+_NO_RECEIVER: tuple[Any, ...] = (
+    _NO_BYTES, _NO_TIMES, _NO_TIMES, np.zeros((0, 0)), _NO_TIMES, *(np.zeros(0),) * 2, np.zeros((0, 0)), _NO_TIMES
+)  # fmt: skip
 
 
 def compiles(simulator: Simulator) -> bool:
@@ -61,7 +67,9 @@ class QuietSteps:
         self.values: SingleArray = np.zeros(VALUES, np.float32) if sensors is None else sensors.values
         """Measurements in HIL_SENSOR of the first inertial sensor, shape (13,)."""
         self.news: RecordArray = np.zeros(1, SENSOR_NEWS)
-        """Its new measurements in the last step, besides those of the inertial sensor."""
+        """New measurements in the last step, besides those of the inertial sensors."""
+        self.gps: ByteArray = np.zeros(GPS_SIZE, np.uint8)
+        """Payload of HIL_GPS with the newest fix."""
         plant = (
             as_bytes(self._plant.memory), commands, simulator.steps, as_bytes(self._plant.output), CONTACT,
             *self._copied(taken),
@@ -89,15 +97,18 @@ class QuietSteps:
     def _slow(self) -> tuple[Any, ...]:
         sensors, parts = self._sensors, self.values.view(HIL_VALUES)
         if sensors is None:
-            never_us, current_a = np.full(2, NEVER_US), np.zeros(1)
-            return never_us, np.ones(2, np.int64), parts, (*_NO_SENSOR, current_a), _NO_SENSOR
-        mag = *_sensor(sensors.mag), self._plant.currents_a
-        return sensors.due_us, sensors.period_us, parts, mag, _sensor(sensors.baro)
+            never_us, current_a = np.full(QUIET_SLOTS, NEVER_US), np.zeros(1)
+            periods_us, receiver = np.ones(QUIET_SLOTS, np.int64), (_NO_RECEIVER, self.gps)
+            return never_us, periods_us, parts, (*_NO_SENSOR, current_a), _NO_SENSOR, receiver
+        mag, gnss = (*_sensor(sensors.mag), self._plant.currents_a), _NO_RECEIVER
+        if sensors.gnss is not None:
+            gnss = as_bytes(sensors.gnss.records), *sensors.gnss.arguments[1:]
+        return sensors.due_us, sensors.period_us, parts, mag, _sensor(sensors.baro), (gnss, self.gps)
 
     def _addresses(self, sensing: tuple[Any, ...]) -> RecordArray:
         plant, frame, sensors = self._plant, self._simulator.frame, self._sensors
         calls = StepCalls(
-            address_of(plant.kernel, plant.memory, self.commands, 0, 1, plant.output), 0, 0, 0, 0
+            address_of(plant.kernel, plant.memory, self.commands, 0, 1, plant.output), 0, 0, 0, 0, 0
         )
         if sensors is not None:
             calls = calls._replace(
@@ -110,6 +121,8 @@ class QuietSteps:
                 speeds, deviates = frame.rotor_speed_rad_s, baro.noise.block[0]
                 address = address_of(measure_baro, baro.records, 0, frame.state, 0.0, speeds, deviates)
                 calls = calls._replace(measure_baro=address)
+            if (gnss := sensors.gnss) is not None:
+                calls = calls._replace(receive_gnss=address_of(receive_gnss, gnss.arguments, 0, frame.state))
         return np.array([calls], STEP_CALLS)
 
     def fits(self, simulator: Simulator, commands: FloatArray) -> bool:
@@ -122,10 +135,11 @@ class QuietSteps:
         sensors, steps = self._sensors, self._plant.quiet_steps() // self._simulator.steps
         if sensors is None:
             return steps
-        slow = [sensor.noise.ready() for sensor in (sensors.mag, sensors.baro) if sensor is not None]
+        measuring = sensors.mag, sensors.baro, sensors.gnss
+        slow = [sensor.noise.ready() for sensor in measuring if sensor is not None]
         return min(steps, sensors.imus.rows_left(), *slow)
 
     def pass_by(self, count: int, result: int) -> None:
         """Count steps that the kernel made, with the result of the last one; raise PlantDivergedError."""
-        has_mag, has_baro = self.news[0].item()
+        has_mag, has_baro, _has_gnss = self.news[0].item()
         self._simulator.pass_by(count, result, has_mag * MAG_FIELDS | has_baro * BARO_FIELDS)

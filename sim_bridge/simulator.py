@@ -283,11 +283,11 @@ class Simulator:
         """True if ``outgoing`` has the true state and, with sensors, messages of sensors, but nothing else."""
         return self._sent is None and self.time_us < self._battery_due_us
 
-    def quiet_intervals(self, measures: bool) -> int:
+    def quiet_intervals(self, measures: bool, fixes: bool = True) -> int:
         """Return how many of the next intervals change nothing but the state and the inertial sensors.
 
         The bytes after each of them are FS_PLANT_STATE and, with sensors, HIL_SENSOR. With ``measures``, magnetometer
-        and barometer may change too.
+        and barometer may change too, and with ``fixes`` the GNSS receiver: HIL_GPS precedes HIL_SENSOR.
         """
         sensors = self.sensors
         if self._sent is not None or not (sensors is None or sensors.is_quiet):
@@ -295,6 +295,8 @@ class Simulator:
         due_us = min(self._change_us, self._battery_due_us)
         if sensors is not None:
             due_us = min(due_us, sensors.next_other_us if measures else sensors.next_us)
+            if not fixes:
+                due_us = min(due_us, sensors.next_fix_us)
         return max(0, (due_us - 1 - self.time_us) // self._interval_us)
 
     def _follow_faults(self) -> None:

@@ -1,4 +1,4 @@
-"""A step of plant, inertial sensors, magnetometer and barometer as one compiled call.
+"""A step of plant, inertial sensors, magnetometer, barometer and GNSS receiver as one compiled call.
 
 It calls the kernels that the simulator runs in any other step, at their addresses, on the same arrays and in the same
 order. Records are passed as bytes, so that this kernel is compiled once for all of them. A module of its own, with few
@@ -15,8 +15,9 @@ from flightstack.core.contract import FloatArray
 from flightstack.core.kernel_calls import call_kernel, call_kernel_float, call_kernel_int
 from flightstack.core.periods import take_due
 from flightstack.core.record_types import dtype_of
+from flightstack.simulator_link.gps_kernels import write_gps
 
-MAG, BARO = 0, 1
+MAG, BARO, GNSS = 0, 1, 2
 """Sensors by the index of their times."""
 
 
@@ -28,6 +29,7 @@ class StepCalls(NamedTuple):
     measure_mag: int
     measure_baro: int
     airspeed: int
+    receive_gnss: int
 
 
 STEP_CALLS = dtype_of(StepCalls)
@@ -45,8 +47,8 @@ def _next_row(noise: FloatArray, cursor: Any) -> Any:
 def _measure_slow(
     calls: Any, slow: Any, news: Any, time_us: int, memory: Any, state: FloatArray, rotor_speeds: Any
 ) -> None:
-    """Measure with magnetometer and barometer if they are due; ``memory`` has the bytes of the plant."""
-    due_us, period_us, parts, mag, baro = slow
+    """Measure with the sensors that are due; ``memory`` has the bytes of the plant."""
+    due_us, period_us, parts, mag, baro, gnss = slow
     if take_due(due_us, period_us, MAG, time_us):
         mags, out, noise, cursor, current_a = mag
         call_kernel(calls["measure_mag"], (mags, state, current_a[0], _next_row(noise, cursor)))
@@ -63,6 +65,12 @@ def _measure_slow(
         values = parts[0]
         values["pressure_hpa"], values["altitude_m"], values["temperature_c"] = out[0], out[1], out[2]
         news["has_baro"] = 1
+    if time_us >= due_us[GNSS]:
+        receiver, payload = gnss
+        if call_kernel_int(calls["receive_gnss"], (receiver, time_us, state)) != 0:
+            write_gps(payload, time_us, receiver[5])
+            news["has_gnss"] = 1
+        due_us[GNSS] = receiver[1][0]
 
 
 @compiled
@@ -79,7 +87,7 @@ def simulate(world: Any, time_us: int, flags: int) -> int:
     if result > largest_result:
         return result
     copy_all(sent, taken)
-    news["has_mag"], news["has_baro"] = 0, 0
+    news["has_mag"], news["has_baro"], news["has_gnss"] = 0, 0, 0
     if len(imus) > 0:
         _measure_slow(calls, slow, news, time_us, memory, state, rotor_speeds)
         call_kernel(calls["measure"], (motion, imus, state, rotor_speeds, noise, wires))

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 FloatArray: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
 SingleArray: TypeAlias = "np.ndarray[Any, np.dtype[np.float32]]"
+ByteArray: TypeAlias = "np.ndarray[Any, np.dtype[np.uint8]]"
 RecordArray: TypeAlias = "np.ndarray[Any, np.dtype[np.void]]"
 Record: TypeAlias = Any
 """One element of a ``RecordArray``, indexed by the names of its fields."""

@@ -36,6 +36,18 @@ def geographic(origin: GeoPoint, scales: tuple[float, float], position_ned_m: Ve
     )
 
 
+@compiled
+def relative(origin: GeoPoint, scales: tuple[float, float], point: GeoPoint) -> Vector3:
+    """Return the NED position [m] of a geodetic point relative to ``origin``; ``scales`` are those of its frame."""
+    north_m_per_deg, east_m_per_deg = scales
+    east_deg = (point.longitude_deg - origin.longitude_deg + 180.0) % 360.0 - 180.0
+    return Vector3(
+        (point.latitude_deg - origin.latitude_deg) * north_m_per_deg,
+        east_deg * east_m_per_deg,
+        origin.altitude_m - point.altitude_m,
+    )
+
+
 class LocalFrame:
     """Flat earth (NED) around an origin, with the ellipsoid's two radii of curvature there.
 
@@ -65,12 +77,7 @@ class LocalFrame:
 
     def to_ned(self, point: GeoPoint) -> Vector3:
         """Return the NED position [m] of a geodetic point relative to the origin."""
-        east_deg = (point.longitude_deg - self.origin.longitude_deg + 180.0) % 360.0 - 180.0
-        return Vector3(
-            (point.latitude_deg - self.origin.latitude_deg) * self._north_m_per_deg,
-            east_deg * self._east_m_per_deg,
-            self.origin.altitude_m - point.altitude_m,
-        )
+        return plain(relative)(self.origin, self.scales, point)
 
     def to_geo(self, position_ned_m: Vector3) -> GeoPoint:
         """Return the geodetic point of a NED position [m] relative to the origin."""

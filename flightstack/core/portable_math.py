@@ -170,6 +170,11 @@ def distance(x: float, y: float, z: float = 0.0) -> float:
     return math.sqrt(x * x + y * y + z * z)
 
 
+def whole_within(value: float, low: float, high: float) -> int:
+    """Round to a whole number in [low, high], half to even; 0 for a value that is not finite."""
+    return int(round(min(max(value, low), high))) if math.isfinite(value) else 0  # noqa: RUF046  # Numba's is a float
+
+
 def roll_angle(w: float, x: float, y: float, z: float) -> float:
     """Return the roll [rad] (3-2-1) of a unit quaternion, body FRD to world NED, in (−π, π]."""
     return atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
@@ -191,7 +196,7 @@ def euler_angles(w: float, x: float, y: float, z: float) -> tuple[float, float, 
 
 
 FUNCTIONS = (
-    sin_cos, tan, arc_tangent_series, atan2, asin, acos, exp, log, distance,
+    sin_cos, tan, arc_tangent_series, atan2, asin, acos, exp, log, distance, whole_within,
     roll_angle, pitch_angle, yaw_angle, euler_angles,
 )  # fmt: skip
 """Functions available to compiled code."""

@@ -57,6 +57,10 @@ class StateEstimator(Protocol):
         """Take a sample of the GNSS receiver."""
         ...
 
+    def pass_fix(self, sample: GnssSample) -> None:
+        """Count a sample of the GNSS receiver as taken: a kernel gave it to the filter."""
+        ...
+
     def range(self, sample: RangeSample) -> None:
         """Take a sample of the rangefinder."""
         ...
@@ -173,6 +177,10 @@ class Estimator:
         )
         x[7:10] = sample.eph_m, sample.epv_m, sample.speed_accuracy_m_s
         self._push(GNSS_RING, x)
+
+    def pass_fix(self, sample: GnssSample) -> None:
+        """Count a sample of the GNSS receiver as taken: a kernel gave it to the filter."""
+        self._fix = sample[1:5]
 
     def _is_good(self, sample: GnssSample) -> bool:
         """Return True if a fix is accurate enough to start from."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from flightstack.estimation.sensor_samples import (
     MagSample,
     RangeSample,
 )
+from flightstack.simulator_link.gps_kernels import FixRow
 from flightstack.simulator_link.sensor_frames import ACCEL, BARO, GYRO, MAG, HilGps
 from flightstack.simulator_link.sensor_inbox import FlowReport, HilReport, RangeReport, Report
 
@@ -91,6 +92,20 @@ def _is_finite(values: Sequence[float]) -> bool:
     return math.isfinite(sum(values))
 
 
+def fix_row(sample: GnssSample) -> FixRow:
+    """Return a sample as a row of numbers, without its accuracy of the speed."""
+    place = sample.latitude_deg, sample.longitude_deg, sample.altitude_msl_m
+    accuracy = sample.eph_m, sample.epv_m
+    return FixRow(*place, *accuracy, *sample.velocity_ned_m_s, sample.fix_type, sample.satellites)
+
+
+def fix_sample(time_s: float, fix: FixRow) -> GnssSample:
+    """Return the sample of a row of numbers; the accuracy of the speed is not known."""
+    velocity = Vector3(fix.north_m_s, fix.east_m_s, fix.down_m_s)
+    kind, satellites = int(fix.fix_type), int(fix.satellites)
+    return GnssSample(time_s, *fix[:3], velocity, fix.eph_m, fix.epv_m, math.nan, kind, satellites)
+
+
 def gnss_sample(time_s: float, gps: HilGps) -> GnssSample:
     """Return the sample of a HIL_GPS, which has no accuracy of the speed."""
     return GnssSample(
@@ -114,6 +129,14 @@ def sample_of(time_s: float, content: HilGps | RangeReport | FlowReport) -> Samp
     if isinstance(content, RangeReport):
         return RangeSample(time_s, content.distance_m, content.quality)
     return FlowSample(time_s, content.dt_s, *content.flow_rad, Vector3(*content.gyro_rad), content.quality)
+
+
+class SlowSamples(NamedTuple):
+    """Newest samples that kernels gave the estimators; None without one."""
+
+    mag: MagSample | None = None
+    baro: BaroSample | None = None
+    gnss: GnssSample | None = None
 
 
 class Lane:
@@ -187,12 +210,16 @@ class SensorFeed:
         lane.measured_us, lane.step_us = time_us, step_us
         lane.estimator.imu_row(row)
 
-    def pass_by(self, time_us: int, step_us: int, mag: MagSample | None, baro: BaroSample | None) -> None:
-        """Count a measurement of each inertial sensor at ``time_us`` as taken, and those of the others if not None."""
+    def pass_by(self, time_us: int, step_us: int, samples: SlowSamples) -> None:
+        """Count a measurement of each inertial sensor at ``time_us`` as taken, and those of other sensors."""
+        mag, baro, gnss = samples
         for lane in self.lanes:
+            newest = lane.newest
             lane.measured_us, lane.step_us = time_us, step_us
-            lane.newest.mag = mag or lane.newest.mag
-            lane.newest.baro = baro or lane.newest.baro
+            newest.mag, newest.baro = mag or newest.mag, baro or newest.baro
+            if gnss is not None:
+                newest.gnss = gnss
+                lane.estimator.pass_fix(gnss)
 
     @property
     def selected(self) -> int:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
+from flightstack.core.portable_math import atan2, distance
+from flightstack.simulator_link.gps_kernels import FixRow
 
 _GAS_CONSTANT_DRY_AIR = 287.1
 _KELVIN = 273.15
@@ -23,6 +25,17 @@ def store_baro(
     pressure_pa = pressure_hpa * 100.0
     row[0], row[1], row[2], row[3] = time_us, altitude_m, temperature_c, pressure_pa
     row[4] = pressure_pa / (_GAS_CONSTANT_DRY_AIR * (temperature_c + _KELVIN))
+
+
+@compiled
+def store_gnss(row: FloatArray, time_us: int, fix: FixRow, speed_accuracy_m_s: float) -> None:
+    """Fill a row of ``GNSS_GROUP``."""
+    north, east = fix.north_m_s, fix.east_m_s
+    row[0], row[1], row[2], row[3] = time_us, fix.latitude_deg, fix.longitude_deg, fix.altitude_m
+    row[4], row[5], row[6] = north, east, fix.down_m_s
+    row[7], row[8], row[9] = fix.eph_m, fix.epv_m, speed_accuracy_m_s
+    row[10], row[11] = fix.fix_type, fix.satellites
+    row[12], row[13] = distance(north, east), atan2(east, north)
 
 
 @compiled

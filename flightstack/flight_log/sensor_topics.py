@@ -9,9 +9,9 @@ import math
 
 from flightstack.core.compiled import plain
 from flightstack.core.contract import STATE_SIZE, FloatArray
-from flightstack.core.portable_math import atan2, distance
+from flightstack.estimation.sensor_feed import fix_row
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, MagSample, RangeSample
-from flightstack.flight_log.sensor_rows import store_baro, store_mag
+from flightstack.flight_log.sensor_rows import store_baro, store_gnss, store_mag
 from flightstack.flight_log.topics import Field, Group, Topic, outer_heading
 from flightstack.mavlink.dialect import mavlink
 
@@ -143,12 +143,7 @@ def fill_baro(row: FloatArray, sample: BaroSample) -> None:
 
 def fill_gnss(row: FloatArray, sample: GnssSample) -> None:
     """Fill a row of ``GNSS_GROUP``."""
-    north, east, down = sample.velocity_ned_m_s
-    row[:] = (
-        round(sample.time_s * 1e6), sample.latitude_deg, sample.longitude_deg, sample.altitude_msl_m,
-        north, east, down, sample.eph_m, sample.epv_m, sample.speed_accuracy_m_s, sample.fix_type,
-        sample.satellites, distance(north, east), atan2(east, north),
-    )  # fmt: skip
+    plain(store_gnss)(row, round(sample.time_s * 1e6), fix_row(sample), sample.speed_accuracy_m_s)
 
 
 def fill_range(row: FloatArray, sample: RangeSample) -> None:

@@ -16,13 +16,13 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from flightstack.core.compiled import compiled, direct
-from flightstack.core.contract import FloatArray, Record, RecordArray, SingleArray
+from flightstack.core.contract import ByteArray, FloatArray, Record, RecordArray, SingleArray
+from flightstack.core.portable_math import whole_within
 from flightstack.core.record_types import dtype_of
 from flightstack.mavlink.fields import RANGES
 from flightstack.mavlink.frames import CHECKSUM_SIZE, HEADER_V2, LARGEST_FRAME, MAGIC_V2
 from flightstack.mavlink.packed import PackedMessage, Packing
 
-ByteArray: TypeAlias = "np.ndarray[Any, np.dtype[np.uint8]]"
 IntArray: TypeAlias = "np.ndarray[Any, np.dtype[np.int64]]"
 
 _LEAST_INFINITE = 2.0**128 - 2.0**103
@@ -55,12 +55,6 @@ class _Message(NamedTuple):
 
 
 _FIELD, _MESSAGE = dtype_of(_Field), dtype_of(_Message)
-
-
-@compiled
-def _whole(value: float, low: float, high: float) -> int:
-    """Round as ``fields.whole``."""
-    return int(min(max(np.rint(value), low), high)) if math.isfinite(value) else 0
 
 
 @compiled
@@ -129,7 +123,7 @@ def pack_frames(
                 for byte in range(4):
                     frames[at + byte] = single_bytes[4 * source + byte]
             else:
-                number = _whole(values[source], field["low"], field["high"])
+                number = whole_within(values[source], field["low"], field["high"])
                 _store_bytes(number, field["size"], frames, at)
         while end > payload + 1 and frames[end - 1] == 0:
             end -= 1

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from flightstack.core.arrays import copy_all
 from flightstack.core.compiled import compiled
 from flightstack.core.record_types import dtype_of
 from flightstack.simulator_link.frame_kernels import (
@@ -22,6 +23,7 @@ from flightstack.simulator_link.frame_kernels import (
     seal,
     write_bytes,
 )
+from flightstack.simulator_link.gps_kernels import GPS_NUMBER_AT
 from flightstack.transports.compiled_socket import forget, now_ns, receive_into, send_from
 
 _FRAME = HEADER + CHECKSUM
@@ -41,6 +43,8 @@ class Exchange(NamedTuple):
     """Bits of HIL_SENSOR; the next two too."""
     mag_fields: int
     baro_fields: int
+    takes_fixes: bool
+    """True if the filters take HIL_GPS."""
     deadline_ns: int
     """Time of the monotonic clock from which no exchange begins."""
     ended_ns: int
@@ -84,13 +88,27 @@ def _is_finite(inbox: Any, at: int, size: int) -> bool:
 
 
 @compiled
+def _gps_size(inbox: Any, at: int, end: int, bits: Any, shape: Any) -> int:
+    """Return the size of the payload of HIL_GPS at ``at``: 0 without one, −1 for one that Python takes."""
+    size = frame_size(inbox, at, end, shape) - _FRAME
+    if size < 0:
+        return 0
+    is_other = size > GPS_NUMBER_AT and inbox[at + HEADER + GPS_NUMBER_AT] != 0
+    return -1 if is_other or not bits["takes_fixes"] else size
+
+
+@compiled
 def _take(inbox: Any, end: int, time_us: int, bits: Any, taking: Any) -> bool:
     """Take the frames of a quiet step at ``time_us``, ``end`` bytes; return False, and take nothing, for any other."""
-    shapes, state, wires, values, news_array, places = taking
+    shapes, state, wires, values, news_array, gps, places = taking
     at = frame_size(inbox, 0, end, shapes[0])
     if at != len(state) or read_bytes(inbox, HEADER, 8) != time_us:
         return False
-    others = 0
+    others, gps_at = 0, at + HEADER
+    gps_size = _gps_size(inbox, at, end, bits, shapes[2])
+    if gps_size < 0:
+        return False
+    at += gps_size + _FRAME if gps_size > 0 else 0
     for k in range(len(wires) - 1, -1, -1):
         size = frame_size(inbox, at, end, shapes[1])
         others = -1 if size == 0 else _news(inbox, at, size, k, bits)
@@ -102,17 +120,17 @@ def _take(inbox: Any, end: int, time_us: int, bits: Any, taking: Any) -> bool:
         at += size
     if at != end:
         return False
-    for i in range(len(state)):
-        state[i] = inbox[i]
+    copy_all(inbox[: len(state)], state)
     for k in range(len(wires)):
-        for i in range(len(wires[k])):
-            wires[k][i] = inbox[places[k] + i]
+        copy_all(inbox[places[k] : places[k] + len(wires[k])], wires[k])
     if len(wires) > 0:
-        for i in range(len(values)):
-            values[i] = inbox[places[0] + i]
+        copy_all(inbox[places[0] : places[0] + len(values)], values)
     news = news_array[0]
     news["has_mag"] = 1 if others & bits["mag_fields"] != 0 else 0
     news["has_baro"] = 1 if others & bits["baro_fields"] != 0 else 0
+    news["has_gnss"] = 1 if gps_size > 0 else 0
+    for i in range(len(gps) if gps_size > 0 else 0):  # the message lacks the zeros at its end
+        gps[i] = inbox[gps_at + i] if i < gps_size else 0
     return True
 
 

@@ -7,6 +7,7 @@ simulator is in this process, or exchanges its messages with it.
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import Any, Protocol, TypeAlias
 
@@ -16,19 +17,30 @@ from flightstack.commander.estimate_checks import LIMITS, watch_estimate
 from flightstack.commander.fault_detector import follow_rotors
 from flightstack.control.loops import PythonLoops
 from flightstack.core.compiled import IS_DISABLED, direct
-from flightstack.core.contract import STATE_SIZE, FloatArray, LoopRow, RecordArray, SingleArray, Vector3
+from flightstack.core.contract import (
+    STATE_SIZE,
+    ByteArray,
+    FloatArray,
+    LoopRow,
+    RecordArray,
+    SingleArray,
+    Vector3,
+)
 from flightstack.core.kernel_calls import address_of, as_bytes
 from flightstack.estimation.delayed_filter import imu_kernel, push_kernel
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.filter_core import PythonCore
+from flightstack.estimation.fusion import GNSS_SIZE
 from flightstack.estimation.health import WATCH
 from flightstack.estimation.imu_track import RECORD_SIZE, take_wire
 from flightstack.estimation.rings import MAG_RING
-from flightstack.estimation.sensor_samples import BaroSample, MagSample
+from flightstack.estimation.sensor_feed import SlowSamples, fix_row, fix_sample
+from flightstack.estimation.sensor_samples import BaroSample, GnssSample, MagSample
 from flightstack.flight_log.flight_log import DEFAULT_CAPACITY, FlightLog, Trace
 from flightstack.flight_log.sensor_recorder import GLOBAL_INTERVAL_US, NEVER_US, TRUTH_INTERVAL_US
 from flightstack.flight_log.sensor_topics import (
     BARO_GROUP,
+    GNSS_GROUP,
     IMU_GROUP,
     MAG_GROUP,
     TRUTH_GLOBAL_GROUP,
@@ -36,9 +48,10 @@ from flightstack.flight_log.sensor_topics import (
 )
 from flightstack.process.assembly import Stack
 from flightstack.process.quiet_outer import QuietOuter
+from flightstack.simulator_link.gps_kernels import FIX_SIZE, FixRow
 from flightstack.simulator_link.hot_frames import VALID_FLAG
 from flightstack.simulator_link.sensor_frames import HIL_VALUES
-from flightstack.vehicle.estimation import HEALTH_US
+from flightstack.vehicle.estimation import HEALTH_US, Estimation
 from flightstack.vehicle.quiet_kernel import (
     QUIET_CALLS,
     QUIET_COUNTERS,
@@ -52,7 +65,7 @@ _Arguments: TypeAlias = tuple[Any, ...]
 """Arguments of the kernel for one part."""
 
 
-_GROUPS = (MAG_GROUP, BARO_GROUP, TRUTH_GROUP, TRUTH_GLOBAL_GROUP)
+_GROUPS = (MAG_GROUP, BARO_GROUP, GNSS_GROUP, TRUTH_GROUP, TRUTH_GLOBAL_GROUP)
 """In the order of the kernel's counters of new rows."""
 
 
@@ -70,7 +83,9 @@ class QuietSimulator(Protocol):
     values: SingleArray
     """Measurements in HIL_SENSOR of the first one, shape (13,)."""
     news: RecordArray
-    """Its new measurements besides those of the inertial sensor, ``SENSOR_NEWS``, shape (1,)."""
+    """New measurements besides those of the inertial sensors, ``SENSOR_NEWS``, shape (1,)."""
+    gps: ByteArray
+    """Payload of HIL_GPS with the newest fix."""
 
     def room(self) -> int:
         """Return for how many steps the kernel can be called."""
@@ -125,14 +140,19 @@ class QuietSensors:
     Of one that flies on the true state: nothing is due.
     """
 
-    def __init__(self, stack: Stack, values: SingleArray, news: RecordArray) -> None:
-        """``values`` and ``news`` are those of ``QuietSimulator``."""
+    def __init__(self, stack: Stack, values: SingleArray, news: RecordArray, gps: ByteArray) -> None:
+        """``values``, ``news`` and ``gps`` are those of ``QuietSimulator``."""
         estimation = self._estimation = stack.estimation
         self._no_traces = [Trace(DEFAULT_CAPACITY, group.columns, lambda: None) for group in _GROUPS]
         self._log: FlightLog | None = None
         self._traces = self._no_traces
         """Those of the log."""
         self._marks = np.zeros(1, SLOW_MARKS)
+        self._marks["fix"] = math.nan
+        self._fix: GnssSample | None = None
+        """The sample that is noted in the marks."""
+        self._place = np.zeros(5)
+        """Origin of the estimate, as ``GnssReceiver`` has that of the simulator."""
         self._marks["truth_us"] = self._marks["global_us"] = self._marks["health_us"] = NEVER_US
         self.push = self.watch = 0
         """Addresses of the kernels that give a filter a measurement, and update the health."""
@@ -144,9 +164,18 @@ class QuietSensors:
             self.watch = address_of(watch_estimate, memory, watch, track.memory, limits, False, False, 0.0)
             offset_m, place = estimation.recorder.offset_m, estimation.recorder.place
         scratch = np.zeros(4), np.zeros(4), np.zeros(2), np.zeros(2)
+        gnss = gps, self._place, np.zeros(FIX_SIZE), np.zeros(GNSS_SIZE), np.zeros(GNSS_SIZE)
         truth = stack.simulator.truth, offset_m, place, TRUTH_INTERVAL_US, GLOBAL_INTERVAL_US
         health = watch, limits, HEALTH_US
-        self.constant: tuple[Any, ...] = (self._marks, news, values.view(HIL_VALUES), scratch, truth, health)
+        self.constant: tuple[Any, ...] = (
+            self._marks,
+            news,
+            values.view(HIL_VALUES),
+            scratch,
+            truth,
+            health,
+            gnss,
+        )
         """Argument ``slow`` of the kernel."""
 
     def room(self) -> int:
@@ -155,16 +184,27 @@ class QuietSensors:
 
     def following(self) -> tuple[Any, ...]:
         """Return the argument ``following`` of the kernel; call once before each of its calls."""
-        marks, estimation, delays_s = self._marks, self._estimation, (0.0, 0.0)
+        marks, estimation, delays_s = self._marks, self._estimation, (0.0, 0.0, 0.0)
         conditions = 0, False, False
         if estimation is not None:
             params = estimation.estimators[0].params
-            delays_s = float(params.mag_delay_s), float(params.baro_delay_s)
-            marks[0] = 0
+            delays_s = float(params.mag_delay_s), float(params.baro_delay_s), float(params.gnss_delay_s)
+            self._begin(estimation)
             marks["truth_us"], marks["global_us"] = estimation.recorder.truth_due_us
             marks["health_us"], conditions = estimation.begin_watch()
         logs = tuple((trace.rows, trace.times_us, trace.n) for trace in self._open_traces())
         return delays_s, logs, conditions
+
+    def _begin(self, estimation: Estimation) -> None:
+        """Note the newest fix and the origin of the estimate; nothing is new."""
+        marks, frame, newest = self._marks, estimation.estimators[0].frame, estimation.samples.gnss
+        marks["mag_us"] = marks["baro_us"] = marks["gnss_us"] = 0
+        for name in ("mag_rows", "baro_rows", "gnss_rows", "truth_rows", "global_rows"):
+            marks[name] = 0
+        if newest is not self._fix and newest is not None:
+            self._fix, marks["fix"][0] = newest, fix_row(newest)
+        if frame is not None:
+            self._place[:] = (*frame.origin, *frame.scales)
 
     def _open_traces(self) -> list[Trace]:
         """Return the traces of the open log; without one, traces that are not recorded."""
@@ -180,7 +220,7 @@ class QuietSensors:
         if self._estimation is None or marks.truth_us == NEVER_US:
             return
         self._estimation.recorder.pass_by((marks.truth_us, marks.global_us))
-        rows = marks.mag_rows, marks.baro_rows, marks.truth_rows, marks.global_rows
+        rows = marks.mag_rows, marks.baro_rows, marks.gnss_rows, marks.truth_rows, marks.global_rows
         for trace, new in zip(self._open_traces(), rows, strict=True):
             trace.n += new
 
@@ -194,7 +234,9 @@ class QuietSensors:
             if marks.baro_us
             else None
         )
-        self._estimation.pass_by(time_us, interval_us, mag, baro, marks.health_us)
+        gnss = fix_sample(marks.gnss_us * 1e-6, FixRow(*marks.fix.tolist())) if marks.gnss_us else None
+        self._fix = gnss or self._fix
+        self._estimation.pass_by(time_us, interval_us, SlowSamples(mag, baro, gnss), marks.health_us)
 
 
 class QuietBlock:
@@ -207,7 +249,7 @@ class QuietBlock:
         self._estimation, self._autopilot = stack.estimation, stack.parts.autopilot
         self._estimates = _estimates(stack)
         self._outer = QuietOuter(stack, loops)
-        self._sensors = QuietSensors(stack, simulator.values, simulator.news)
+        self._sensors = QuietSensors(stack, simulator.values, simulator.news, simulator.gps)
         self._interval_us, self._divisor = stack.rates.interval_us, stack.rates.divisor
         self.waited = False
         """True if the last tick of ``run`` waited for Python."""

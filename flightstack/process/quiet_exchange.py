@@ -6,14 +6,23 @@ from typing import Any
 
 import numpy as np
 
-from flightstack.core.contract import FloatArray, RecordArray, SingleArray
+from flightstack.core.contract import ByteArray, FloatArray, RecordArray, SingleArray
 from flightstack.core.kernel_calls import address_of, as_bytes
 from flightstack.params.config import TRUTH, StackConfig
 from flightstack.process.assembly import Stack, build
 from flightstack.process.exchange_kernel import EXCHANGE, Exchange, exchange
 from flightstack.process.quiet_block import QuietBlock, compiles, estimators_of
 from flightstack.simulator_link.frame_kernels import SENSOR_NEWS, SHAPE
-from flightstack.simulator_link.sensor_frames import ACCEL, BARO, GYRO, MAG, SENSOR_SHAPE, VALUES
+from flightstack.simulator_link.gps_kernels import GPS_SIZE
+from flightstack.simulator_link.sensor_frames import (
+    ACCEL,
+    BARO,
+    GPS_SHAPE,
+    GYRO,
+    MAG,
+    SENSOR_SHAPE,
+    VALUES,
+)
 from flightstack.transports import compiled_socket
 from flightstack.transports.compiled_socket import CompiledSocket
 
@@ -36,16 +45,18 @@ class ExchangedSteps:
             self.values[:6].reshape(1, 6) if count == 1 else np.zeros((count, 6), np.float32)
         )
         self.news: RecordArray = np.zeros(1, SENSOR_NEWS)
+        self.gps: ByteArray = np.zeros(GPS_SIZE, np.uint8)
+        self._estimation = stack.estimation
         self.record: RecordArray = np.zeros(1, EXCHANGE)
         frame = as_bytes(answer.frame)
         self.record[0] = Exchange(
             frame.ctypes.data, answer.shape.size, answer.shape.extra, stack.rates.interval_us, int(ACCEL | GYRO),
-            int(MAG), int(BARO), 0, 0, 0, 0,
+            int(MAG), int(BARO), False, 0, 0, 0, 0,
         )  # fmt: skip
         self._took_ns = np.zeros(MOST, np.int64)
-        shapes = np.array([[plant.shape], [SENSOR_SHAPE]], SHAPE)
+        shapes = np.array([[plant.shape], [SENSOR_SHAPE], [GPS_SHAPE]], SHAPE)
         values, wires = self.values.view(np.uint8), self.wires.view(np.uint8)
-        taking = shapes, as_bytes(plant.frame), wires, values, self.news, np.zeros(count, np.int64)
+        taking = shapes, as_bytes(plant.frame), wires, values, self.news, self.gps, np.zeros(count, np.int64)
         self.world: tuple[Any, ...] = (self.socket.arguments, self.record, frame, self._took_ns, taking)
         self.step = address_of(exchange, self.world, 0, 0)
 
@@ -55,6 +66,7 @@ class ExchangedSteps:
         record = self.record
         record["deadline_ns"], record["ended_ns"] = deadline_ns, began_ns
         record["waited_ns"], record["began"] = 0, 0
+        record["takes_fixes"] = self._estimation is not None and self._estimation.takes_fixes
 
     def room(self) -> int:
         """Return how many exchanges a call can make."""

@@ -1,4 +1,4 @@
-"""The frames of the lockstep exchange in compiled code: FS_PLANT_STATE, FS_ACTUATORS and HIL_SENSOR of MAVLink 2.
+"""The frames of the lockstep exchange in compiled code: FS_PLANT_STATE, FS_ACTUATORS, HIL_SENSOR and HIL_GPS.
 
 They are those of ``hot_frames`` and ``sensor_frames``: a frame that is not exactly as expected is left to them. A
 module of its own, with few imports: the key of a kernel in the cache depends on all of them.
@@ -31,10 +31,11 @@ _CHECKSUMS = _table()
 
 
 class SensorNews(NamedTuple):
-    """What HIL_SENSOR has besides the inertial sensor: 1 for a new measurement."""
+    """What a simulator sends besides the inertial sensors: 1 for a new measurement."""
 
     has_mag: int
     has_baro: int
+    has_gnss: int
 
 
 SENSOR_NEWS = dtype_of(SensorNews)

@@ -195,6 +195,8 @@ class HilGps(NamedTuple):
 _GPS = struct.Struct("<QiiiHHHhhhHBBBH")
 _GPS_EXTRA: int = mavlink.MAVLink_hil_gps_message.crc_extra
 _GPS_MESSAGE = HIL_GPS_ID.to_bytes(3, "little")
+GPS_SHAPE = Shape(_GPS.size, _GPS_EXTRA, *_GPS_MESSAGE)
+"""HIL_GPS for compiled code."""
 UNKNOWN = 0xFFFF
 
 
@@ -223,6 +225,11 @@ def encode_gps(gps: HilGps, seq: int, system_id: int, component_id: int) -> byte
         or b"\x00"
     )
     return pack_frame(HIL_GPS_ID, payload, _GPS_EXTRA, seq, system_id, component_id)
+
+
+def gps_buffer(system_id: int, component_id: int) -> bytearray:
+    """Return a frame of HIL_GPS for compiled code, with the sequence number before the first one."""
+    return bytearray(pack_frame(HIL_GPS_ID, bytes(_GPS.size), _GPS_EXTRA, 255, system_id, component_id))
 
 
 def decode_gps(frame: bytes | memoryview) -> HilGps | None:

@@ -49,7 +49,7 @@ class QuietTicks:
             return 0
         block = self._fitting(simulator, actuators)
         if block is not None:
-            return min(block.count(), simulator.quiet_intervals(measures=True))
+            return min(block.count(), self._quiet_intervals(simulator))
         time_us, count = self._now.time_us, simulator.quiet_intervals(measures=False)
         if self._estimation is not None:
             quiet_us = self._estimation.quiet_until_us(measures=False) - 1 - time_us
@@ -59,6 +59,10 @@ class QuietTicks:
     def _is_in_step(self, simulator: Simulator) -> bool:
         """Return True if the simulator's next state comes one interval of the vehicle after the newest one."""
         return simulator.interval_us == self._interval_us and simulator.stamp_us == self._link.stamp_us
+
+    def _quiet_intervals(self, simulator: Simulator) -> int:
+        fixes = self._estimation is not None and self._estimation.takes_fixes
+        return simulator.quiet_intervals(measures=True, fixes=fixes)
 
     def _fitting(self, simulator: Simulator, actuators: ActuatorsFrame) -> QuietBlock | None:
         """Return the compiled ticks, None if a part of them is not compiled, or is not that of the start."""
@@ -75,7 +79,7 @@ class QuietTicks:
         is_due = self._autopilot.next_outer == 0 and self._lockstep.is_due
         if block is None or not (is_due and self._is_in_step(simulator)):
             return 0
-        done = block.run_periods(min(most, 1 + simulator.quiet_intervals(measures=True)))
+        done = block.run_periods(min(most, 1 + self._quiet_intervals(simulator)))
         self.is_idle = done > 0 and not block.waited
         self._answer(simulator, actuators, done - 1)
         return done or 1
@@ -91,7 +95,7 @@ class QuietTicks:
             return 0
         if actuators.flags != self._link.flags(self._now.status.armed) | VALID_FLAG:
             return 0
-        count = min(most, block.count(runs_on=True), simulator.quiet_intervals(measures=True))
+        count = min(most, block.count(runs_on=True), self._quiet_intervals(simulator))
         if count <= 0:
             return 0
         done = block.run(count)

@@ -31,8 +31,8 @@ from flightstack.estimation.filter_core import FilterCore
 from flightstack.estimation.health import NO_HEALTH
 from flightstack.estimation.lanes import Lanes, sum_of_resets
 from flightstack.estimation.sensed import Sensed
-from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed
-from flightstack.estimation.sensor_samples import BaroSample, ImuSample, MagSample
+from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed, SlowSamples
+from flightstack.estimation.sensor_samples import BaroSample, ImuSample
 from flightstack.estimation.snapshot import snapshot
 from flightstack.flight_log.sensor_recorder import NEVER_US, SensorRecorder
 from flightstack.guidance.navigator import Navigator
@@ -223,15 +223,18 @@ class Estimation:
         self.limits[0] = limits_of(self._now.behaviour)
         return self._health_due_us, (self._conditions, self._now.has_state, self._now.flying)
 
-    def pass_by(
-        self, time_us: int, step_us: int, mag: MagSample | None, baro: BaroSample | None, health_due_us: int
-    ) -> None:
+    @property
+    def takes_fixes(self) -> bool:
+        """True if kernels may give fixes of GNSS to the filters: they have a local frame."""
+        return self._lanes.estimators[0].frame is not None
+
+    def pass_by(self, time_us: int, step_us: int, samples: SlowSamples, health_due_us: int) -> None:
         """Follow the measurements up to ``time_us`` that the kernels of sensors and filters took.
 
-        ``mag`` and ``baro`` are the newest of them, None without one; the next health is due at ``health_due_us``.
+        The next health is due at ``health_due_us``.
         """
         self._time_us = time_us
-        self._feed.pass_by(time_us, step_us, mag, baro)
+        self._feed.pass_by(time_us, step_us, samples)
         self._check_resets(time_us)
         if self._lanes.is_alone and health_due_us != self._health_due_us:
             self._health_due_us, self.health = health_due_us, self._lanes.watched()

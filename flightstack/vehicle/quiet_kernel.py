@@ -16,7 +16,7 @@ from flightstack.core.contract import FloatArray, LoopRow
 from flightstack.core.kernel_calls import call_kernel, call_kernel_int
 from flightstack.core.record_types import dtype_of
 from flightstack.vehicle.outer_kernel import guide, note_outer
-from flightstack.vehicle.slow_kernel import log_truth, take_slow, watch_health
+from flightstack.vehicle.slow_kernel import log_truth, take_fix, take_slow, watch_health
 
 _REFERENCE, _COMMAND, _SPEED = (
     columns.start for columns in (LoopRow.REFERENCE_ATTITUDE, LoopRow.ROTOR_COMMAND, LoopRow.ROTOR_SPEED)
@@ -120,6 +120,7 @@ def _advance(
         resets_before = _total(resets)
         at = record_at + counters["sensed"]
         record_times[at] = time_us
+        take_fix(calls["push"], slow, time_us, sensing[3], following)
         _sense(calls, sensing, time_us, interval_us, selected, records[at])
         take_slow(calls["push"], slow, time_us, sensing[3], following)
         counters["sensed"] += 1

@@ -1,4 +1,4 @@
-"""Magnetometer and barometer, the health of the estimate and the log of the truth in quiet ticks, as compiled code.
+"""Sensors besides the inertial ones, the health of the estimate and the log of the truth in quiet ticks, compiled.
 
 It calls the kernels that the estimator runs in any other tick, on the same arrays and in the same order.
 """
@@ -8,29 +8,46 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
+from flightstack.core.array_items import as_tuple, store
+from flightstack.core.arrays import copy_all
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
+from flightstack.core.geodesy import GeoPoint, relative
 from flightstack.core.kernel_calls import call_kernel, call_kernel_int
 from flightstack.core.record_types import dtype_of
-from flightstack.estimation.rings import BARO_RING, MAG_RING
-from flightstack.flight_log.sensor_rows import store_baro, store_global, store_mag, store_truth
+from flightstack.estimation.rings import BARO_RING, GNSS_RING, MAG_RING
+from flightstack.estimation.sensor_samples import GnssFix
+from flightstack.flight_log.sensor_rows import (
+    store_baro,
+    store_global,
+    store_gnss,
+    store_mag,
+    store_truth,
+)
+from flightstack.simulator_link.gps_kernels import FIX_SIZE, FixRow, read_gps
+
+_FIX_3D = float(GnssFix.FIX_3D)
 
 
 class SlowMarks(NamedTuple):
     """What the kernel notes."""
 
     mag_us: int
-    """Time of the newest sample, or 0; the next one too."""
+    """Time of the newest sample, or 0; the next two too."""
     baro_us: int
+    gnss_us: int
     field_gauss: Annotated[FloatArray, 3]
     """Magnetic field of that sample, FRD."""
     pressure_hpa: float
     """Of that sample, as pressure altitude and temperature."""
     altitude_m: float
     temperature_c: float
+    fix: Annotated[FloatArray, FIX_SIZE]
+    """The newest one, ``FixRow``, also if it came before; NaN without one."""
     mag_rows: int
-    """New rows of the log; the next three too."""
+    """New rows of the log; the next four too."""
     baro_rows: int
+    gnss_rows: int
     truth_rows: int
     global_rows: int
     truth_us: int
@@ -53,17 +70,52 @@ def _push(push: int, filters: Any, ring: int, values: FloatArray, row: FloatArra
 
 
 @compiled
+def _is_repeated(new: FloatArray, last: FloatArray) -> bool:
+    """Return True for an old measurement: see ``Estimator.gnss``."""
+    velocity = new[5:8]
+    if velocity[0] == 0.0 and velocity[1] == 0.0 and velocity[2] == 0.0:
+        return False
+    place_is_old = new[0] == last[0] and new[1] == last[1] and new[2] == last[2]
+    return bool(place_is_old and velocity[0] == last[5] and velocity[1] == last[6] and velocity[2] == last[7])
+
+
+@compiled
+def take_fix(push: int, slow: Any, time_us: int, filters: Any, following: Any) -> None:
+    """Give a new fix at ``time_us`` to the filters and the log; as in Python, before the inertial measurement."""
+    marks, news = slow[0][0], slow[1][0]
+    if news["has_gnss"] == 0:
+        return
+    payload, place, new, sample, copy = slow[6]
+    delay_s, log = following[0][2], following[1][2]
+    read_gps(payload, new)
+    fix = FixRow(*as_tuple(new, FIX_SIZE))
+    if fix.fix_type >= _FIX_3D and not _is_repeated(new, marks["fix"]):
+        point = GeoPoint(fix.latitude_deg, fix.longitude_deg, fix.altitude_m)
+        origin, scales = GeoPoint(place[0], place[1], place[2]), (place[3], place[4])
+        position = relative(origin, scales, point)
+        store(sample, (
+            time_us * 1e-6 - delay_s, position.x, position.y, position.z,
+            fix.north_m_s, fix.east_m_s, fix.down_m_s, fix.eph_m, fix.epv_m, math.nan,
+        ))  # fmt: skip
+        _push(push, filters, GNSS_RING, sample, copy)
+    copy_all(new, marks["fix"])
+    marks["gnss_us"] = time_us
+    store_gnss(_log_row(log, marks["gnss_rows"], time_us), time_us, fix, math.nan)
+    marks["gnss_rows"] += 1
+
+
+@compiled
 def take_slow(push: int, slow: Any, time_us: int, filters: Any, following: Any) -> None:
     """Give new measurements at ``time_us``, the vehicle's time, to the filters and the log.
 
     Those that are not finite are none. ``push`` is the address of the kernel. ``following`` has delays, logs, and what
     the health is given.
     """
-    marks_array, news_array, parts, rows, _truth, _health = slow
+    marks_array, news_array, parts, rows, _truth, _health, _gnss = slow
     marks, news, values = marks_array[0], news_array[0], parts[0]
-    delays_s, (mag_log, baro_log, _truth_log, _global_log), _conditions = following
+    delays_s, (mag_log, baro_log, _gnss_log, _truth_log, _global_log), _conditions = following
     mag_sample, mag_copy, baro_sample, baro_copy = rows
-    mag_delay_s, baro_delay_s = delays_s
+    mag_delay_s, baro_delay_s, _gnss_delay_s = delays_s
     if news["has_mag"] != 0:
         field = values["mag_gauss"]
         x, y, z = float(field[0]), float(field[1]), float(field[2])
@@ -105,11 +157,11 @@ def log_truth(slow: Any, time_us: int, following: Any) -> None:
         return
     state, offset_m, place, interval_us, global_interval_us = slow[4]
     marks["truth_us"] = (time_us // interval_us + 1) * interval_us
-    store_truth(_log_row(logs[2], marks["truth_rows"], time_us), state, offset_m)
+    store_truth(_log_row(logs[3], marks["truth_rows"], time_us), state, offset_m)
     marks["truth_rows"] += 1
     if time_us >= marks["global_us"]:
         marks["global_us"] = (time_us // global_interval_us + 1) * global_interval_us
-        store_global(_log_row(logs[3], marks["global_rows"], time_us), state, place)
+        store_global(_log_row(logs[4], marks["global_rows"], time_us), state, place)
         marks["global_rows"] += 1
 
 
@@ -130,5 +182,8 @@ def watch_health(watch: int, slow: Any, time_us: int, memory: Any, track: Any, f
         newest["mag_s"] = marks["mag_us"] * 1e-6
     if marks["baro_us"] != 0:
         newest["baro_s"], newest["pressure_hpa"] = marks["baro_us"] * 1e-6, marks["pressure_hpa"]
+    if marks["gnss_us"] != 0:
+        has_fix = FixRow(*as_tuple(marks["fix"], FIX_SIZE)).fix_type >= _FIX_3D
+        newest["fix_s"] = marks["gnss_us"] * 1e-6 if has_fix else -math.inf
     found: int = call_kernel_int(watch, (memory, health, track, limits, has_origin, flying, time_us * 1e-6))
     return bool(found == conditions)

@@ -96,11 +96,10 @@ class Channel:
         part: int | None = None,
         *,
         scale: float = 1.0,
-        latency_us: int = 0,
     ) -> None:
         """``key``: name and number of the sensor; ``part``: of a record with several channels.
 
-        ``scale`` is from the unit of faults to that of the record, ``latency_us`` from a measurement to its message.
+        ``scale`` is from the unit of faults to that of the record.
         """
         name, number = key
         index = number if part is not None else 0
@@ -108,9 +107,9 @@ class Channel:
         self._bias: FloatArray = records["fault_bias"][index, of_part]
         at = index if part is None else (index, part)
         self._flat = (records["fault_noise"], records["is_frozen"], at)
-        self._scale, self._latency_us = scale, latency_us
+        self._scale = scale
         self._fault = HEALTHY
-        self._passes_at_once = latency_us == 0  # and has no fault
+        self._passes_at_once = True  # without a fault
         self._waiting: deque[tuple[int, Any]] = deque()
         self.next_due_us = NEVER_US
         """Time of the next message that waits."""
@@ -124,7 +123,7 @@ class Channel:
     def set(self, fault: ChannelFault, time_us: int) -> None:
         """Begin, change or end the fault at ``time_us``."""
         self._fault = fault
-        self._passes_at_once = self._latency_us == 0 and fault == HEALTHY
+        self._passes_at_once = fault == HEALTHY
         noise, frozen, at = self._flat
         noise[at], frozen[at] = fault.noise * self._scale, fault.is_frozen
         self.update(time_us)
@@ -146,7 +145,7 @@ class Channel:
         """Take the measurement ``out``, which is kept, and return the one that is sent at ``time_us``, or None."""
         fault = self._fault
         if fault.loss == 0.0 or self._losses.next() >= fault.loss:
-            due_us = time_us + self._latency_us + fault.late_us
+            due_us = time_us + fault.late_us
             self._waiting.append((due_us, out))
             self.next_due_us = min(self.next_due_us, due_us)
         sent: T | None = self.due(time_us)

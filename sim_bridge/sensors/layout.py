@@ -122,6 +122,10 @@ GNSS = _dtype(
     ("fault_bias", "f8", 3),  # m NED
     ("fault_rate", "f8", 3),  # m/s NED: the velocity of a spoofed position
     ("noise_factor", "f8"),  # of jamming
+    ("first_fix_us", "i8"),  # time without a fix after switch-on
+    ("eph_m", "f8"),  # stated accuracies
+    ("epv_m", "f8"),
+    ("seen", "i8"),  # number of satellites
     ("out", "f8", 6),  # position m NED, velocity m/s NED
 )
 

@@ -20,13 +20,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flightstack.core.contract import FloatArray, RecordArray, SingleArray
-from flightstack.core.geodesy import GeoPoint, LocalFrame, earth_field_ned_gauss
+from flightstack.core.geodesy import GeoPoint, earth_field_ned_gauss
 from flightstack.core.periods import next_due
 from flightstack.core.portable_math import sin_cos
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.fields import whole
 from flightstack.mavlink.link import Link, Message
 from flightstack.params.vehicle import Vehicle
+from flightstack.simulator_link.gps_kernels import FixRow
 from flightstack.simulator_link.hot_frames import PlantStateFrame
 from flightstack.simulator_link.sensor_frames import (
     ACCEL,
@@ -37,12 +38,13 @@ from flightstack.simulator_link.sensor_frames import (
     HilMeasurement,
     HilSensorFrame,
     encode_gps,
+    gps_buffer,
 )
 from sim_bridge.plant.faults.table import Fault, Kind
 from sim_bridge.plant.plant import Plant, PlantOptions
 from sim_bridge.sensors.barometer import Barometer
 from sim_bridge.sensors.faults import HEALTHY, NEVER_US, Channel, channel_faults
-from sim_bridge.sensors.gnss import Fix, GnssReceiver
+from sim_bridge.sensors.gnss import GnssReceiver
 from sim_bridge.sensors.imu import ImuSet
 from sim_bridge.sensors.magnetometer import Magnetometer
 from sim_bridge.sensors.optical_flow import OpticalFlow
@@ -50,7 +52,7 @@ from sim_bridge.sensors.rangefinder import Rangefinder
 
 _DEGREE = math.pi / 180.0
 _IMU = ACCEL | GYRO
-MAG_SLOT, BARO_SLOT, QUIET_SLOTS, SLOTS = 0, 1, 2, 5
+MAG_SLOT, BARO_SLOT, GNSS_SLOT, QUIET_SLOTS, SLOTS = 0, 1, 2, 3, 5
 """Sensors by their index in ``due_us``, first those that quiet ticks measure as well, and its length."""
 _UNKNOWN_VARIANCE = 255
 
@@ -87,7 +89,6 @@ class SensorSuite:
         self._truth, self._plant, self._sender, self._seed = truth, plant, sender, options.seed
         seed = options.seed
         self._link = Link(*sender)
-        self._frame = LocalFrame(home)
         self.imus = ImuSet(vehicle, seed, truth.state)
         count = len(self.imus.records)
         self._frames = [HilSensorFrame(*sender) for _ in range(count)]
@@ -97,7 +98,8 @@ class SensorSuite:
         self._wires = self._frames[0].values[:6].reshape(1, 6) if count == 1 else self._apart
         self.imu_wires: tuple[SingleArray, ...] = tuple(self._wires)
         """Newest measurement of each inertial sensor as in HIL_SENSOR: specific force and rates, shape (6,)."""
-        self._gps_seq = 0
+        self.gps_frame = gps_buffer(*sender)
+        """A frame of HIL_GPS, with the sequence number of the newest one."""
         self._messages: list[bytes] = []
         self._channels: dict[tuple[str, int], Channel] = {}
         for index in range(count):
@@ -120,6 +122,7 @@ class SensorSuite:
         numbers, seed = vehicle.sensors.numbers, self._seed
         self.mag: Magnetometer | None = None
         self.baro: Barometer | None = None
+        self.gnss: GnssReceiver | None = None
         if "mag" in numbers:
             mag = self.mag = Magnetometer(vehicle, seed, earth_field_ned_gauss(home))
             self._mag_matrix: FloatArray = mag.records[0]["matrix"].copy()
@@ -128,8 +131,8 @@ class SensorSuite:
             baro = self.baro = Barometer(vehicle, seed, home.altitude_m)
             self._add(BARO_SLOT, "baro", baro.records, partial(self._measure_baro, baro), self._send_baro)
         if "gnss" in numbers:
-            self.gnss = GnssReceiver(vehicle, seed)
-            self._add(2, "gnss", self.gnss.records, self._measure_gnss, self._send_fix, self.gnss.latency_us)
+            gnss = self.gnss = GnssReceiver(vehicle, seed, home)
+            self._add(GNSS_SLOT, "gnss", gnss.records, partial(self._receive_gnss, gnss), self._send_fix)
         if "range" in numbers:
             self.range = Rangefinder(vehicle, options)
             self._add(3, "range", self.range.records, self._measure_range, self._send_range)
@@ -144,9 +147,8 @@ class SensorSuite:
         records: RecordArray,
         measure: Callable[[int], Any],
         send: Callable[[int, Any], None],
-        latency_us: int = 0,
     ) -> None:
-        channel = Channel((name, 0), self._seed, records, latency_us=latency_us)
+        channel = Channel((name, 0), self._seed, records)
         self._channels[name, 0] = channel
         period_us = round(1e6 / float(records[0]["rate_hz"]))
         self.due_us[slot], self.period_us[slot] = 0, period_us
@@ -179,7 +181,7 @@ class SensorSuite:
                     for row in self._mag_matrix
                 ]
             )
-        if ("gnss", 0) in self._channels:
+        if self.gnss is not None:
             self.gnss.jam(values.get(Kind.GNSS_JAM, 0.0))
             self.gnss.records[0]["fault_rate"] = self._channels["gnss", 0].rate
 
@@ -190,6 +192,9 @@ class SensorSuite:
         self.imus.measure(self._truth.state, self._truth.rotor_speed_rad_s, self._apart)
         for sensor in self._sensors:
             sensor.measure(time_us)
+        if self.gnss is not None:
+            self.gnss.restart()
+            self._due_us[GNSS_SLOT] = 0
 
     def measure(self, time_us: int) -> None:
         """Measure the present state, at the simulated time."""
@@ -238,7 +243,7 @@ class SensorSuite:
     def is_quiet(self) -> bool:
         """True while ``measure`` before ``next_us`` changes ``imu_wires`` alone: there are no faults.
 
-        Before ``next_other_us``, it also changes what magnetometer and barometer write to ``values``.
+        Before ``next_other_us``, it also changes what magnetometer, barometer and GNSS receiver measure.
         """
         return not (self._has_faults or self._is_apart or self._messages)
 
@@ -251,6 +256,11 @@ class SensorSuite:
     def next_other_us(self) -> int:
         """Time of the next measurement of a sensor that quiet ticks do not measure, or of the next late message."""
         return self._next_other_us
+
+    @property
+    def next_fix_us(self) -> int:
+        """Time of the next measurement or message of the GNSS receiver."""
+        return int(self._due_us[GNSS_SLOT])
 
     @property
     def measurements(self) -> Sequence[HilMeasurement]:
@@ -291,14 +301,14 @@ class SensorSuite:
                 due_us[slot] = next_due(time_us, period_us)
                 out = measure(time_us)
                 if not is_direct:
-                    out = channel.pass_on(time_us, out if isinstance(out, tuple) else out.copy())
+                    out = channel.due(time_us) if out is None else channel.pass_on(time_us, out.copy())
             elif not is_direct:
                 out = channel.due(time_us)
             if out is not None:
                 send(time_us, out)
             sensor_us = due_us[slot] if is_direct else min(due_us[slot], channel.next_due_us)
             next_us = min(next_us, sensor_us)
-            if slot > BARO_SLOT or not is_direct:
+            if slot >= QUIET_SLOTS or not is_direct:
                 next_other_us = min(next_other_us, sensor_us)
         self._next_us, self._next_other_us = next_us, next_other_us
 
@@ -318,15 +328,18 @@ class SensorSuite:
         parts["pressure_hpa"], parts["altitude_m"], parts["temperature_c"] = out.tolist()
         self._fields[0] |= BARO
 
-    def _measure_gnss(self, time_us: int) -> Fix:
-        return self.gnss.measure(time_us, self._truth.state)
+    def _receive_gnss(self, receiver: GnssReceiver, time_us: int) -> FloatArray | None:
+        """Return the fix that is sent now; the receiver tells when it has the next measurement or fix."""
+        fix = receiver.receive(time_us, self._truth.state)
+        self._due_us[GNSS_SLOT] = int(receiver.times_us[0])
+        return fix
 
-    def _send_fix(self, time_us: int, fix: Fix) -> None:
-        geo = self._frame.to_geo(fix.position_ned_m)
-        seq, self._gps_seq = self._gps_seq, (self._gps_seq + 1) & 255
+    def _send_fix(self, time_us: int, out: FloatArray) -> None:
+        fix = FixRow(*out.tolist())
+        seq = self.gps_frame[4] = (self.gps_frame[4] + 1) & 255
         gps = HilGps(
-            time_us, geo.latitude_deg, geo.longitude_deg, geo.altitude_m, fix.eph_m, fix.epv_m,
-            fix.velocity_ned_m_s, fix.fix_type, fix.satellites,
+            time_us, fix.latitude_deg, fix.longitude_deg, fix.altitude_m, fix.eph_m, fix.epv_m,
+            (fix.north_m_s, fix.east_m_s, fix.down_m_s), int(fix.fix_type), int(fix.satellites),
         )  # fmt: skip
         self._messages.append(encode_gps(gps, seq, *self._sender))
 

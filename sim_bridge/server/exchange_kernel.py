@@ -35,7 +35,8 @@ class Exchanges(NamedTuple):
     state_extra: int
     """CRC_EXTRA of the state."""
     sensor_extra: int
-    """CRC_EXTRA of HIL_SENSOR."""
+    """CRC_EXTRA of HIL_SENSOR; then that of HIL_GPS."""
+    gps_extra: int
     valid_flag: int
     """Flag of each state; then that of one that touches the ground."""
     contact_flag: int
@@ -88,6 +89,18 @@ def _write_sensors(e: Any, at: int, outbox: Any, frames: Any, wires: Any, news: 
 
 
 @compiled
+def _write_gps(e: Any, at: int, outbox: Any, frame: Any, payload: Any, time_us: int) -> int:
+    """Write HIL_GPS to the outbox, without the zeros at its end; return where it ends."""
+    size = len(payload)
+    while size > 1 and payload[size - 1] == 0:
+        size -= 1
+    copy_all(payload, frame[HEADER:])
+    size = seal(frame, time_us, size, e["gps_extra"])
+    copy_all(frame[:size], outbox[at:])
+    return at + size
+
+
+@compiled
 def _is_answer(line: Any, count: int, time_us: int, e: Any, shape: Any) -> bool:
     """Return True if the inbox has the answer to the state at ``time_us``, and nothing else."""
     inbox = line[2]
@@ -106,10 +119,10 @@ def serve_steps(
     """Receive up to ``count`` answers, the first to the state at ``time_us``; make a step after each, and send it.
 
     ``answer`` and ``state`` are frames, ``sensors`` the frames of HIL_SENSOR and the bytes of the measurements, of
-    which there are none without sensors.
+    which there are none without sensors, and the frame of HIL_GPS and its newest payload.
     """
     e, news = exchanges[0], world[4][0]
-    frames, wires = sensors
+    frames, wires, gps_frame, gps = sensors
     e["steps"], e["result"], e["size"] = 0, 0, 0
     for _ in range(count):
         size = receive_into(line)
@@ -127,6 +140,8 @@ def serve_steps(
         state[flags_at] = e["valid_flag"] | (e["contact_flag"] if e["result"] != 0 else 0)
         end = seal(state, time_us, e["state_size"], e["state_extra"])
         copy_all(state[:end], outbox)
+        if news["has_gnss"] != 0:
+            end = _write_gps(e, end, outbox, gps_frame, gps, time_us)
         end = _write_sensors(e, end, outbox, frames, wires, news, time_us)
         e["size"] = end
         if not send_from(line, e["outbox_at"], end):

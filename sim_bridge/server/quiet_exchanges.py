@@ -12,7 +12,7 @@ from flightstack.core.kernel_calls import as_bytes
 from flightstack.params.vehicle import Vehicle
 from flightstack.simulator_link.frame_kernels import SHAPE
 from flightstack.simulator_link.hot_frames import GROUND_CONTACT_FLAG, LOCKSTEP_FLAG, VALID_FLAG
-from flightstack.simulator_link.sensor_frames import ACCEL, BARO, GYRO, MAG, SENSOR_SHAPE
+from flightstack.simulator_link.sensor_frames import ACCEL, BARO, GPS_SHAPE, GYRO, MAG, SENSOR_SHAPE
 from flightstack.transports import compiled_socket
 from flightstack.transports.compiled_socket import CompiledSocket
 from sim_bridge import quiet_steps
@@ -65,14 +65,15 @@ class QuietExchanges:
         steps = self._steps = QuietSteps(simulator, link.actuators.rotor_speed_rad_s)
         state = simulator.frame
         self._record[0] = Exchanges(
-            self._outbox.ctypes.data, state.shape.size, state.shape.extra, SENSOR_SHAPE.extra, VALID_FLAG,
-            GROUND_CONTACT_FLAG, LOCKSTEP_FLAG, len(simulator.vehicle.rotors), simulator.interval_us,
+            self._outbox.ctypes.data, state.shape.size, state.shape.extra, SENSOR_SHAPE.extra, GPS_SHAPE.extra,
+            VALID_FLAG, GROUND_CONTACT_FLAG, LOCKSTEP_FLAG, len(simulator.vehicle.rotors), simulator.interval_us,
             int(ACCEL | GYRO), int(MAG), int(BARO), CONTACT, 0, 0, 0,
         )  # fmt: skip
         frames = (_NO_FRAME,) if sensors is None else tuple(map(as_bytes, sensors.raw_frames))
+        gps = _NO_FRAME if sensors is None else as_bytes(sensors.gps_frame), steps.gps
         self._arguments = (
             self._socket.arguments, self._record, as_bytes(link.actuators.frame),
-            np.array([link.actuators.shape], SHAPE), as_bytes(state.frame), (frames, steps.wires.view(np.uint8)),
+            np.array([link.actuators.shape], SHAPE), as_bytes(state.frame), (frames, steps.wires.view(np.uint8), *gps),
             self._outbox, steps.world,
         )  # fmt: skip
         self._serve = direct(serve_steps, *self._arguments, 0, 0)

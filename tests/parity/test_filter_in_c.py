@@ -54,5 +54,7 @@ def test_single_precision_follows_double_within_centimetres() -> None:
             settled = np.maximum(settled, difference)
     assert max(apart[:3]) < 0.04  # m; measured: 0.0195, in the step that fuses the first height
     assert max(apart[3:6]) < 0.01  # m/s; measured: 0.0038
-    assert max(apart[6:10]) < 1e-2  # measured: 4.3e-3, while one fuses the first fields a step later than the other
+    assert (
+        max(apart[6:10]) < 1e-2
+    )  # measured: 4.3e-3, while one fuses the first fields a step later than the other
     assert max(settled[6:10]) < 1e-3  # measured: 2.4e-4

@@ -11,9 +11,10 @@ from scipy.spatial.transform import Rotation
 from flightstack.core.contract import FloatArray, Vector3
 from flightstack.core.geodesy import GeoPoint, earth_field_ned_gauss
 from flightstack.mavlink.dialect import mavlink
+from flightstack.simulator_link.gps_kernels import FixRow
 from sim_bridge.plant.dimensions import foot_z_m, propeller_radius_m
 from sim_bridge.sensors.barometer import Barometer, pressure_altitude_m, standard_pressure_hpa
-from sim_bridge.sensors.gnss import Fix, GnssReceiver
+from sim_bridge.sensors.gnss import GnssReceiver
 from sim_bridge.sensors.magnetometer import Magnetometer
 from sim_bridge.sensors.noise import NormalStream
 from sim_bridge.sensors.optical_flow import OpticalFlow
@@ -21,6 +22,7 @@ from sim_bridge.sensors.rangefinder import Rangefinder
 from tests.support.sensor_vehicles import X_QUAD, state_at, with_sensors
 
 ROWS = 1_000
+HOME = GeoPoint(47.4, 8.5, 488.0)
 FIELD = Vector3(0.21, 0.01, 0.43)
 HIGH = state_at(position=(0.0, 0.0, -100.0))
 FOOT = foot_z_m(X_QUAD)
@@ -181,10 +183,19 @@ def test_drift_of_a_barometer_follows_the_time_between_its_samples() -> None:
 # ---------------------------------------------------------------------- GNSS
 
 
-def fixes(receiver: GnssReceiver, count: int, begin_us: int = 0) -> list[tuple[int, Fix]]:
+def receiver_of(grade: str = "ideal", **numbers: float) -> GnssReceiver:
+    """Return a receiver without latency, with other numbers."""
+    return GnssReceiver(with_sensors(grade, gnss={"latency_s": 0.0, **numbers}), 1, HOME)
+
+
+def fixes(receiver: GnssReceiver, count: int, begin_us: int = 0) -> list[tuple[int, FixRow]]:
     """Return the fixes of a receiver at rest, as (time, fix)."""
-    times_us = [begin_us + 100_000 * index for index in range(count)]
-    return [(time_us, receiver.measure(time_us, state_at())) for time_us in times_us]
+    found = []
+    for time_us in range(begin_us, begin_us + 100_000 * count, 100_000):
+        sent = receiver.receive(time_us, state_at())
+        assert sent is not None
+        found.append((time_us, FixRow(*sent.tolist())))
+    return found
 
 
 def test_gnss_errors_are_white_and_correlated_as_given() -> None:
@@ -193,10 +204,10 @@ def test_gnss_errors_are_white_and_correlated_as_given() -> None:
         "horizontal_noise_m": 0.3, "horizontal_drift_m": 0.5, "vertical_noise_m": 0.6, "vertical_drift_m": 0.8,
         "drift_time_s": 1.0, "velocity_noise_m_s": 0.05, "vertical_velocity_noise_m_s": 0.08,
     }  # fmt: skip
-    receiver = GnssReceiver(with_sensors(gnss=numbers), 1)
+    receiver = receiver_of(**numbers)
     out = np.empty((20_000, 6))
     for index in range(len(out)):
-        receiver.measure(index * 100_000, state_at())
+        receiver.receive(index * 100_000, state_at())
         out[index] = receiver.records[0]["out"]
     for axis, (white, drift) in enumerate([(0.3, 0.5), (0.3, 0.5), (0.6, 0.8)]):
         column = out[:, axis]
@@ -211,16 +222,29 @@ def test_gnss_errors_are_white_and_correlated_as_given() -> None:
     )
 
 
+@pytest.mark.parametrize("latency_s", [0.0, 0.06, 0.11, 0.35])
+def test_a_fix_is_sent_once_after_its_latency(latency_s: float) -> None:
+    """The state moves north by 1 m/s, so that a fix shows the time of its measurement."""
+    receiver, sent_us = receiver_of(latency_s=latency_s), []
+    for time_us in range(0, 1_000_001, 20_000):
+        sent = receiver.receive(time_us, state_at(velocity=(time_us * 1e-6, 0.0, 0.0)))
+        if sent is not None:
+            sent_us.append((time_us, round(FixRow(*sent.tolist()).north_m_s * 1e6)))
+    steps_us = 20_000 * math.ceil(latency_s * 50.0 - 1e-9)
+    expected = [(measured + steps_us, measured) for measured in range(0, 1_000_001 - steps_us, 100_000)]
+    assert sent_us == expected
+
+
 def test_gnss_states_the_standard_deviations_of_its_errors() -> None:
     numbers = {
         "horizontal_noise_m": 0.3, "horizontal_drift_m": 0.4, "vertical_noise_m": 0.6, "vertical_drift_m": 0.8,
     }  # fmt: skip
-    (_, fix), *_ = fixes(GnssReceiver(with_sensors(gnss=numbers), 1), 3)
+    (_, fix), *_ = fixes(receiver_of(**numbers), 3)
     assert (fix.eph_m, fix.epv_m) == (pytest.approx(math.sqrt(2.0) * 0.5), pytest.approx(1.0))
 
 
 def test_gnss_has_no_fix_before_its_first_one() -> None:
-    found = fixes(GnssReceiver(with_sensors(gnss={"first_fix_s": 1.0}), 1), 20)
+    found = fixes(receiver_of(first_fix_s=1.0), 20)
     kinds = [(time_us < 1_000_000, fix.fix_type) for time_us, fix in found]
     no_fix, fix_3d = mavlink.GPS_FIX_TYPE_NO_FIX, mavlink.GPS_FIX_TYPE_3D_FIX
     assert {kind for early, kind in kinds if early} == {no_fix}
@@ -228,7 +252,7 @@ def test_gnss_has_no_fix_before_its_first_one() -> None:
 
 
 def test_jammed_gnss_loses_satellites_accuracy_and_at_last_the_fix() -> None:
-    receiver = GnssReceiver(with_sensors("consumer"), 1)
+    receiver = receiver_of("consumer")
     _, clear = fixes(receiver, 40)[-1]
     receiver.jam(0.5)
     _, jammed = fixes(receiver, 40, begin_us=4_000_000)[-1]
