@@ -23,17 +23,28 @@ from sim_bridge.sensors.gnss import receive_gnss
 from sim_bridge.sensors.imu import measure_imu
 from sim_bridge.sensors.layout import IMU, MOTION
 from sim_bridge.sensors.magnetometer import Magnetometer, measure_mag
-from sim_bridge.sensors.suite import BARO_SLOT, GNSS_SLOT, MAG_SLOT, QUIET_SLOTS
+from sim_bridge.sensors.suite import BARO_SLOT, MAG_SLOT
 from sim_bridge.simulator import Simulator
-from sim_bridge.step_kernel import BARO, GNSS, MAG, STEP_CALLS, StepCalls, simulate
+from sim_bridge.step_kernel import BARO, MAG, STEP_CALLS, StepCalls, simulate
 
-assert (MAG_SLOT, BARO_SLOT, GNSS_SLOT) == (MAG, BARO, GNSS)
+assert (MAG_SLOT, BARO_SLOT) == (MAG, BARO)
 _NO_BYTES = np.zeros(0, np.uint8)
-_NO_TIMES = np.zeros(0, np.int64)
 _NO_SENSOR: tuple[Any, ...] = (_NO_BYTES, np.zeros(3), np.zeros((0, 0)), np.zeros(1, np.int64))
+_NO_TIMES, _NO_FIX = np.full(1, NEVER_US), np.zeros(0)
 _NO_RECEIVER: tuple[Any, ...] = (
-    _NO_BYTES, _NO_TIMES, _NO_TIMES, np.zeros((0, 0)), _NO_TIMES, *(np.zeros(0),) * 2, np.zeros((0, 0)), _NO_TIMES
-)  # fmt: skip
+    (
+        _NO_BYTES,
+        *(_NO_TIMES,) * 3,
+        np.zeros((0, 0)),
+        _NO_TIMES,
+        _NO_FIX,
+        _NO_FIX,
+        np.zeros((0, 0)),
+        _NO_TIMES,
+    ),
+    _NO_TIMES,
+    _NO_FIX,
+)
 
 
 def compiles(simulator: Simulator) -> bool:
@@ -97,13 +108,13 @@ class QuietSteps:
     def _slow(self) -> tuple[Any, ...]:
         sensors, parts = self._sensors, self.values.view(HIL_VALUES)
         if sensors is None:
-            never_us, current_a = np.full(QUIET_SLOTS, NEVER_US), np.zeros(1)
-            periods_us, receiver = np.ones(QUIET_SLOTS, np.int64), (_NO_RECEIVER, self.gps)
-            return never_us, periods_us, parts, (*_NO_SENSOR, current_a), _NO_SENSOR, receiver
+            never_us, current_a = np.full(2, NEVER_US), np.zeros(1)
+            mag, gnss = (*_NO_SENSOR, current_a), (*_NO_RECEIVER, self.gps)
+            return never_us, np.ones(2, np.int64), parts, mag, _NO_SENSOR, gnss
         mag, gnss = (*_sensor(sensors.mag), self._plant.currents_a), _NO_RECEIVER
-        if sensors.gnss is not None:
-            gnss = as_bytes(sensors.gnss.records), *sensors.gnss.arguments[1:]
-        return sensors.due_us, sensors.period_us, parts, mag, _sensor(sensors.baro), (gnss, self.gps)
+        if (receiver := sensors.gnss) is not None:
+            gnss = (as_bytes(receiver.records), *receiver.arguments[1:]), receiver.due_us, receiver.sent
+        return sensors.due_us, sensors.period_us, parts, mag, _sensor(sensors.baro), (*gnss, self.gps)
 
     def _addresses(self, sensing: tuple[Any, ...]) -> RecordArray:
         plant, frame, sensors = self._plant, self._simulator.frame, self._sensors

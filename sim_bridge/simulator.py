@@ -119,7 +119,7 @@ class Simulator:
     def outgoing(self) -> bytes | memoryview:
         """Return the bytes to send for the present state, valid until the next call of ``apply``.
 
-        FS_PLANT_STATE, preceded by BATTERY_STATUS ten times a second and followed by the messages of the sensors.
+        FS_PLANT_STATE, preceded by BATTERY_STATUS twice a second and followed by the messages of the sensors.
         ``state:drop`` drops FS_PLANT_STATE.
         """
         truth = self._outgoing_truth()

@@ -17,7 +17,7 @@ from flightstack.core.periods import take_due
 from flightstack.core.record_types import dtype_of
 from flightstack.simulator_link.gps_kernels import write_gps
 
-MAG, BARO, GNSS = 0, 1, 2
+MAG, BARO = 0, 1
 """Sensors by the index of their times."""
 
 
@@ -65,12 +65,10 @@ def _measure_slow(
         values = parts[0]
         values["pressure_hpa"], values["altitude_m"], values["temperature_c"] = out[0], out[1], out[2]
         news["has_baro"] = 1
-    if time_us >= due_us[GNSS]:
-        receiver, payload = gnss
-        if call_kernel_int(calls["receive_gnss"], (receiver, time_us, state)) != 0:
-            write_gps(payload, time_us, receiver[5])
-            news["has_gnss"] = 1
-        due_us[GNSS] = receiver[1][0]
+    receiver, fix_due_us, fix, payload = gnss
+    if time_us >= fix_due_us[0] and call_kernel_int(calls["receive_gnss"], (receiver, time_us, state)) != 0:
+        write_gps(payload, time_us, fix)
+        news["has_gnss"] = 1
 
 
 @compiled

@@ -93,7 +93,7 @@ def _gps_size(inbox: Any, at: int, end: int, bits: Any, shape: Any) -> int:
     size = frame_size(inbox, at, end, shape) - _FRAME
     if size < 0:
         return 0
-    is_other = size > GPS_NUMBER_AT and inbox[at + HEADER + GPS_NUMBER_AT] != 0
+    is_other = size > GPS_NUMBER_AT and read_bytes(inbox, at + HEADER + GPS_NUMBER_AT, 1) != 0
     return -1 if is_other or not bits["takes_fixes"] else size
 
 

@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 from flightstack.core.contract import FloatArray
 from flightstack.process.assembly import Stack
 from flightstack.process.connections import SimulatorPace
-from flightstack.process.quiet_block import QuietBlock, compiles, estimators_of
+from flightstack.process.quiet_block import QuietBlock, compiles
 from flightstack.process.quiet_exchange import ExchangedSteps
+from flightstack.process.quiet_sensors import estimators_of
 from flightstack.transports import compiled_socket
 from flightstack.transports.tcp import LinkClosedError, TcpClient
 from flightstack.vehicle.autopilot import Lockstep

@@ -11,7 +11,8 @@ from flightstack.core.kernel_calls import address_of, as_bytes
 from flightstack.params.config import TRUTH, StackConfig
 from flightstack.process.assembly import Stack, build
 from flightstack.process.exchange_kernel import EXCHANGE, Exchange, exchange
-from flightstack.process.quiet_block import QuietBlock, compiles, estimators_of
+from flightstack.process.quiet_block import QuietBlock, compiles
+from flightstack.process.quiet_sensors import estimators_of
 from flightstack.simulator_link.frame_kernels import SENSOR_NEWS, SHAPE
 from flightstack.simulator_link.gps_kernels import GPS_SIZE
 from flightstack.simulator_link.sensor_frames import (

@@ -83,4 +83,6 @@ def read_gps(payload: Any, row: FloatArray) -> None:
     place = _signed(payload, 8, 4) * 1e-7, _signed(payload, 12, 4) * 1e-7, _signed(payload, 16, 4) * 1e-3
     velocity = _signed(payload, 26, 2) * 0.01, _signed(payload, 28, 2) * 0.01, _signed(payload, 30, 2) * 0.01
     accuracy = _accuracy(payload, 20), _accuracy(payload, 22)
-    store(row, place + accuracy + velocity + (float(payload[34]), float(payload[35])))  # noqa: RUF005  # Numba
+    store(
+        row, place + accuracy + velocity + (float(payload[34]), float(payload[35]))
+    )  # Numba knows no other form

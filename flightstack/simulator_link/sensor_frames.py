@@ -21,6 +21,7 @@ from flightstack.mavlink.fields import int16, int32, whole
 from flightstack.mavlink.frames import CHECKSUM_SIZE, HEADER, HEADER_V2, MAGIC_V2, checksum, pack_frame
 from flightstack.mavlink.link import Message
 from flightstack.simulator_link.frame_kernels import FIELDS_AT, Shape
+from flightstack.simulator_link.gps_kernels import FixRow
 
 HIL_SENSOR_ID: int = mavlink.MAVLINK_MSG_ID_HIL_SENSOR
 HIL_GPS_ID: int = mavlink.MAVLINK_MSG_ID_HIL_GPS
@@ -198,6 +199,12 @@ _GPS_MESSAGE = HIL_GPS_ID.to_bytes(3, "little")
 GPS_SHAPE = Shape(_GPS.size, _GPS_EXTRA, *_GPS_MESSAGE)
 """HIL_GPS for compiled code."""
 UNKNOWN = 0xFFFF
+
+
+def gps_message(time_us: int, fix: FixRow) -> HilGps:
+    """Return the message with a fix of the first receiver."""
+    velocity_ned_m_s = fix.north_m_s, fix.east_m_s, fix.down_m_s
+    return HilGps(time_us, *fix[:5], velocity_ned_m_s, int(fix.fix_type), int(fix.satellites))
 
 
 def encode_gps(gps: HilGps, seq: int, system_id: int, component_id: int) -> bytes:

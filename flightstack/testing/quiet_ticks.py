@@ -7,7 +7,8 @@ three quarters of an inner tick. If all parts are compiled, one kernel runs a bl
 from __future__ import annotations
 
 from flightstack.process.assembly import Stack
-from flightstack.process.quiet_block import QuietBlock, compiles, estimators_of
+from flightstack.process.quiet_block import QuietBlock, compiles
+from flightstack.process.quiet_sensors import estimators_of
 from flightstack.simulator_link.hot_frames import VALID_FLAG, ActuatorsFrame
 from flightstack.vehicle.autopilot import Lockstep
 from flightstack.vehicle.quiet_kernel import LARGEST_RESULT

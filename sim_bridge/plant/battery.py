@@ -20,7 +20,7 @@ from flightstack.mavlink.fields import int16, int32, whole
 from flightstack.params.battery import Battery
 from flightstack.simulator_link.battery_frame import EXTRA_PLACES, PLACES, UNUSED_CELL, BatteryReport
 
-INTERVAL_US = 100_000
+INTERVAL_US = 500_000
 """Simulated time between two reports."""
 
 

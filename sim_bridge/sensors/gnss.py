@@ -66,17 +66,18 @@ def _fix(gnss: Record, time_us: int, place: FloatArray) -> FixRow:
 def receive_gnss(receiver: Any, time_us: int, state: FloatArray) -> int:
     """Measure if it is due; return 1 if a fix is sent at ``time_us``, the newest whose latency is over, in ``sent``.
 
-    ``receiver`` are the arguments of ``GnssReceiver``. ``times_us`` has the time of the next call, that of the next
-    measurement, period and latency.
+    ``receiver`` are the arguments of ``GnssReceiver``; ``times_us`` has the time of the next measurement, period and
+    latency. The next call is due at ``due_us``.
     """
-    gnss_array, times_us, waiting_us, waiting, count, sent, place, noise, cursor = receiver
+    gnss_array, due_us, times_us, waiting_us, waiting, count, sent, place, noise, cursor = receiver
     gnss = gnss_array[0]
-    if time_us >= times_us[1]:
-        times_us[1] = (time_us // times_us[2] + 1) * times_us[2]
+    next_us, period_us, latency_us = times_us[0], times_us[1], times_us[2]
+    if time_us >= next_us:
+        next_us = times_us[0] = (time_us // period_us + 1) * period_us
         at = cursor[0]
         cursor[0] = at + 1
         _measure(gnss, time_us, state, noise[at])
-        waiting_us[count[0]] = time_us + times_us[3]
+        waiting_us[count[0]] = time_us + latency_us
         store(waiting[count[0]], _fix(gnss, time_us, place))
         count[0] += 1
     over = 0
@@ -88,7 +89,7 @@ def receive_gnss(receiver: Any, time_us: int, state: FloatArray) -> int:
         for i in range(count[0]):
             waiting_us[i] = waiting_us[over + i]
             copy_all(waiting[over + i], waiting[i])
-    times_us[0] = min(times_us[1], waiting_us[0] if count[0] > 0 else NEVER_US)
+    due_us[0] = min(next_us, waiting_us[0] if count[0] > 0 else NEVER_US)
     return 1 if over > 0 else 0
 
 
@@ -114,15 +115,16 @@ class GnssReceiver:
         )
         self.noise = noise
         """Its deviates."""
-        self.times_us = np.array([0, 0, period_us, latency_us])
-        """Time of the next measurement or fix, then those of ``receive_gnss``."""
+        self.due_us = np.zeros(1, np.int64)
+        """Time of the next measurement or fix."""
+        self._times_us = np.array([0, period_us, latency_us])
         self._count = np.zeros(1, np.int64)
         most = latency_us // period_us + 2
         self.sent: FloatArray = np.zeros(FIX_SIZE)
         """The newest fix that was sent."""
         self.arguments: tuple[Any, ...] = (
-            self.records, self.times_us, np.zeros(most, np.int64), np.zeros((most, FIX_SIZE)), self._count, self.sent,
-            np.array((*home, *LocalFrame(home).scales)), noise.block, noise.cursor,
+            self.records, self.due_us, self._times_us, np.zeros(most, np.int64), np.zeros((most, FIX_SIZE)),
+            self._count, self.sent, np.array((*home, *LocalFrame(home).scales)), noise.block, noise.cursor,
         )  # fmt: skip
         """Of ``receive_gnss``."""
         self._call = receive_gnss
@@ -148,4 +150,4 @@ class GnssReceiver:
 
     def restart(self) -> None:
         """Drop the fixes that wait, and measure next at once."""
-        self._count[0] = self.times_us[0] = self.times_us[1] = 0
+        self._count[0] = self.due_us[0] = self._times_us[0] = 0

@@ -10,6 +10,9 @@ import numpy as np
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Quaternion, Record, RecordArray, Vector3
 from flightstack.core.geometry import rotate
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.fields import whole
+from flightstack.mavlink.link import Message
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.sensors.layout import RANGE, write_ground, write_numbers
@@ -17,6 +20,7 @@ from sim_bridge.sensors.noise import NormalStream, quantised, with_fault
 
 _LEAST_COSINE = 0.5
 _LEVEL = PlantOptions()
+_UNKNOWN_VARIANCE = 255
 
 
 @compiled
@@ -63,3 +67,18 @@ class Rangefinder:
         """Measure at a state."""
         measure_range(self.records, state, self._noise.row())
         return self.out
+
+
+def distance_message(sensor: Record, time_us: int, distance_m: float, quality: float) -> Message:
+    """Return DISTANCE_SENSOR with a measurement; ``sensor`` is the record of the rangefinder."""
+    return mavlink.MAVLink_distance_sensor_message(
+        time_us // 1000,
+        whole(float(sensor["min_m"]) * 100.0, 0, 65535),
+        whole(float(sensor["max_m"]) * 100.0, 0, 65535),
+        whole(distance_m * 100.0, 0, 65535),
+        mavlink.MAV_DISTANCE_SENSOR_LASER,
+        0,
+        mavlink.MAV_SENSOR_ROTATION_PITCH_270,
+        _UNKNOWN_VARIANCE,
+        signal_quality=100 if quality > 0.0 else 1,
+    )

@@ -24,7 +24,6 @@ from flightstack.core.geodesy import GeoPoint, earth_field_ned_gauss
 from flightstack.core.periods import next_due
 from flightstack.core.portable_math import sin_cos
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.fields import whole
 from flightstack.mavlink.link import Link, Message
 from flightstack.params.vehicle import Vehicle
 from flightstack.simulator_link.gps_kernels import FixRow
@@ -34,11 +33,11 @@ from flightstack.simulator_link.sensor_frames import (
     BARO,
     GYRO,
     MAG,
-    HilGps,
     HilMeasurement,
     HilSensorFrame,
     encode_gps,
     gps_buffer,
+    gps_message,
 )
 from sim_bridge.plant.faults.table import Fault, Kind
 from sim_bridge.plant.plant import Plant, PlantOptions
@@ -48,19 +47,23 @@ from sim_bridge.sensors.gnss import GnssReceiver
 from sim_bridge.sensors.imu import ImuSet
 from sim_bridge.sensors.magnetometer import Magnetometer
 from sim_bridge.sensors.optical_flow import OpticalFlow
-from sim_bridge.sensors.rangefinder import Rangefinder
+from sim_bridge.sensors.rangefinder import Rangefinder, distance_message
 
 _DEGREE = math.pi / 180.0
 _IMU = ACCEL | GYRO
-MAG_SLOT, BARO_SLOT, GNSS_SLOT, QUIET_SLOTS, SLOTS = 0, 1, 2, 3, 5
+MAG_SLOT, BARO_SLOT, QUIET_SLOTS, SLOTS = 0, 1, 2, 4
 """Sensors by their index in ``due_us``, first those that quiet ticks measure as well, and its length."""
-_UNKNOWN_VARIANCE = 255
 
 
 class _Sensor(NamedTuple):
-    """A sensor with a rate of its own; ``measure`` returns the output, ``send`` puts it into a message."""
+    """A sensor with a rate of its own; ``measure`` returns the output, ``send`` puts it into a message.
 
-    slot: int
+    One that ``is_quiet`` is measured by quiet ticks as well. ``due_us`` is the time of the next call of ``measure``,
+    which a sensor that returns None at times sets itself.
+    """
+
+    is_quiet: bool
+    due_us: memoryview
     period_us: int
     channel: Channel
     measure: Callable[[int], Any]
@@ -113,7 +116,7 @@ class SensorSuite:
         self.due_us = np.full(SLOTS, NEVER_US, np.int64)
         """Time of the next measurement of each sensor that is not inertial; never for one that is missing."""
         self.period_us = np.full(SLOTS, NEVER_US, np.int64)
-        self._due_us = self.due_us.data  # a number of an array takes four times as long to read
+        self._due_us = self.due_us.data
         self._add_slow_sensors(vehicle, home, options)
         self._next_us = self._next_other_us = 0
 
@@ -132,13 +135,15 @@ class SensorSuite:
             self._add(BARO_SLOT, "baro", baro.records, partial(self._measure_baro, baro), self._send_baro)
         if "gnss" in numbers:
             gnss = self.gnss = GnssReceiver(vehicle, seed, home)
-            self._add(GNSS_SLOT, "gnss", gnss.records, partial(self._receive_gnss, gnss), self._send_fix)
+            self._channels["gnss", 0] = channel = Channel(("gnss", 0), seed, gnss.records)
+            receive = partial(self._receive_gnss, gnss)
+            self._sensors.append(_Sensor(True, gnss.due_us.data, 1, channel, receive, self._send_fix))
         if "range" in numbers:
             self.range = Rangefinder(vehicle, options)
-            self._add(3, "range", self.range.records, self._measure_range, self._send_range)
+            self._add(2, "range", self.range.records, self._measure_range, self._send_range)
         if "flow" in numbers:
             self.flow = OpticalFlow(vehicle, options)
-            self._add(4, "flow", self.flow.records, self._measure_flow, self._send_flow)
+            self._add(3, "flow", self.flow.records, self._measure_flow, self._send_flow)
 
     def _add(
         self,
@@ -152,7 +157,8 @@ class SensorSuite:
         self._channels[name, 0] = channel
         period_us = round(1e6 / float(records[0]["rate_hz"]))
         self.due_us[slot], self.period_us[slot] = 0, period_us
-        self._sensors.append(_Sensor(slot, period_us, channel, measure, send))
+        due_us = self.due_us[slot : slot + 1].data  # a number of an array takes four times as long to read
+        self._sensors.append(_Sensor(slot < QUIET_SLOTS, due_us, period_us, channel, measure, send))
 
     def set_interval_us(self, interval_us: int) -> None:
         """Set the time between two exchanges."""
@@ -194,7 +200,6 @@ class SensorSuite:
             sensor.measure(time_us)
         if self.gnss is not None:
             self.gnss.restart()
-            self._due_us[GNSS_SLOT] = 0
 
     def measure(self, time_us: int) -> None:
         """Measure the present state, at the simulated time."""
@@ -222,7 +227,7 @@ class SensorSuite:
         self.imus.take_rows(count)
         self._fields[:] = self._all_imus
         self._fields[0] |= fields
-        self._next_us = min(*self._due_us[:QUIET_SLOTS], self._next_other_us)
+        self._next_us = min(*self._due_us[:QUIET_SLOTS], self.next_fix_us, self._next_other_us)
 
     @property
     def raw_frames(self) -> list[memoryview]:
@@ -260,7 +265,7 @@ class SensorSuite:
     @property
     def next_fix_us(self) -> int:
         """Time of the next measurement or message of the GNSS receiver."""
-        return int(self._due_us[GNSS_SLOT])
+        return NEVER_US if self.gnss is None else int(self.gnss.due_us[0])
 
     @property
     def measurements(self) -> Sequence[HilMeasurement]:
@@ -294,11 +299,10 @@ class SensorSuite:
 
     def _measure_slow(self, time_us: int) -> None:
         next_us = next_other_us = NEVER_US
-        due_us = self._due_us
-        for slot, period_us, channel, measure, send in self._sensors:
+        for is_quiet, due_us, period_us, channel, measure, send in self._sensors:
             out, is_direct = None, channel.is_direct
-            if time_us >= due_us[slot]:
-                due_us[slot] = next_due(time_us, period_us)
+            if time_us >= due_us[0]:
+                due_us[0] = next_due(time_us, period_us)
                 out = measure(time_us)
                 if not is_direct:
                     out = channel.due(time_us) if out is None else channel.pass_on(time_us, out.copy())
@@ -306,9 +310,9 @@ class SensorSuite:
                 out = channel.due(time_us)
             if out is not None:
                 send(time_us, out)
-            sensor_us = due_us[slot] if is_direct else min(due_us[slot], channel.next_due_us)
+            sensor_us = due_us[0] if is_direct else min(due_us[0], channel.next_due_us)
             next_us = min(next_us, sensor_us)
-            if slot >= QUIET_SLOTS or not is_direct:
+            if not (is_quiet and is_direct):
                 next_other_us = min(next_other_us, sensor_us)
         self._next_us, self._next_other_us = next_us, next_other_us
 
@@ -329,39 +333,18 @@ class SensorSuite:
         self._fields[0] |= BARO
 
     def _receive_gnss(self, receiver: GnssReceiver, time_us: int) -> FloatArray | None:
-        """Return the fix that is sent now; the receiver tells when it has the next measurement or fix."""
-        fix = receiver.receive(time_us, self._truth.state)
-        self._due_us[GNSS_SLOT] = int(receiver.times_us[0])
-        return fix
+        return receiver.receive(time_us, self._truth.state)
 
     def _send_fix(self, time_us: int, out: FloatArray) -> None:
-        fix = FixRow(*out.tolist())
         seq = self.gps_frame[4] = (self.gps_frame[4] + 1) & 255
-        gps = HilGps(
-            time_us, fix.latitude_deg, fix.longitude_deg, fix.altitude_m, fix.eph_m, fix.epv_m,
-            (fix.north_m_s, fix.east_m_s, fix.down_m_s), int(fix.fix_type), int(fix.satellites),
-        )  # fmt: skip
-        self._messages.append(encode_gps(gps, seq, *self._sender))
+        self._messages.append(encode_gps(gps_message(time_us, FixRow(*out.tolist())), seq, *self._sender))
 
     def _measure_range(self, _time_us: int) -> FloatArray:
         return self.range.measure(self._truth.state)
 
     def _send_range(self, time_us: int, out: FloatArray) -> None:
-        self._messages.append(self._link.encode(self._distance_message(time_us, *out.tolist())))
-
-    def _distance_message(self, time_us: int, distance_m: float, quality: float) -> Message:
-        sensor = self.range.records[0]
-        return mavlink.MAVLink_distance_sensor_message(
-            time_us // 1000,
-            whole(float(sensor["min_m"]) * 100.0, 0, 65535),
-            whole(float(sensor["max_m"]) * 100.0, 0, 65535),
-            whole(distance_m * 100.0, 0, 65535),
-            mavlink.MAV_DISTANCE_SENSOR_LASER,
-            0,
-            mavlink.MAV_SENSOR_ROTATION_PITCH_270,
-            _UNKNOWN_VARIANCE,
-            signal_quality=100 if quality > 0.0 else 1,
-        )
+        message = distance_message(self.range.records[0], time_us, *out.tolist())
+        self._messages.append(self._link.encode(message))
 
     def _measure_flow(self, _time_us: int) -> FloatArray:
         return self.flow.measure(self._truth.state)

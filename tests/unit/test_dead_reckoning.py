@@ -66,6 +66,7 @@ def still(seconds: float, params: EstimatorParams, gyro_bias: float = 0.0, accel
         clock=np.zeros(2),
         behind=np.zeros(BEHIND_SIZE),
         turn=np.zeros(3),
+        drag=np.zeros(2),
         covariance=np.zeros((ERROR_STATES, ERROR_STATES)),
         observations=np.zeros(OBSERVATIONS, dtype_of(Observed)),
     )

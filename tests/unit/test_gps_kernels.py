@@ -19,7 +19,13 @@ from flightstack.simulator_link.gps_kernels import (
     read_gps,
     write_gps,
 )
-from flightstack.simulator_link.sensor_frames import GPS_SHAPE, HilGps, decode_gps, encode_gps, gps_buffer
+from flightstack.simulator_link.sensor_frames import (
+    GPS_SHAPE,
+    decode_gps,
+    encode_gps,
+    gps_buffer,
+    gps_message,
+)
 
 HOMES = (GeoPoint(47.4, 8.5, 488.0), GeoPoint(-16.8, 179.99, 3.0), GeoPoint(89.0, -179.99, -50.0))
 
@@ -41,23 +47,18 @@ def fixes() -> list[FixRow]:
     ]
 
 
-def message_of(fix: FixRow, time_us: int) -> HilGps:
-    place, speed = fix[:3], (fix.north_m_s, fix.east_m_s, fix.down_m_s)
-    return HilGps(time_us, *place, fix.eph_m, fix.epv_m, speed, int(fix.fix_type), int(fix.satellites))
-
-
 @pytest.mark.parametrize("compile_them", [True, False])
 def test_payload_and_values_are_those_of_the_frames(compile_them: bool) -> None:
     write, read = (write_gps, read_gps) if compile_them else (plain(write_gps), plain(read_gps))
     for number, fix in enumerate(fixes()):
         payload, row = np.full(GPS_SIZE, 7, np.uint8), np.zeros(FIX_SIZE)
         write(payload, 1000 * number, np.array(fix))
-        frame = encode_gps(message_of(fix, 1000 * number), 0, 1, 1)
+        frame = encode_gps(gps_message(1000 * number, fix), 0, 1, 1)
         assert payload.tobytes().rstrip(b"\x00") == frame[HEADER_V2:-CHECKSUM_SIZE].rstrip(b"\x00")
         read(payload, row)
         decoded = decode_gps(frame)
         assert decoded is not None
-        assert message_of(FixRow(*row.tolist()), 1000 * number) == decoded
+        assert gps_message(1000 * number, FixRow(*row.tolist())) == decoded
 
 
 def test_unknown_accuracies_are_read_as_such() -> None:
@@ -70,7 +71,7 @@ def test_unknown_accuracies_are_read_as_such() -> None:
 
 
 def test_buffer_and_shape_are_those_of_the_message() -> None:
-    buffer, frame = gps_buffer(3, 51), encode_gps(message_of(fixes()[0], 5)._replace(number=1), 255, 3, 51)
+    buffer, frame = gps_buffer(3, 51), encode_gps(gps_message(5, fixes()[0])._replace(number=1), 255, 3, 51)
     assert buffer[2:HEADER_V2] == frame[2:HEADER_V2]
     assert len(buffer) == HEADER_V2 + GPS_SHAPE.size + CHECKSUM_SIZE
     assert frame[HEADER_V2 + GPS_NUMBER_AT] == 1

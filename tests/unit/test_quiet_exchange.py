@@ -17,12 +17,13 @@ import pytest
 from flightstack.core.compiled import IS_DISABLED
 from flightstack.core.geodesy import GeoPoint
 from flightstack.mavlink.dialect import FS_PLANT_STATE_ID, mavlink
+from flightstack.mavlink.frames import CHECKSUM_SIZE, HEADER_V2, FrameFinder
 from flightstack.mavlink.link import Link
 from flightstack.params.vehicle import load_vehicle
 from flightstack.process.exchange_kernel import exchange
 from flightstack.process.quiet_exchange import ExchangedSteps
 from flightstack.simulator_link.hot_frames import LOCKSTEP_FLAG, ActuatorsFrame
-from flightstack.simulator_link.sensor_frames import BARO, HIL_SENSOR_ID, MAG
+from flightstack.simulator_link.sensor_frames import BARO, HIL_GPS_ID, HIL_SENSOR_ID, MAG
 from flightstack.testing import World
 from flightstack.transports.compiled_socket import IS_AVAILABLE
 from flightstack.transports.tcp import wait_in_kernel
@@ -94,12 +95,12 @@ def worlds(tmp_path: Any) -> dict[str, dict[str, Any]]:
 def test_quiet_states_are_taken_and_answered(kind: str, tmp_path: Any, sockets: Any) -> None:
     ours, others = sockets
     with World(make_engine=BytesEngine, **worlds(tmp_path)[kind]) as world:
-        world.run_for(0.5)
+        world.run_for(1.5)  # to an origin: fixes are taken
         vehicle, quiet, news = Vehicle(world, ours), 0, set()
         for _ in range(120):
             data = vehicle.next_state()
             others.send(data)
-            is_plain = ids_of(data) <= {FS_PLANT_STATE_ID, HIL_SENSOR_ID}
+            is_plain = ids_of(data) <= {FS_PLANT_STATE_ID, HIL_SENSOR_ID, HIL_GPS_ID}
             assert vehicle.exchange() == (0 if is_plain else -1)
             (answer,) = messages(others)
             expected = ActuatorsFrame()
@@ -118,16 +119,42 @@ def test_quiet_states_are_taken_and_answered(kind: str, tmp_path: Any, sockets: 
                 assert vehicle.steps.wires.tobytes() == b"".join(wire.tobytes() for wire in sensors.imu_wires)
                 assert vehicle.steps.values.tobytes() == sensors.values.tobytes()
                 fields = sensors.measurements[0].fields
-                has_mag, has_baro = vehicle.steps.news[0].item()
+                has_mag, has_baro, has_gnss = vehicle.steps.news[0].item()
                 assert (has_mag, has_baro) == (fields & MAG == MAG, fields & BARO == BARO)
+                assert has_gnss == (HIL_GPS_ID in ids_of(data))
+                if has_gnss:
+                    assert vehicle.steps.gps.tobytes().rstrip(b"\x00") == gps_payload(data)
         assert quiet > 100
-        assert len(news) == (1 if kind == "truth" else 3)
+        assert len(news) == (1 if kind == "truth" else 4)
         assert len(vehicle.steps.took_ns) == 120
 
 
 def ids_of(data: bytes) -> set[int]:
     """The ids of the messages in ``data``."""
     return {message.get_msgId() for message in Link(1, 200).decode(data)}
+
+
+def test_a_fix_before_the_origin_is_left_to_python(sockets: Any) -> None:
+    """Which decides whether it is good enough to start from."""
+    ours, others = sockets
+    with World(make_engine=BytesEngine) as world:
+        world.run_for(0.5)
+        vehicle = Vehicle(world, ours)
+        taken = {}
+        for _ in range(60):
+            data = vehicle.next_state()
+            others.send(data)
+            has_fix = HIL_GPS_ID in ids_of(data)
+            taken.setdefault(has_fix, set()).add(vehicle.exchange() == 0)
+            vehicle.steps.socket.clear()
+            messages(others)
+        assert taken == {True: {False}, False: {True}}
+
+
+def gps_payload(data: bytes) -> bytes:
+    """The payload of HIL_GPS in ``data``."""
+    (frame,) = (bytes(one) for one in FrameFinder().find(memoryview(data)) if one[7] == HIL_GPS_ID)
+    return frame[HEADER_V2:-CHECKSUM_SIZE]
 
 
 def altered(data: bytes, how: str) -> bytes:

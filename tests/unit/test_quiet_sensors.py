@@ -11,11 +11,13 @@ from flightstack.core.compiled import IS_DISABLED, plain
 from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.kernel_calls import as_bytes
+from flightstack.estimation.sensor_feed import SlowSamples
 from flightstack.flight_log.sensor_rows import store_global
 from flightstack.params.config import StackConfig
 from flightstack.process.assembly import build
-from flightstack.process.quiet_block import QuietSensors
+from flightstack.process.quiet_sensors import QuietSensors
 from flightstack.simulator_link.frame_kernels import SENSOR_NEWS
+from flightstack.simulator_link.gps_kernels import GPS_SIZE
 from flightstack.simulator_link.sensor_frames import HIL_VALUES, VALUES
 from flightstack.vehicle.slow_kernel import take_slow
 
@@ -26,14 +28,15 @@ def test_a_sample_is_kept_when_later_messages_lack_it() -> None:
     stack = build(StackConfig(), lambda: None)
     assert stack.estimation is not None
     values, news = np.zeros(VALUES, np.float32), np.zeros(1, SENSOR_NEWS)
-    sensors, parts = QuietSensors(stack, values, news), values.view(HIL_VALUES)
+    sensors = QuietSensors(stack, values, news, np.zeros(GPS_SIZE, np.uint8))
+    parts = values.view(HIL_VALUES)
     filters = tuple(as_bytes(each.memory) for each in stack.estimation.estimators)
     following = sensors.following()
     parts["mag_gauss"], parts["pressure_hpa"] = (0.2, 0.1, 0.4), 955.5
     parts["altitude_m"], parts["temperature_c"] = 488.0, 15.0
-    news[0] = 1, 1
+    news[0] = 1, 1, 0
     take_slow(sensors.push, sensors.constant, 10_000, filters, following)
-    values[:], news[0] = -1.0, (0, 0)
+    values[:], news[0] = -1.0, (0, 0, 0)
     take_slow(sensors.push, sensors.constant, 12_000, filters, following)
     sensors.pass_by(12_000, 2000)
     mag, baro = stack.estimation.samples.mag, stack.estimation.samples.baro
@@ -60,5 +63,5 @@ def test_a_health_that_is_due_in_a_tick_with_a_reset_is_updated_in_it() -> None:
     assert not math.isfinite(estimation.health.imu_age_s)
     estimation.estimator.memory["resets"][0]["position"]["number"] = 1.0
     due_us = estimation.begin_watch()[0]
-    estimation.pass_by(120_000, 2000, None, None, due_us)
+    estimation.pass_by(120_000, 2000, SlowSamples(), due_us)
     assert estimation.begin_watch()[0] == 150_000
