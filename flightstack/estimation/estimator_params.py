@@ -28,7 +28,7 @@ class EstimatorParams(NamedTuple):
     body_field_walk: float = estimator_default("body_field_walk")  # gauss/√s
     wind_walk: float = estimator_default("wind_walk")  # m/s/√s
     baro_walk: float = 0.015  # m/√s
-    baro_dynamic_share: float = 0.015
+    baro_dynamic_share: float = 0.025
     """Share of the dynamic pressure that the barometer feels, 1σ."""
     gyro_range_rad_s: float = estimator_default("gyro_range_rad_s")
     accel_range_m_s2: float = estimator_default("accel_range_m_s2")

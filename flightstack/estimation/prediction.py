@@ -173,14 +173,15 @@ def _keep_misaligned(p: Covariance, at: int, axis: Vector3, params: EstimatorPar
 def _keep_inclined(f: Filter, force: Vector3, dt_s: float, params: EstimatorParams) -> None:
     """Keep the accelerometer's vertical bias as uncertain as the alignment of its axes leaves it.
 
-    Drag along the body shows in a vertical axis that is off by e, as a bias of e times its mean. ``force`` is the
-    velocity change in the body frame.
+    Drag d along the body shows in a vertical axis that is off by e as a bias of d e. A filter that learns it holds it
+    for the sensor's own, so that the variance stays that of both: 2 (d e)², with the mean drag of the last T. ``force``
+    is the velocity change in the body frame.
     """
     p, drag, share = f.covariance, f.drag, min(dt_s / _REMEMBERED_S, 1.0)
     drag[0] += force.x / _REMEMBERED_S - share * drag[0]
     drag[1] += force.y / _REMEMBERED_S - share * drag[1]
     square = params.gyro_scale_error * params.gyro_scale_error * (drag[0] * drag[0] + drag[1] * drag[1])
-    p[ACCEL_BIAS + 2, ACCEL_BIAS + 2] = max(p[ACCEL_BIAS + 2, ACCEL_BIAS + 2], square)
+    p[ACCEL_BIAS + 2, ACCEL_BIAS + 2] = max(p[ACCEL_BIAS + 2, ACCEL_BIAS + 2], 2.0 * square)
 
 
 @compiled

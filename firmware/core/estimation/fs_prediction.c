@@ -79,7 +79,7 @@ fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion)
     };
 }
 
-/* prediction.py:237 */
+/* prediction.py:238 */
 void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_params *params)
 {
     const fs_nominal n = fs_read_nominal(f->nominal);
@@ -169,8 +169,9 @@ static void keep_misaligned(fs_real p[27][27], int32_t at, const fs_vector3 *axi
 /*
  * Keep the accelerometer's vertical bias as uncertain as the alignment of its axes leaves it.
  *
- * Drag along the body shows in a vertical axis that is off by e, as a bias of e times its mean. force is the velocity
- * change in the body frame.
+ * Drag d along the body shows in a vertical axis that is off by e as a bias of d e. A filter that learns it holds it
+ * for the sensor's own, so that the variance stays that of both: 2 (d e)^2, with the mean drag of the last T. force
+ * is the velocity change in the body frame.
  *
  * prediction.py:173
  */
@@ -183,7 +184,7 @@ static void keep_inclined(fs_filter *f, const fs_vector3 *force, fs_real dt_s, c
                            (f->drag[0] * f->drag[0] + f->drag[1] * f->drag[1]);
     f->covariance[FS_ACCEL_BIAS + 2][FS_ACCEL_BIAS + 2] =
                                                           fs_max(f->covariance[FS_ACCEL_BIAS + 2][FS_ACCEL_BIAS + 2],
-            square);
+            FS_LIT(2.0) * square);
 }
 
 /*
@@ -192,7 +193,7 @@ static void keep_inclined(fs_filter *f, const fs_vector3 *force, fs_real dt_s, c
  * The port feels a share of the dynamic pressure: an altitude of share u^2 / 2 g for the airspeed u, which changes by
  * share u du / g, as white noise. The wind is not known.
  *
- * prediction.py:187
+ * prediction.py:188
  */
 static fs_real pressure_variance(const fs_filter *f, const fs_vector3 *change, fs_real dt_s,
                                  const fs_estimator_params *params)
@@ -206,7 +207,7 @@ static fs_real pressure_variance(const fs_filter *f, const fs_vector3 *change, f
     return fs_min(variance, FS_MOST_PRESSURE);
 }
 
-/* prediction.py:201 */
+/* prediction.py:202 */
 static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vector3 *angle, const fs_vector3 *change,
                               const fs_vector3 *force, fs_real dt_s, const fs_imu_noise *noise,
                               const fs_estimator_params *params)
@@ -239,7 +240,7 @@ static void add_process_noise(fs_filter *f, const fs_quaternion *q, const fs_vec
     add(f->covariance, FS_BARO_BIAS, 1, params->baro_walk * params->baro_walk * dt_s + pressure);
 }
 
-/* prediction.py:253 */
+/* prediction.py:254 */
 void fs_predict_errors(fs_filter *f, const fs_imu_noise *noise, const fs_estimator_params *params)
 {
     const fs_real dt_s = f->behind[0];
@@ -262,7 +263,7 @@ void fs_predict_errors(fs_filter *f, const fs_imu_noise *noise, const fs_estimat
     }
 }
 
-/* prediction.py:269 */
+/* prediction.py:270 */
 void fs_add_unknown(fs_filter *f, const fs_delta_sample *step)
 {
     const fs_real half_s = FS_LIT(0.5) * step->dt_s;

@@ -50,7 +50,7 @@ fs_motion fs_moved(const fs_motion *start, const fs_vector3 *angle, const fs_vec
 /* Return the nominal state with another motion. prediction.py:101 */
 fs_nominal fs_with_motion(const fs_nominal *n, const fs_motion *motion);
 
-/* Propagate the state over the sample. The covariance is behind it until predict_errors. prediction.py:237 */
+/* Propagate the state over the sample. The covariance is behind it until predict_errors. prediction.py:238 */
 void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_params *params);
 
 /*
@@ -58,13 +58,13 @@ void fs_predict(fs_filter *f, const fs_delta_sample *sample, const fs_estimator_
  *
  * The errors then move with the attitude in the middle of that time.
  *
- * prediction.py:253
+ * prediction.py:254
  */
 void fs_predict_errors(fs_filter *f, const fs_imu_noise *noise, const fs_estimator_params *params);
 
 /*
  * Add the uncertainty of what the sensor could not measure in a step; the position has half of the velocity's.
- * prediction.py:269
+ * prediction.py:270
  */
 void fs_add_unknown(fs_filter *f, const fs_delta_sample *step);
 
