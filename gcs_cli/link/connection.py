@@ -181,6 +181,11 @@ class Connection:
         if not (self.is_recording or isinstance(self._line, SharedLine)):
             self._share_due_s = -math.inf
 
+    @property
+    def serves_others(self) -> bool:
+        """True while other processes use this link: what is received late here is late there."""
+        return self._server is not None and self._server.has_clients
+
     def _serve(self, now_s: float) -> None:
         if self._server is None and isinstance(self._line, SharedLine):
             self._server = self._line.server

@@ -211,6 +211,11 @@ class ShareServer:
             return None
         return cls(listener, path, lock)
 
+    @property
+    def has_clients(self) -> bool:
+        """True while other processes use the link."""
+        return bool(self._clients)
+
     def interests(self) -> Iterable[Interest]:
         """Return the descriptors to wait for."""
         clients = [interest for line, _ in self._clients for interest in line.interests()]

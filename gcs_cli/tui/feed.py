@@ -27,7 +27,7 @@ Value = TypeVar("Value")
 
 GATHER_S = 0.1
 """Messages are received in batches of this time: a wake-up costs several messages. A job or an action of the
-user ends the wait; no batches while the answer that measures the round trip is awaited."""
+user ends the wait; no batches while the answer that measures the round trip is awaited, or others use the link."""
 _STEP_S = 0.05
 
 
@@ -199,7 +199,9 @@ class Feed:
                 self._jobs.popleft().future.cancel()
 
     def _pause_s(self) -> float:
-        return 0.0 if self.connection.session.awaits_round_trip(self.now_s) else GATHER_S
+        connection = self.connection
+        is_urgent = connection.serves_others or connection.session.awaits_round_trip(self.now_s)
+        return 0.0 if is_urgent else GATHER_S
 
     def _serve(self) -> None:
         """Begin the actions, and follow the messages and the effects; after every step of the link, in jobs too.

@@ -18,6 +18,7 @@ from gcs_cli.link.endpoint import VehicleEndpoint, parse_endpoint
 from gcs_cli.link.lines import RETRY_S, Line, TcpInLine
 from gcs_cli.link.share import ShareServer, open_shared, share_path
 from gcs_cli.link.tlog import encode_record
+from gcs_cli.tui.feed import Feed
 from tests.support.commands import gcs
 from tests.support.fake_links import running, serial_device, tcp_client, tcp_server, udp_vehicles
 from tests.support.fake_vehicle import FakeVehicle
@@ -147,6 +148,25 @@ def test_second_process_uses_the_link_of_the_first(monkeypatch: pytest.MonkeyPat
             assert gcs("arm") == ("armed\n", "", 0)
             assert gcs("disarm", "--connect", f"udpin:127.0.0.1:{port}") == ("disarmed\n", "", 0)
         assert first.session.view.identity is not None
+
+
+def test_view_passes_messages_on_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A view receives in batches, which would delay both directions of the others."""
+    monkeypatch.setattr("gcs_cli.tui.feed.GATHER_S", 10.0 * LONG_S)
+    port = free_port()
+    endpoint = parse_endpoint(f"udp:{port}")
+    with udp_vehicles(FakeVehicle(), to_port=port), Connection(endpoint) as first:
+        first.share()
+        first.wait_for_vehicle(LONG_S)
+        line = open_shared(endpoint)
+        assert line is not None
+        first.step(first.now_s)  # accepts it
+        assert first.serves_others
+        feed = Feed(first)
+        feed.start()
+        with Connection(endpoint, line=line) as second:
+            second.wait_for_vehicle(LONG_S)
+        feed.stop()
 
 
 @pytest.mark.parametrize("kind", ["udp", "tcp"])
