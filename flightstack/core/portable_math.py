@@ -172,7 +172,7 @@ def distance(x: float, y: float, z: float = 0.0) -> float:
 
 def whole_within(value: float, low: float, high: float) -> int:
     """Round to a whole number in [low, high], half to even; 0 for a value that is not finite."""
-    return int(round(min(max(value, low), high))) if math.isfinite(value) else 0  # noqa: RUF046  # Numba's is a float
+    return round(min(max(value, low), high)) if math.isfinite(value) else 0
 
 
 def roll_angle(w: float, x: float, y: float, z: float) -> float:

@@ -30,7 +30,7 @@ from flightstack.flight_log.sensor_topics import (
 from flightstack.process.assembly import Stack
 from flightstack.simulator_link.gps_kernels import FIX_SIZE, FixRow
 from flightstack.simulator_link.sensor_frames import HIL_VALUES
-from flightstack.vehicle.estimation import HEALTH_US, Estimation
+from flightstack.vehicle.estimation import HEALTH_US, Estimation, Watched
 from flightstack.vehicle.slow_kernel import SLOW_MARKS, SlowMarks
 
 _Arguments: TypeAlias = tuple[Any, ...]
@@ -174,4 +174,6 @@ class QuietSensors:
         )
         gnss = fix_sample(marks.gnss_us * 1e-6, FixRow(*marks.fix.tolist())) if marks.gnss_us else None
         self._fix = gnss or self._fix
-        self._estimation.pass_by(time_us, interval_us, SlowSamples(mag, baro, gnss), marks.health_us)
+        self._estimation.pass_by(
+            time_us, interval_us, SlowSamples(mag, baro, gnss), Watched(marks.health_us, marks.conditions)
+        )

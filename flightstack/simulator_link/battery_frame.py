@@ -1,4 +1,4 @@
-"""Fast codec of BATTERY_STATUS on the simulator link, sent ten times per simulated second in the lockstep exchange.
+"""Fast codec of BATTERY_STATUS on the simulator link, sent twice per simulated second in the lockstep exchange.
 
 pymavlink takes 15 µs to encode and decode one, 0.3 µs per step. A test checks that the bytes equal pymavlink's.
 """

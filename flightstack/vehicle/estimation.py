@@ -75,6 +75,15 @@ _SENSOR_FAULTS = (
 )
 
 
+class Watched(NamedTuple):
+    """The health that a kernel updated."""
+
+    due_us: int
+    """Time of the next one."""
+    conditions: int
+    """Those of the newest one."""
+
+
 class Users(NamedTuple):
     """The parts of the vehicle that follow the estimate besides the loops."""
 
@@ -228,17 +237,17 @@ class Estimation:
         """True if kernels may give fixes of GNSS to the filters: they have a local frame."""
         return self._lanes.estimators[0].frame is not None
 
-    def pass_by(self, time_us: int, step_us: int, samples: SlowSamples, health_due_us: int) -> None:
-        """Follow the measurements up to ``time_us`` that the kernels of sensors and filters took.
+    def pass_by(self, time_us: int, step_us: int, samples: SlowSamples, watched: Watched) -> None:
+        """Follow the measurements up to ``time_us`` that the kernels of sensors and filters took, and the health.
 
-        The next health is due at ``health_due_us``.
+        A health of the kernel was updated before a reset, which ends its call.
         """
         self._time_us = time_us
         self._feed.pass_by(time_us, step_us, samples)
+        if self._lanes.is_alone and watched.due_us != self._health_due_us:
+            self._health_due_us, self.health = watched.due_us, self._lanes.watched()
+            self._use_health(watched.conditions)
         self._check_resets(time_us)
-        if self._lanes.is_alone and health_due_us != self._health_due_us:
-            self._health_due_us, self.health = health_due_us, self._lanes.watched()
-            self._use_health()
         if time_us >= self._health_due_us:  # in a tick with a reset
             self._update_health(time_us)
 
@@ -322,14 +331,13 @@ class Estimation:
         since_change_s = time_us * 1e-6 - self._lanes.selection.changed_s
         if has_failed and not had_failed and now.has_state and since_change_s > _TOLD_S:
             users.journal.say(Severity.WARNING, "A spare inertial sensor has failed")
-        self._use_health()
+        limits = limits_of(now.behaviour)
+        self._use_health(plain(conditions_of)(self.health, limits, self._mag_fault[0], now.flying))
 
-    def _use_health(self) -> None:
-        """Act on the newest health."""
+    def _use_health(self, conditions: int) -> None:
+        """Act on the newest health, with its conditions."""
         now, users = self._now, self._users
-        self._conditions = plain(conditions_of)(
-            self.health, limits_of(now.behaviour), self._mag_fault[0], now.flying
-        )
+        self._conditions = conditions
         users.failsafes.take_health(self.health, self._conditions)
         self._report_sensors()
         failsafes = users.failsafes

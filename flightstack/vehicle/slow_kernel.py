@@ -55,6 +55,8 @@ class SlowMarks(NamedTuple):
     global_us: int
     health_us: int
     """Time from which the health of the estimate is updated."""
+    conditions: int
+    """Those of the newest health."""
 
 
 SLOW_MARKS = dtype_of(SlowMarks)
@@ -186,4 +188,5 @@ def watch_health(watch: int, slow: Any, time_us: int, memory: Any, track: Any, f
         has_fix = FixRow(*as_tuple(marks["fix"], FIX_SIZE)).fix_type >= _FIX_3D
         newest["fix_s"] = marks["gnss_us"] * 1e-6 if has_fix else -math.inf
     found: int = call_kernel_int(watch, (memory, health, track, limits, has_origin, flying, time_us * 1e-6))
+    marks["conditions"] = found
     return bool(found == conditions)

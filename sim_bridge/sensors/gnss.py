@@ -119,7 +119,9 @@ class GnssReceiver:
         """Time of the next measurement or fix."""
         self._times_us = np.array([0, period_us, latency_us])
         self._count = np.zeros(1, np.int64)
-        most = latency_us // period_us + 2
+        most = (
+            latency_us // period_us + 3
+        )  # as measurements fall on steps, up to two are nearer to each other
         self.sent: FloatArray = np.zeros(FIX_SIZE)
         """The newest fix that was sent."""
         self.arguments: tuple[Any, ...] = (

@@ -2,14 +2,15 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from random import Random
 
 import pytest
 
-from flightstack.core.contract import FloatArray
 from flightstack.params import vehicle
 from flightstack.process.quiet_block import QuietBlock
 from flightstack.testing import ConditionTimeoutError, World
 from flightstack.testing.state import State
+from sim_bridge.sensors.gnss import GnssReceiver
 from sim_bridge.sensors.magnetometer import Magnetometer
 from tests.support.bytes_engine import BytesEngine
 
@@ -209,11 +210,14 @@ def _calls_of_a_second(world: World, monkeypatch: pytest.MonkeyPatch) -> list[in
     return calls
 
 
+_GNSS = "[sensors.gnss]\nrate_hz = 33\nlatency_s = 0.137\n"
+
+
 def test_sensors_of_uneven_rates_measure_at_the_same_ticks(tmp_path: Path) -> None:
     """Periods of 30.303 and 13.333 ms are no multiples of a tick."""
     text = (Path(vehicle.__file__).parent / "vehicles" / "x_quad.toml").read_text()
     path = tmp_path / "uneven.toml"
-    path.write_text(f"{text}\n[sensors.mag]\nrate_hz = 33\n[sensors.baro]\nrate_hz = 75\n")
+    path.write_text(f"{text}\n[sensors.mag]\nrate_hz = 33\n[sensors.baro]\nrate_hz = 75\n{_GNSS}")
     logs = []
     for engine in ({}, {"make_engine": BytesEngine}):
         with World(state="estimated", vehicle=str(path), seed=5, **engine) as world:
@@ -224,21 +228,51 @@ def test_sensors_of_uneven_rates_measure_at_the_same_ticks(tmp_path: Path) -> No
     assert logs[0] == logs[1]
 
 
-def test_most_measurements_of_the_magnetometer_are_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
-    calls: list[float] = []
-    measure = Magnetometer.measure
+@pytest.mark.parametrize(("sensor", "name"), [(Magnetometer, "measure"), (GnssReceiver, "receive")])
+def test_most_measurements_are_compiled(sensor: type, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[object] = []
+    measure = getattr(sensor, name)
 
-    def counted(mag: Magnetometer, state: FloatArray, current_a: float) -> FloatArray:
-        calls.append(current_a)
-        return measure(mag, state, current_a)
+    def counted(*arguments: object) -> object:
+        calls.append(arguments)
+        return measure(*arguments)
 
     with World(state="estimated") as world:
         world.wait_until_ready()
         world.takeoff(2.0)
         world.run_for(4.0)
-        monkeypatch.setattr(Magnetometer, "measure", counted)
+        monkeypatch.setattr(sensor, name, counted)
         world.run_for(1.0)
-    assert 0 < len(calls) <= 0.5 * 100  # measured: 43, in ticks with work for Python, such as a fix of GNSS
+    assert 0 < len(calls) <= 9  # of 100 and 10; measured: 6 and 2, in ticks with work for Python
+
+
+def test_health_before_a_reset_has_the_conditions_of_its_time(tmp_path: Path) -> None:
+    """The filter gives up the compass in the tick of a reset of the yaw: the next health reports it, not the last."""
+    text = (Path(vehicle.__file__).parent / "vehicles" / "x_quad.toml").read_text()
+    path = tmp_path / "slow_gnss.toml"
+    path.write_text(f"{text}\n[sensors.gnss]\nrate_hz = 33\nlatency_s = 1.3\nfirst_fix_s = 0.0\n")
+    logs = []
+    for engine in ({}, {"make_engine": BytesEngine}):
+        with World(state="estimated", vehicle=str(path), seed=28, **engine) as world:
+            random = Random(78)
+            world.wait_until_ready()
+            world.takeoff(2.0)
+            for wait_s, fault, for_s in _DISTURBANCES:
+                world.run_for(wait_s)
+                if fault:
+                    world.fault(fault, for_s=for_s)
+                else:
+                    world.goto(random.uniform(-3.0, 3.0), 1.0)
+            world.run_for(2.0)
+            logs.append(world.engine.newest_log())
+    assert b"Compass disagrees with GNSS and is no longer used" in logs[0]
+    assert logs[0] == logs[1]
+
+
+_DISTURBANCES = (
+    (1.0488, "sensor:baro:off", 1.4996), (0.1686, "sensor:gnss:loss=0.5", 0.9534), (0.0126, "", 0.0),
+    (0.1982, "sensor:baro:off", 1.2238), (1.0975, "", 0.0),
+)  # fmt: skip
 
 
 def _signals(state: State) -> dict[str, object]:

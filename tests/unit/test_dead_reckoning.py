@@ -134,3 +134,15 @@ def test_height_error_of_gnss_returns_slowly_with_a_barometer_only(baro_s: float
         drift_gnss_bias(f, row, 0.1, EstimatorParams())
     assert f.nominal[27] == pytest.approx(kept, rel=0.01)
     assert f.nominal[26] == pytest.approx(math.exp(-1.0), rel=0.01)  # horizontal
+
+
+@pytest.mark.parametrize("seconds", [2.0, 5.0, 40.0])
+def test_drag_keeps_the_vertical_bias_of_the_accelerometer_uncertain(seconds: float) -> None:
+    """An axis off by e shows the mean drag of about the last 5 s as a bias: the variance is twice its square."""
+    drag, params = Vector3(1.2, -0.9, 0.0), QUIET._replace(gyro_scale_error=0.0035)
+    f = still(0.0, params)
+    for step in range(round(seconds / STEP_S)):
+        force = Vector3(drag.x * STEP_S, drag.y * STEP_S, -GRAVITY * STEP_S)
+        predict(f, DeltaSample((step + 1) * STEP_S, STEP_S, NONE, force, 0.0, 0.0), params)
+    mean = 1.5 * (1.0 - math.exp(-seconds / 5.0))
+    assert f.covariance[ACCEL_BIAS + 2, ACCEL_BIAS + 2] == pytest.approx(2.0 * (0.0035 * mean) ** 2, rel=0.01)

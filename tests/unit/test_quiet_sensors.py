@@ -19,6 +19,7 @@ from flightstack.process.quiet_sensors import QuietSensors
 from flightstack.simulator_link.frame_kernels import SENSOR_NEWS
 from flightstack.simulator_link.gps_kernels import GPS_SIZE
 from flightstack.simulator_link.sensor_frames import HIL_VALUES, VALUES
+from flightstack.vehicle.estimation import Watched
 from flightstack.vehicle.slow_kernel import take_slow
 
 
@@ -63,5 +64,5 @@ def test_a_health_that_is_due_in_a_tick_with_a_reset_is_updated_in_it() -> None:
     assert not math.isfinite(estimation.health.imu_age_s)
     estimation.estimator.memory["resets"][0]["position"]["number"] = 1.0
     due_us = estimation.begin_watch()[0]
-    estimation.pass_by(120_000, 2000, SlowSamples(), due_us)
+    estimation.pass_by(120_000, 2000, SlowSamples(), Watched(due_us, 0))
     assert estimation.begin_watch()[0] == 150_000

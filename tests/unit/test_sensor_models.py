@@ -235,6 +235,24 @@ def test_a_fix_is_sent_once_after_its_latency(latency_s: float) -> None:
     assert sent_us == expected
 
 
+@pytest.mark.parametrize("step_us", [2000, 15_000, 18_000, 20_000, 100_000, 170_000])
+@pytest.mark.parametrize("rate_hz", [0.7, 7.0, 10.0, 33.0, 45.0, 50.0])
+@pytest.mark.parametrize("latency_s", [0.0, 0.019, 0.11, 2.0])
+def test_fixes_wait_at_any_rate_latency_and_step(rate_hz: float, latency_s: float, step_us: int) -> None:
+    """Each is sent at the first step after its latency, or replaced by a newer one."""
+    receiver, waiting = receiver_of(rate_hz=rate_hz, latency_s=latency_s), []
+    period_us, latency_us, next_us = round(1e6 / rate_hz), round(latency_s * 1e6), 0
+    for time_us in range(0, 3_000_000, step_us):
+        if time_us >= next_us:
+            next_us = (time_us // period_us + 1) * period_us
+            waiting.append(time_us)
+        over = [measured for measured in waiting if measured + latency_us <= time_us]
+        waiting = waiting[len(over) :]
+        sent = receiver.receive(time_us, state_at(velocity=(time_us * 1e-6, 0.0, 0.0)))
+        assert (sent is not None) is bool(over)
+        assert sent is None or round(FixRow(*sent.tolist()).north_m_s * 1e6) == over[-1]
+
+
 def test_gnss_states_the_standard_deviations_of_its_errors() -> None:
     numbers = {
         "horizontal_noise_m": 0.3, "horizontal_drift_m": 0.4, "vertical_noise_m": 0.6, "vertical_drift_m": 0.8,
