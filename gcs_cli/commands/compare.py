@@ -14,9 +14,9 @@ from rich.table import Table
 from rich.text import Text
 
 from flightstack.process.command_line import make_app
-from flightstack.process.console import complain
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly.fly_display import FlyConsole
+from gcs_cli.logs.reader import warn_if_damaged
 from gcs_cli.report.compare import (
     ComparedRun,
     Row,
@@ -59,8 +59,7 @@ def compare(
     check_page(page)
     read = read_runs(found)
     for run in read:
-        if run.flight.damaged:
-            complain(f"gcs: warning: {run.log}: the log is damaged; read up to {run.flight.duration_s:.1f} s")
+        warn_if_damaged(run.flight, run.log)
     failure = write_page(page, render_comparison(read), overwrite)
     if as_json:
         facts = comparison(read, page if failure is None else None)

@@ -17,7 +17,7 @@ from flightstack.process.command_line import make_app
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.estimate.log_samples import DECLINATION
 from gcs_cli.estimate.result import Result, estimate_log, quantities, render, rows_of
-from gcs_cli.logs.reader import log_file, read_log
+from gcs_cli.logs.reader import log_file, read_log, warn_if_damaged
 from gcs_cli.run_directory import write_page
 from gcs_cli.settings import JsonOption, OpenOption, OverwriteOption, check_page, output_of
 
@@ -61,10 +61,12 @@ def estimate(
         check_page(page)
     given = _given(param or ())
     recording = read_log(log)
+    warn_if_damaged(recording, recording.source)
     result = estimate_log(recording, given)
     failure = None if page is None else write_page(page, render(result, recording), overwrite)
     output, file = output_of(context, as_json), None if page is None or failure else str(page)
-    output.say("estimate", "\n".join(_lines(result)), log=str(log), file=file, **result.summary)
+    facts = {"log": str(log), "damaged": recording.damaged, "file": file, **result.summary}
+    output.say("estimate", "\n".join(_lines(result)), **facts)
     if failure is not None:
         raise failure
     if page is None:

@@ -10,8 +10,8 @@ import typer
 
 from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.process.command_line import make_app
-from flightstack.process.console import complain
 from gcs_cli.errors import USAGE, CliError
+from gcs_cli.logs.reader import warn_if_damaged
 from gcs_cli.report.compare import read_runs
 from gcs_cli.report.page import render_report
 from gcs_cli.report.poses import find_run
@@ -50,8 +50,7 @@ def report(
     check_new(page, overwrite)
     (read,) = read_runs([run])
     flight, summary = read.flight, {**read.summary, "log_sha256": file_sha256(run.log)}
-    if flight.damaged:
-        complain(f"gcs: warning: {run.log}: the log is damaged; read up to {flight.duration_s:.1f} s")
+    warn_if_damaged(flight, run.log)
     tlog = run.log.with_name(TLOG_NAME)
     timing = read_loop_timing(tlog, flight.start_s) if run.summary else ()
     write_text_atomically(page, render_report(flight, read.plan, summary, timing, read.name))

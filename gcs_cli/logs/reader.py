@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import lzma
 from pathlib import Path
+from typing import Protocol
 
 from flightstack.core.errors import ConfigError
+from flightstack.process.console import complain
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.logs.recording import Recording
 from gcs_cli.logs.tlog_reader import read_tlog
@@ -14,6 +16,24 @@ from gcs_cli.run_directory import LOG_NAME
 
 _ULOG_MAGIC = b"ULog"
 _XZ_MAGIC = b"\xfd7zXZ\x00"
+
+
+class ReadLog(Protocol):
+    """A log that was read, perhaps in part."""
+
+    @property
+    def damaged(self) -> bool:
+        """True if a part could not be read."""
+
+    @property
+    def duration_s(self) -> float:
+        """From the first to the last sample."""
+
+
+def warn_if_damaged(log: ReadLog, source: object) -> None:
+    """Print a warning that names ``source`` if the log could only be read in part."""
+    if log.damaged:
+        complain(f"gcs: warning: {source}: the log is damaged; read up to {log.duration_s:.1f} s")
 
 
 def log_file(path: Path) -> Path:

@@ -13,7 +13,7 @@ from flightstack.transports.udp import PortBusyError
 from flightstack.transports.vehicle_ports import Place, VehiclePorts
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly.processes import Interruption
-from gcs_cli.logs.reader import log_file, read_log
+from gcs_cli.logs.reader import log_file, read_log, warn_if_damaged
 from gcs_cli.logs.recording import ULOG
 from gcs_cli.logs.tlog_reader import dated_records
 from gcs_cli.output import Output
@@ -71,6 +71,7 @@ class ReplayPorts:
 def playback_of(path: Path) -> Playback:
     """Return the messages of a log; raise CliError (usage)."""
     recording = read_log(path)
+    warn_if_damaged(recording, recording.source)
     if recording.form == ULOG:
         return UlogPlayback(recording, _plans_beside(path, recording.vehicle[0]))
     return TlogPlayback(log_file(path).read_bytes(), recording.vehicle)

@@ -6,6 +6,7 @@ import json
 import lzma
 import math
 import os
+import random
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -101,6 +102,28 @@ def test_compressed_log_is_read_in_place(log: Path, tmp_path: Path) -> None:
     assert len(read_log(path).topics) == len(read_log(log).topics)
     path.write_bytes(path.read_bytes()[:-100])
     assert main(["estimate", str(path)]) == USAGE
+
+
+@pytest.mark.parametrize("is_truncated", [True, False])
+def test_damaged_log_is_reported(
+    is_truncated: bool, log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    content = bytearray(log.read_bytes())
+    middle = len(content) // 2
+    if is_truncated:
+        del content[middle:]
+    else:
+        content[middle : middle + 5000] = random.Random(1).randbytes(5000)
+    path = tmp_path / "flight.ulg"
+    path.write_bytes(content)
+    assert main(["estimate", str(path), "--json"]) == 0
+    printed = capsys.readouterr()
+    warning = f"gcs: warning: {path}: the log is damaged; read up to {read_log(path).duration_s:.1f} s\n"
+    assert printed.err == warning
+    assert json.loads(printed.out)["damaged"]
+    assert main(["estimate", str(log), "--json"]) == 0
+    printed = capsys.readouterr()
+    assert (printed.err, json.loads(printed.out)["damaged"]) == ("", False)
 
 
 def test_old_and_new_names_of_gnss_fields_give_equal_samples(log: Path, tmp_path: Path) -> None:

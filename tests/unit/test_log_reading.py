@@ -28,6 +28,7 @@ from gcs_cli.logs.recording import TLOG, ULOG, Recording
 from gcs_cli.logs.scene import enu_positions, enu_quaternions
 from gcs_cli.logs.tlog_reader import read_tlog
 from gcs_cli.logs.ulog_reader import read_ulog
+from gcs_cli.replay.replay_run import playback_of
 from tests.support.sample_logs import EPOCH_US, small_tlog, small_ulog
 from tests.support.synthetic_flight import synthetic_flight_bytes
 
@@ -103,6 +104,14 @@ def test_truncated_logs_are_read_and_reported() -> None:
         assert recording.damaged
         assert recording.duration_s > 1.0
         assert not read(content, "log").damaged
+
+
+def test_replay_of_a_truncated_log_is_warned_of(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "flight.ulg"
+    content = small_ulog()
+    path.write_bytes(content[: 2 * len(content) // 3])
+    playback_of(path)
+    assert capsys.readouterr().err.startswith(f"gcs: warning: {path}: the log is damaged; read up to ")
 
 
 @pytest.mark.parametrize("read", [read_ulog, read_tlog])

@@ -10,12 +10,10 @@ import typer
 from flightstack.core.atomic_file import check_new
 from flightstack.core.errors import ConfigError
 from flightstack.process.command_line import make_app
-from flightstack.process.console import complain
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.logs import export_mcap, export_rerun, export_tables
 from gcs_cli.logs.info import info_lines
-from gcs_cli.logs.reader import read_log
-from gcs_cli.logs.recording import Recording
+from gcs_cli.logs.reader import read_log, warn_if_damaged
 from gcs_cli.settings import JsonOption, OverwriteOption, output_of
 
 app = make_app(add_completion=False)
@@ -77,7 +75,7 @@ def export(
             if file.is_dir():
                 raise ConfigError(file, "", "is a directory")
     recording = read_log(log)
-    warn_if_damaged(recording)
+    warn_if_damaged(recording, recording.source)
     out = output_of(context, as_json)
 
     def say(form: str, path: Path, count: int, unit: str) -> None:
@@ -91,11 +89,3 @@ def export(
         say("mcap", mcap, export_mcap.export_mcap(recording, mcap), "messages")
     if rerun is not None:
         say("rerun", rerun, export_rerun.export_rerun(recording, rerun), "entities")
-
-
-def warn_if_damaged(recording: Recording) -> None:
-    """Print a warning if the log could only be read in part."""
-    if recording.damaged:
-        complain(
-            f"gcs: warning: {recording.source}: the log is damaged; read up to {recording.duration_s:.1f} s"
-        )

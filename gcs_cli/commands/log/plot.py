@@ -11,12 +11,12 @@ import typer
 from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.process.command_line import make_app
 from gcs_cli.charts.pages import render_page
-from gcs_cli.commands.log.file import LogArgument, warn_if_damaged
+from gcs_cli.commands.log.file import LogArgument
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.logs.fields import Field, find_fields
 from gcs_cli.logs.info import start_utc
 from gcs_cli.logs.plot import field_figure, field_samples, terminal_panel
-from gcs_cli.logs.reader import read_log
+from gcs_cli.logs.reader import read_log, warn_if_damaged
 from gcs_cli.logs.recording import Recording
 from gcs_cli.output import Output
 from gcs_cli.settings import JsonOption, OverwriteOption, output_of
@@ -72,7 +72,7 @@ def plot(
         if file is not None:
             check_new(file, overwrite)
     recording = read_log(log)
-    warn_if_damaged(recording)
+    warn_if_damaged(recording, recording.source)
     found = list(dict.fromkeys(field for wanted in fields for field in find_fields(recording, wanted)))
     limits = begin, math.inf if end is None else end
     out = output_of(context, as_json)
