@@ -24,6 +24,7 @@ IndexArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
 DAMAGE = (ULogException, struct.error, ValueError, KeyError, IndexError, OverflowError, TypeError)
 """Exceptions for a damaged log, raised by pyulog or by code that reads its result."""
+NO_DATA = "the log has no data"
 _ROW_AT = 5
 """Offset of the row in a message of data: behind size, type and subscription id."""
 _KIND_AT, _TIME_SIZE = 2, 8
@@ -38,6 +39,11 @@ class ParsedLog(NamedTuple):
     log: Any
     damaged: bool
     """True if the file is cut off, or damage was found."""
+
+    @property
+    def has_data(self) -> bool:
+        """True if a topic has a sample; damaged definitions may lack the times."""
+        return any(len(item.data.get("timestamp", ())) for item in self.log.data_list)
 
 
 class LogBytes(io.BytesIO):

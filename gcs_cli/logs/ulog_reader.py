@@ -10,7 +10,7 @@ import numpy as np
 
 from flightstack.core.errors import ConfigError
 from gcs_cli.logs.recording import ULOG, Dropout, LogText, ParameterChange, Recording, Topic
-from gcs_cli.logs.ulog_parser import parse_ulog
+from gcs_cli.logs.ulog_parser import NO_DATA, parse_ulog
 
 _GPS_TOPICS = ("vehicle_gps_position", "sensor_gps")
 _LOWEST_LEVEL = 7
@@ -21,7 +21,7 @@ def read_ulog(content: bytes, source: str) -> Recording:
     log, damaged = parse_ulog(content, source)
     topics = tuple(_topics(log))
     if not topics:
-        raise ConfigError(source, "", "the log has no data")
+        raise ConfigError(source, "", NO_DATA)
     return Recording(
         source=source,
         form=ULOG,

@@ -14,7 +14,7 @@ from flightstack.core.contract import MAX_ROTORS, FloatArray
 from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import GeoPoint
 from flightstack.core.geometry_bulk import euler_from_quaternions
-from gcs_cli.logs.ulog_parser import DAMAGE, ParsedLog, parse_ulog
+from gcs_cli.logs.ulog_parser import DAMAGE, NO_DATA, ParsedLog, parse_ulog
 from gcs_cli.report.flight_data import (
     REAL_TIME,
     Flight,
@@ -50,12 +50,15 @@ _TOPICS = [
 
 
 def read_flight(path: Path) -> Flight:
-    """Read a ULog file, complete or cut off; raise ConfigError when it is none."""
+    """Read a ULog file, complete or cut off; raise ConfigError when it is none, or has no data."""
     try:
         content = path.read_bytes()
     except OSError as error:
         raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
-    return flight_of(content, path)
+    parsed = parse_ulog(content, path, _TOPICS)
+    if not parsed.has_data and not parse_ulog(content, path).has_data:
+        raise ConfigError(path, "", NO_DATA)
+    return flight_in(parsed, path)
 
 
 def flight_of(content: bytes, source: object) -> Flight:

@@ -174,9 +174,13 @@ def test_bad_runs_are_one_sentence_and_write_nothing(
     monkeypatch.chdir(tmp_path)
     text = tmp_path / "text.ulg"
     text.write_text("no log")
+    header = tmp_path / "logs" / "header.ulg"
+    header.parent.mkdir()
+    header.write_bytes((runs[0] / "flight.ulg").read_bytes()[:1000])
     for words, sentence in (
         ([runs[0]], "give two flights or more"),
         ([runs[0], text], "is not a readable flight log"),
+        ([runs[0], header], "header.ulg: the log has no data"),
         ([runs[0], tmp_path / "none"], "there is no such directory or log"),
         ([runs[0], tmp_path], "text.ulg"),
     ):

@@ -122,13 +122,17 @@ def test_directories_without_one_log_are_named(tmp_path: Path) -> None:
         find_run(tmp_path / "c.ulg")
 
 
-def test_a_log_cut_to_its_head_holds_no_flight(run: Path, tmp_path: Path) -> None:
-    (tmp_path / "flight.ulg").write_bytes((run / "flight.ulg").read_bytes()[:30])
+@pytest.mark.parametrize(
+    ("size", "reason"),
+    [(30, "the log has no data"), (3250, "the log is damaged before its first position")],
+)
+def test_a_log_cut_before_its_first_position_holds_no_flight(
+    size: int, reason: str, run: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "flight.ulg").write_bytes((run / "flight.ulg").read_bytes()[:size])
     ended = gcs("log", "draw", tmp_path)
     assert ended.returncode == 2
-    assert ended.stderr.startswith(
-        f"gcs: {tmp_path}/flight.ulg: the log is damaged before its first position"
-    )
+    assert ended.stderr.startswith(f"gcs: {tmp_path}/flight.ulg: {reason}")
 
 
 def test_what_is_no_log_is_refused(tmp_path: Path) -> None:

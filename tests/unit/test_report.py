@@ -14,7 +14,9 @@ import pytest
 from flightstack.mavlink.dialect import FsLoopTiming
 from flightstack.mavlink.link import Link
 from flightstack.plan import Plan, load_plan
+from gcs_cli.errors import DONE, USAGE
 from gcs_cli.link.tlog import TlogFile
+from gcs_cli.logs.ulog_reader import read_ulog
 from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.conditions import conditions
 from gcs_cli.report.flight_charts import mode_bands, time_figures
@@ -23,7 +25,9 @@ from gcs_cli.report.page import render_report, write_report
 from gcs_cli.report.path_charts import map_figure
 from gcs_cli.report.summary import RunInfo, summarise
 from gcs_cli.report.telemetry import read_loop_timing
+from tests.support.commands import gcs
 from tests.support.parsed_page import own_part, parsed
+from tests.support.sample_logs import small_ulog
 from tests.support.square_plan import square_plan
 from tests.support.synthetic_flight import synthetic_flight_bytes
 
@@ -224,6 +228,23 @@ def test_loop_timing_comes_from_the_telemetry_log(tmp_path: Path, flight: Flight
     write_report(out, flight, square_plan(), summary, tmp_path / "missing.tlog")
     assert "No loop timing" in out.read_text(encoding="utf-8")
     assert read_loop_timing(tlog, 0.5)[1].time_s == 0.5
+
+
+def test_log_without_samples_is_refused(tmp_path: Path) -> None:
+    log = tmp_path / "header.ulg"
+    log.write_bytes(small_ulog()[:1000])
+    refused = "", f"gcs: {log}: the log has no data\n", USAGE
+    assert gcs("report", log) == refused
+    assert gcs("log", "info", log) == refused
+    assert list(tmp_path.iterdir()) == [log]
+
+
+def test_log_of_unknown_topics_has_a_report(tmp_path: Path) -> None:
+    content = small_ulog()
+    for topic in read_ulog(content, "log").topics:
+        content = content.replace(topic.kind.encode(), f"x{topic.kind[1:]}".encode())
+    (tmp_path / "other.ulg").write_bytes(content)
+    assert gcs("report", tmp_path / "other.ulg").returncode == DONE
 
 
 def test_report_names_force_torque_and_parameters() -> None:

@@ -19,7 +19,7 @@ from flightstack.core.geometry_bulk import euler_from_quaternions
 from flightstack.plan import Command, Frame, MissionItem, Plan
 from gcs_cli.errors import FAILED
 from gcs_cli.logs.ulog_parser import ParsedLog
-from gcs_cli.report.analysis import flight_in, read_flight
+from gcs_cli.report.analysis import flight_in, flight_of, read_flight
 from gcs_cli.report.flight_data import Flight, MissionProgress, Status, series
 from gcs_cli.report.flight_figures import attitude_error, rms_command_rate_rad_s2, rms_torque_n_m
 from gcs_cli.report.flight_outcome import COMPLETED, Code, Outcome, with_log
@@ -327,13 +327,11 @@ def test_a_log_cut_anywhere_is_read_as_far_as_it_goes(log_path: Path, tmp_path: 
     assert durations[-1] == pytest.approx(35.99)
 
 
-def test_unknown_message_longer_than_its_log_ends_the_reading(log_path: Path, tmp_path: Path) -> None:
+def test_unknown_message_longer_than_its_log_ends_the_reading(log_path: Path) -> None:
     content = bytearray(log_path.read_bytes()[:20_000])
     size, _ = struct.unpack_from("<HB", content, 16)
     struct.pack_into("<HB", content, 16 + 3 + size, 0xFFFF, 0)  # the second definition
-    path = tmp_path / "damaged.ulg"
-    path.write_bytes(content)
-    assert read_flight(path).damaged
+    assert flight_of(bytes(content), "log").damaged
 
 
 def test_damage_is_never_printed_or_raised_as_anything_else(
