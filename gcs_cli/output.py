@@ -13,7 +13,7 @@ import typer
 
 from flightstack.core.errors import ConfigError
 from flightstack.process.command_line import UsageError, usage_sentence
-from flightstack.process.console import complain, drop, say
+from flightstack.process.console import check_output, complain, drop, say
 from flightstack.process.interrupts import signals
 from gcs_cli.errors import DONE, FAILED, INTERRUPTED, USAGE, CliError
 
@@ -62,8 +62,7 @@ def run_command(run: Callable[[], int | None], as_json: bool) -> int:
     """Run a command; return its exit code. With ``as_json``, an error is also a JSON object on stdout."""
     try:
         code = run() or DONE
-        if sys.stdout is not None:
-            sys.stdout.flush()
+        check_output()
         if code != INTERRUPTED:  # typer's code for a KeyboardInterrupt; our commands raise CliError with it
             return code
         sentence, code = "interrupted", INTERRUPTED

@@ -15,6 +15,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from flightstack import __version__
+from flightstack.process.console import check_output
 
 UsageError: Any = typer.BadParameter.__mro__[1]
 """Base class of usage errors: typer has its own copy of click in some versions."""
@@ -217,13 +218,18 @@ def _default(field: dataclasses.Field[Any]) -> Any:
 
 
 def run_app(app: typer.Typer, name: str, arguments: Sequence[str] | None = None) -> int:
-    """Run a command line; return its exit code. An interrupt, of which typer makes an exit code, is raised again."""
+    """Run a command line; return its exit code. An interrupt, of which typer makes an exit code, is raised again.
+
+    Raise OSError if its output was lost.
+    """
     try:
         code = app(arguments, prog_name=name, standalone_mode=False)
     except typer.Abort:
         raise KeyboardInterrupt from None
     if code == _TYPER_INTERRUPTED:
         raise KeyboardInterrupt
+    if not code:
+        check_output()
     return int(code or 0)
 
 

@@ -10,6 +10,8 @@ from typing import IO
 
 OUTPUT_ERRORS = frozenset({errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF})
 """Errors of writing to stdout, which name no file."""
+_lost: list[tuple[IO[str], OSError]] = []
+"""Streams of which output was lost, and why."""
 
 
 def replace_unencodable() -> None:
@@ -37,9 +39,26 @@ def _print(line: object, stream: IO[str] | None) -> Exception | None:
     except (OSError, ValueError) as error:
         if isinstance(error, ValueError) and not stream.closed:
             raise
-        drop(stream)
+        lose(stream, error)
         return error
     return None
+
+
+def lose(stream: IO[str], error: Exception) -> None:
+    """Discard all further output of a stream after an error; the program goes on until ``check_output``."""
+    if isinstance(error, OSError) and error.errno in OUTPUT_ERRORS - {errno.EPIPE}:
+        _lost.append((stream, error))  # the reader of a closed pipe needs no message
+    drop(stream)
+
+
+def check_output() -> None:
+    """Flush stdout; raise OSError if it fails, or if output to stdout was lost before. Call at a program's end."""
+    if sys.stdout is not None:
+        sys.stdout.flush()
+    errors = [error for stream, error in _lost if stream is sys.stdout]
+    _lost.clear()
+    if errors:
+        raise errors[0]
 
 
 def report_os_error(program: str, error: OSError) -> int:

@@ -14,7 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from flightstack.core.enums import Severity
-from flightstack.process.console import drop
+from flightstack.process.console import drop, lose
 from gcs_cli.fly.flight import Flight, Phase
 from gcs_cli.tui.fly.panels import clock_text
 from gcs_cli.tui.watch_lines import text_line
@@ -27,7 +27,10 @@ _WITH_BAR, _WITH_PLACE = 60, 90  # columns of the terminal
 
 
 class FlyConsole(Console):
-    """A console that stops printing after a broken pipe or on a full disk, so that the flight continues."""
+    """A console that stops printing after a broken pipe or on a full disk, so that the flight continues.
+
+    ``check_output`` reports a full disk at the program's end.
+    """
 
     def __init__(self, **settings: Any) -> None:
         """Words between colons, as in the notation of faults, are no names of pictures."""
@@ -37,8 +40,9 @@ class FlyConsole(Console):
         """Print; stop printing after an error."""
         try:
             super().print(*objects, **options)
-        except OSError:
-            self.on_broken_pipe()
+        except OSError as error:
+            lose(self.file, error)
+            self.quiet = True
 
     def on_broken_pipe(self) -> None:
         """Discard all further output."""

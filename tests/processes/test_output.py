@@ -12,7 +12,8 @@ import pytest
 from tests.support.commands import gcs
 from tests.support.vehicle_processes import LONG_S, vehicle
 
-PROGRAMS = ("flightstack", "sim_bridge", "gcs_cli")
+NAMES = {"flightstack": "flightstack", "sim_bridge": "sim-bridge", "gcs_cli": "gcs"}
+PROGRAMS = tuple(NAMES)
 
 
 def closed_pipe() -> int:
@@ -40,8 +41,26 @@ def test_help_into_a_closed_pipe_ends_quietly(program: str) -> None:
 def test_help_onto_a_full_disk_is_one_sentence(program: str) -> None:
     with Path("/dev/full").open("w") as full:
         done = run([program, "--help"], stdout=full.fileno())
-    name = {"sim_bridge": "sim-bridge", "gcs_cli": "gcs"}.get(program, program)
-    assert (done.stderr, done.returncode) == (f"{name}: No space left on device\n", 1)
+    assert (done.stderr, done.returncode) == (f"{NAMES[program]}: No space left on device\n", 1)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["flightstack", "--check", "--state-dir", "none"],
+        ["gcs_cli", "fly", "hop", "--out", "run"],
+        ["gcs_cli", "test", "hop.toml"],
+    ],
+    ids=" ".join,
+)
+def test_a_result_onto_a_full_disk_is_one_sentence(
+    command: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "hop.toml").write_text('plan = "hop"\n')
+    monkeypatch.chdir(tmp_path)
+    with Path("/dev/full").open("w") as full:
+        done = run(command, stdout=full.fileno())
+    assert (done.stderr, done.returncode) == (f"{NAMES[command[0]]}: No space left on device\n", 1)
 
 
 @pytest.mark.parametrize("program", PROGRAMS)

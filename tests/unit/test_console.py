@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import importlib
 import io
+import os
 import sys
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 
 from flightstack.process import console
 from flightstack.process.console import report_os_error
+from gcs_cli.fly.fly_display import FlyConsole
 from sim_bridge import command as sim_bridge
 from tests.support.commands import flightstack_command, sim_bridge_command
 
@@ -51,6 +53,30 @@ def test_a_closed_output_is_an_error_that_is_returned(monkeypatch: pytest.Monkey
     output.close()
     monkeypatch.setattr(sys, "stdout", output)
     assert isinstance(console.say("line"), ValueError)
+
+
+def test_lost_output_is_raised_once_at_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    with Path("/dev/full").open("w") as full:
+        monkeypatch.setattr(sys, "stdout", full)
+        console.check_output()
+        FlyConsole().print("figures")
+        assert console.say("line") is None  # to /dev/null
+        with pytest.raises(OSError, match="No space left on device"):
+            console.check_output()
+        console.check_output()
+
+
+def test_lost_output_of_stderr_or_a_closed_pipe_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    with Path("/dev/full").open("w") as full, os.fdopen(writer, "w") as pipe:
+        monkeypatch.setattr(sys, "stderr", full)
+        monkeypatch.setattr(sys, "stdout", pipe)
+        console.complain("line")
+        assert isinstance(console.say("line"), BrokenPipeError)
+        FlyConsole().print("figures")
+        FlyConsole(stderr=True).print("figures")
+        console.check_output()
 
 
 def test_an_os_error_names_its_file(
