@@ -65,16 +65,25 @@ def write_bytes_atomically(
     File and directory are synced, so that after a power loss either the old or the new file is there. Without
     ``survives_power_loss`` nothing is synced.
     """
-    try:
-        with replacing(path, mode) as temporary, open(temporary, "wb") as file:
-            file.write(data)
-            file.flush()
-            if survives_power_loss and _is_replaceable(temporary):
-                os.fsync(file.fileno())
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, str(path)) from error  # not the temporary file
+    with replacing(path, mode) as temporary, open(temporary, "wb") as file:
+        file.write(data)
+        file.flush()
+        if survives_power_loss and _is_replaceable(temporary):
+            os.fsync(file.fileno())
     if survives_power_loss:
         _sync_folder(Path(os.path.realpath(path)).parent)
+
+
+@contextlib.contextmanager
+def naming(path: Path, temporary: Path) -> Iterator[None]:
+    """Name ``path``, as the user gave it, in an OSError that names no file, or ``temporary`` or a file in it."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is not None and not str(error.filename).startswith(str(temporary)):
+            raise
+        reason = os.strerror(error.errno) if error.errno else error.strerror or str(error)
+        raise OSError(error.errno, reason, str(path)) from error
 
 
 @contextlib.contextmanager
@@ -83,24 +92,27 @@ def replacing(path: Path, mode: int | None = None) -> Iterator[Path]:
 
     Its name is random and it is created exclusively, so that an existing file or link is never written to. On an
     error the temporary file is removed and ``path`` is unchanged. The target of a link is replaced, not the link; a
-    device or a pipe is yielded itself. Without ``mode`` the new file has the permissions of the old one. Raise OSError.
+    device or a pipe is yielded itself. Without ``mode`` the new file has the permissions of the old one. Raise OSError,
+    which names ``path`` instead of the temporary file.
     """
     if not _is_replaceable(path):  # before links are resolved: /dev/stdout may link to "pipe:[1]"
-        yield path
+        with naming(path, path):
+            yield path
         return
-    path = Path(os.path.realpath(path))
-    is_kept = mode is None and path.exists()
-    if mode is None:
-        mode = path.stat().st_mode & 0o777 if is_kept else _OPEN_TO_ALL
-    temporary = path.with_name(f".{secrets.token_hex(8)}.{path.name[-_LONGEST_TAIL:]}")
-    os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, mode))
-    try:
-        if is_kept:
-            temporary.chmod(mode)  # independent of the umask
-        yield temporary
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    target = Path(os.path.realpath(path))
+    temporary = target.with_name(f".{secrets.token_hex(8)}.{target.name[-_LONGEST_TAIL:]}")
+    with naming(path, temporary):
+        is_kept = mode is None and target.exists()
+        if mode is None:
+            mode = target.stat().st_mode & 0o777 if is_kept else _OPEN_TO_ALL
+        os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, mode))
+        try:
+            if is_kept:
+                temporary.chmod(mode)  # independent of the umask
+            yield temporary
+            temporary.replace(target)
+        finally:
+            temporary.unlink(missing_ok=True)
 
 
 def _is_replaceable(path: Path) -> bool:

@@ -8,6 +8,7 @@ digests of all that the flights depend on.
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import hashlib
 import json
@@ -17,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from flightstack import __version__
-from flightstack.core.atomic_file import write_text_atomically
+from flightstack.core.atomic_file import naming, write_text_atomically
 from flightstack.core.errors import ConfigError
 from gcs_cli.campaign.installed import FLYING, sources_digest
 from gcs_cli.campaign.plan import PlannedFlight
@@ -51,7 +52,7 @@ class Journal:
 
         ``overwrite``: begin anew, whatever is there.
         """
-        path = folder / JOURNAL
+        self._path = path = folder / JOURNAL
         is_new = not path.exists()
         self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
         try:
@@ -92,18 +93,18 @@ class Journal:
         with os.fdopen(os.dup(self._descriptor), "rb") as file:
             file.seek(0)
             content = file.read()
-        rows, end = _whole_rows(content)
+        rows, end = _whole_rows(self._path, content)
         if end < len(content):
             os.ftruncate(self._descriptor, end)
         return rows
 
     def add(self, row: Row) -> None:
-        """Append a row; raise OSError."""
+        """Append a row; raise OSError, which names the journal."""
         line = json.dumps(row, allow_nan=False).encode() + b"\n"
-        written = os.write(self._descriptor, line)
-        if written < len(line):  # a full disk; the next start removes the part
-            raise OSError(f"{JOURNAL}: {written} of {len(line)} bytes were written")
-        os.fsync(self._descriptor)
+        with naming(self._path, self._path):
+            if os.write(self._descriptor, line) < len(line):  # the next start removes the part
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            os.fsync(self._descriptor)
         self.rows[int(row["flight"])] = row
 
     def check_unchanged(self, record: Mapping[str, Any]) -> None:
@@ -130,7 +131,7 @@ def open_journal(folder: Path, record: Mapping[str, Any], overwrite: bool = Fals
 def flown_before(folder: Path, number: int) -> PlannedFlight:
     """Return a flight of the journal in ``folder``; raise CliError (usage) if it is not there."""
     try:
-        rows, _ = _whole_rows((folder / JOURNAL).read_bytes())
+        rows, _ = _whole_rows(folder / JOURNAL, (folder / JOURNAL).read_bytes())
     except FileNotFoundError:
         raise CliError(f"{folder}: there is no search: --only repeats one of its flights", USAGE) from None
     if number not in rows:
@@ -148,7 +149,7 @@ def changed_since(folder: Path, files: Mapping[str, bytes]) -> str:
     return ""
 
 
-def _whole_rows(content: bytes) -> tuple[dict[int, Row], int]:
+def _whole_rows(path: Path, content: bytes) -> tuple[dict[int, Row], int]:
     """Return the rows up to the last line's end, and the number of their bytes; raise CliError for a damaged one."""
     end = content.rfind(b"\n") + 1
     rows: dict[int, Row] = {}
@@ -158,7 +159,7 @@ def _whole_rows(content: bytes) -> tuple[dict[int, Row], int]:
             rows[int(row["flight"])] = row
         except (ValueError, TypeError, KeyError):
             remedy = "mend the line, or --overwrite to fly all again"
-            raise CliError(f"{JOURNAL}: line {number} is damaged: {remedy}", USAGE) from None
+            raise CliError(f"{path}: line {number} is damaged: {remedy}", USAGE) from None
     return rows, end
 
 

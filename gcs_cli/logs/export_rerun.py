@@ -29,7 +29,10 @@ def export_rerun(recording: Recording, path: Path) -> int:
         stream = rr.RecordingStream("flightstack", recording_id=Path(recording.source).name)
         stream.save(str(temporary))
         count = _write(rr, stream, recording)
-        stream.flush()
+        try:
+            stream.flush()
+        except RuntimeError as error:  # a full disk; the library tells no reason
+            raise OSError(0, f"cannot be written: {error}") from error
         stream.disconnect()
     return count
 

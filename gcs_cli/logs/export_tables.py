@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from flightstack.core.atomic_file import naming
 from flightstack.core.errors import ConfigError
 from gcs_cli.errors import library
 from gcs_cli.logs.info import start_utc
@@ -90,16 +91,20 @@ def _export(
 
 @contextmanager
 def new_folder(folder: Path) -> Iterator[Path]:
-    """Yield an empty directory, whose files go to ``folder`` at the end; after an error nothing is left."""
+    """Yield an empty directory, whose files go to ``folder`` at the end; after an error nothing is left.
+
+    Raise OSError, which names ``folder`` instead of the temporary directory.
+    """
     folder.parent.mkdir(parents=True, exist_ok=True)
     temporary = folder.with_name(f".{secrets.token_hex(8)}.{folder.name[-60:]}")
-    temporary.mkdir()
-    try:
-        yield temporary
-        if folder.is_dir():
-            for file in temporary.iterdir():
-                file.replace(folder / file.name)
-        else:
-            temporary.rename(folder)
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+    with naming(folder, temporary):
+        temporary.mkdir()
+        try:
+            yield temporary
+            if folder.is_dir():
+                for file in temporary.iterdir():
+                    file.replace(folder / file.name)
+            else:
+                temporary.rename(folder)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)

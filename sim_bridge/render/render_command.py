@@ -98,7 +98,7 @@ def _errors_reported(caller: str) -> Iterator[None]:
         raise SystemExit(_INTERRUPTED) from None
     except OSError as error:
         reason = error.strerror or (str(error).splitlines() or ["unknown reason"])[0]
-        sentence, code = f"the pictures cannot be written: {reason}", 1
+        sentence, code = f"{error.filename or 'the pictures cannot be written'}: {reason}", 1
     except (UsageProblemError, ConfigError) as error:
         sentence, code = str(error), 2
     else:

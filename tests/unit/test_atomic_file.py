@@ -121,6 +121,32 @@ def test_a_failed_write_keeps_the_old_file(tmp_path: Path, monkeypatch: pytest.M
     assert os.listdir(tmp_path) == ["a.txt"]
 
 
+@pytest.mark.parametrize("has_name", [True, False])
+def test_a_write_error_names_the_file_not_its_temporary_one(has_name: bool, tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    with pytest.raises(OSError, match="No space left") as raised, replacing(path) as temporary:
+        raise OSError(errno.ENOSPC, "No space left on device", *([str(temporary)] if has_name else []))
+    assert raised.value.filename == str(path)
+
+
+def test_an_error_of_another_file_keeps_its_name(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError) as raised, replacing(tmp_path / "a.mcap"):
+        (tmp_path / "missing").read_text()
+    assert raised.value.filename == str(tmp_path / "missing")
+
+
+def test_a_temporary_file_that_cannot_be_made_is_not_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(path: Path, *_: object) -> None:
+        raise OSError(errno.EROFS, "Read-only file system", str(path))
+
+    monkeypatch.setattr(atomic_file.os, "open", fail)
+    with pytest.raises(OSError, match="Read-only") as raised, replacing(tmp_path / "a.mcap"):
+        pass
+    assert raised.value.filename == str(tmp_path / "a.mcap")
+
+
 def test_an_existing_file_is_refused_unless_it_may_be_overwritten(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
     check_new(path, overwrite=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import errno
 import io
 import json
 import os
@@ -94,9 +95,20 @@ def test_damaged_line_is_named_and_the_file_stays(tmp_path: Path, damaged: bytes
     lines[1] = damaged
     content = b"\n".join(lines) + b"\n"
     (tmp_path / JOURNAL).write_bytes(content)
-    with pytest.raises(CliError, match="line 2 is damaged"):
+    with pytest.raises(CliError, match=f"^{tmp_path / JOURNAL}: line 2 is damaged"):
         Journal(tmp_path, RECORD_1)
     assert (tmp_path / JOURNAL).read_bytes() == content
+
+
+def test_full_disk_names_the_journal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with open_journal(tmp_path, RECORD_1) as journal:
+        monkeypatch.setattr(os, "fsync", fail)
+        with pytest.raises(OSError, match="No space left") as raised:
+            journal.add(ROWS[0])
+        assert raised.value.filename == str(tmp_path / JOURNAL)
 
 
 def test_journal_is_written_before_add_returns(tmp_path: Path) -> None:

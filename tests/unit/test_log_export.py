@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
 import math
 import sys
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gcs_cli.errors import USAGE
+from gcs_cli.errors import FAILED, USAGE
 from gcs_cli.logs.export_mcap import export_mcap
 from gcs_cli.logs.export_rerun import TIMELINE, entity_path, export_rerun
 from gcs_cli.logs.export_tables import export_csv, export_parquet
@@ -140,6 +141,40 @@ def test_an_interrupted_export_leaves_nothing(
     with pytest.raises(KeyboardInterrupt):
         export_mcap(log, tmp_path / "log.mcap")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_write_error_names_the_given_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    log, out = tmp_path / "a.tlog", tmp_path / "out"
+    log.write_bytes(small_tlog())
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    def read_only(path: Path, *_: object, **__: object) -> None:
+        if path.parent == tmp_path:
+            raise OSError(errno.EROFS, "Read-only file system", str(path))
+
+    with monkeypatch.context() as patch:
+        patch.setattr("gcs_cli.logs.export_tables.csv.writer", full)
+        expected = f"gcs: {out}: No space left on device\n"
+        assert gcs("log", "export", log, "--csv", out) == ("", expected, FAILED)
+    monkeypatch.setattr("pathlib.Path.mkdir", read_only)
+    expected = f"gcs: {out}: Read-only file system\n"
+    assert gcs("log", "export", log, "--csv", out) == ("", expected, FAILED)
+
+
+def test_a_recording_that_rerun_cannot_write_is_named(
+    log: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rerun = pytest.importorskip("rerun")
+
+    def fail(_: object) -> None:
+        raise RuntimeError("the writer ended")
+
+    monkeypatch.setattr(rerun.RecordingStream, "flush", fail)
+    with pytest.raises(OSError, match="cannot be written: the writer ended") as raised:
+        export_rerun(log, tmp_path / "log.rrd")
+    assert raised.value.filename == str(tmp_path / "log.rrd")
 
 
 def test_existing_exports_are_kept_without_overwrite(tmp_path: Path) -> None:
