@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from rich.console import Console
 
@@ -27,8 +27,18 @@ def _drag_of(options: FlyOptions) -> tuple[float, float, float]:
     return (0.0, 0.0, 0.0) if options.plant == NO_DRAG_PLANT else flown_vehicle(options).linear_drag_n_s_m
 
 
-def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[str, Any], Outcome]:
-    """Write summary and report; return the summary, and the outcome after reading the log."""
+class Results(NamedTuple):
+    """Results of a flight."""
+
+    summary: dict[str, Any]
+    outcome: Outcome
+    """Outcome after reading the log."""
+    failure: CliError | None
+    """The error of results that could not be written."""
+
+
+def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> Results:
+    """Write summary and report; return them even if they cannot be written."""
     log, outcome = flown.folder / LOG_NAME, flown.outcome
     try:
         data = read_flight(log)
@@ -38,13 +48,13 @@ def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[s
             outcome = Outcome(Code.NO_LOG, f"the mission was flown, but its log cannot be read: {error}")
     else:
         outcome = with_log(outcome, data, plan.items)
-    summary = summarise(data, plan, _run_info(options, flown, outcome))
+    summary, failure = summarise(data, plan, _run_info(options, flown, outcome)), None
     try:
         write_summary(flown.folder / SUMMARY_NAME, summary)
         write_report(flown.folder / REPORT_NAME, data, plan, summary, flown.folder / TLOG_NAME)
     except OSError as error:
-        raise CliError(f"{flown.folder}: the results cannot be written: {error.strerror}") from None
-    return summary, outcome
+        failure = CliError(f"{flown.folder}: the results cannot be written: {error.strerror}")
+    return Results(summary, outcome, failure)
 
 
 def _run_info(options: FlyOptions, flown: Flown, outcome: Outcome) -> RunInfo:

@@ -151,7 +151,7 @@ def run_fly(options: FlyOptions, run: RunOptions, out: Path | None) -> None:
     finally:
         display.close()
     results = importlib.import_module(_RESULTS)  # late: see run_flight
-    summary, outcome = results.write_results(options, items, flown)
+    summary, outcome, failure = results.write_results(options, items, flown)
     if run.as_json:
         print(json.dumps({**summary, "directory": str(flown.folder)}), flush=True)
     else:
@@ -160,4 +160,8 @@ def run_fly(options: FlyOptions, run: RunOptions, out: Path | None) -> None:
     if run.open_report and report.exists():
         webbrowser.open(report.resolve().as_uri())
     if not outcome.completed:
+        if failure is not None:
+            complain(f"gcs: {failure}")
         raise CliError(f"{outcome.reason} (see {flown.folder})", outcome.exit_code)
+    if failure is not None:
+        raise failure

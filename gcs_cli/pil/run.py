@@ -146,7 +146,9 @@ def fly_stage(
         flown = fly(options, plan, folder / place, display, overwrite)
     finally:
         display.close()
-    summary, outcome = write_results(options, plan, flown)
+    summary, outcome, failure = write_results(options, plan, flown)
+    if failure is not None:
+        raise failure
     try:
         samples = read_samples(folder / place / LOG_NAME)
     except ConfigError:  # a flight that never began has no log; its outcome has the reason

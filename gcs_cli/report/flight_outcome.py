@@ -113,17 +113,33 @@ def _warnings(view: VehicleView) -> str:
 
 
 def with_log(outcome: Outcome, flight: Flight, items: Sequence[MissionItem]) -> Outcome:
-    """Return the outcome with what the log adds: the cause of an early end, a crash, items that were not reached."""
+    """Return the outcome with what the log adds: cause of an early end, crash, items not reached, its own end.
+
+    The codes that it changes are those of a vehicle that has disarmed.
+    """
     if outcome.code not in (Code.COMPLETED, Code.INCOMPLETE):
         return outcome
     failed = outcome.reason.replace(COMPLETED.reason, "the vehicle crashed at the end of the mission")
     if any(status.nav_state == _TERMINATED for status in flight.statuses) or flight.disarmed_in_air:
         return Outcome(Code.LOST_CONTROL, failed)
     failsafe = any(status.failsafe for status in flight.statuses)
+    cut = _cut(flight)
     if not outcome.completed:
-        return outcome._replace(code=Code.FAILSAFE) if failsafe else outcome
-    notes = [_unreached(flight, items), "a failsafe acted on the way" if failsafe else ""]
+        return _noted(outcome._replace(code=Code.FAILSAFE) if failsafe else outcome, cut)
+    return _noted(
+        outcome, cut or _unreached(flight, items), "a failsafe acted on the way" if failsafe else ""
+    )
+
+
+def _noted(outcome: Outcome, *notes: str) -> Outcome:
     return outcome._replace(reason="; ".join([outcome.reason, *(note for note in notes if note)]))
+
+
+def _cut(flight: Flight) -> str:
+    """Say that the log of a vehicle that has disarmed ends before that, as on a full disk; else return nothing."""
+    if flight.statuses and not flight.statuses[-1].armed:
+        return ""
+    return f"the flight log ends early, at {flight.duration_s:.1f} s, and so do the figures"
 
 
 def _unreached(flight: Flight, items: Sequence[MissionItem]) -> str:

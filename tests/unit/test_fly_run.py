@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import errno
+import json
 import threading
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from gcs_cli.fly import fly_run
-from gcs_cli.fly.flight import Phase
+from gcs_cli.errors import FAILED
+from gcs_cli.fly import fly_results, fly_run
+from gcs_cli.fly.flight import Flown, Phase
+from gcs_cli.report.flight_outcome import COMPLETED
+from tests.support.commands import gcs
+from tests.support.sample_logs import small_ulog
 
 
 def test_results_are_imported_once_beside_the_exchange_of_messages(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -48,3 +55,26 @@ def test_results_are_imported_once_beside_the_exchange_of_messages(monkeypatch: 
     )
     assert len(importers) == 1
     assert importers[0] is not threading.main_thread()
+
+
+def test_full_disk_loses_neither_the_evaluation_nor_that_the_log_is_cut(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = small_ulog()
+    (tmp_path / "flight.ulg").write_bytes(content[: len(content) // 2])
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    flown = Flown(tmp_path, COMPLETED, 1.0, None, False)
+    monkeypatch.setattr(fly_run, "fly", lambda *_: flown)
+    monkeypatch.setattr(fly_results, "write_summary", full)
+    ended = gcs("fly", "square", "--out", tmp_path)
+    failure = f"{tmp_path}: the results cannot be written: No space left on device"
+    assert (ended.stderr, ended.returncode) == (f"gcs: {failure}\n", FAILED)
+    assert "the mission was flown to its end; the flight log ends early, at 1" in ended.stdout
+    assert "tracking rms error 0." in ended.stdout
+    ended = gcs("fly", "square", "--out", tmp_path, "--json")
+    summary, error = map(json.loads, ended.stdout.splitlines())
+    assert "the flight log ends early" in summary["outcome_text"]
+    assert error["message"] == failure

@@ -7,6 +7,7 @@ import json
 import math
 import re
 import struct
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -241,6 +242,11 @@ def test_the_log_tells_why_a_mission_ended_early() -> None:
     assert with_log(EARLY, flown_with(ARMED, landed=False), items).code is Code.LOST_CONTROL
     crashed = with_log(COMPLETED, flown_with(ARMED, landed=False), items)
     assert (crashed.code, crashed.exit_code) == (Code.LOST_CONTROL, FAILED)
+    cut = flown_with(ARMED, landed=False)
+    cut = replace(cut, statuses=cut.statuses[:-1], duration_s=1.52)
+    note = "; the flight log ends early, at 1.5 s, and so do the figures"
+    assert with_log(EARLY, cut, items) == EARLY._replace(reason=EARLY.reason + note)
+    assert with_log(COMPLETED, cut, items) == COMPLETED._replace(reason=COMPLETED.reason + note)
     refused = Outcome(Code.REFUSED, "the vehicle refused to arm: no")
     assert with_log(refused, flown_with(ARMED, TERMINATION), items) == refused
 
