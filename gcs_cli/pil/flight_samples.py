@@ -10,7 +10,7 @@ import numpy as np
 
 from flightstack.core.contract import LoopStatus
 from flightstack.core.errors import ConfigError
-from gcs_cli.logs.ulog_parser import DAMAGE, parse_ulog
+from gcs_cli.logs.ulog_parser import DAMAGE, ParsedLog, parse_ulog
 from gcs_cli.pil.signals import SIGNALS
 from gcs_cli.pil.ulps import Float32Array
 
@@ -45,6 +45,9 @@ class FlightSamples(NamedTuple):
     """Parameters at the start."""
     changes: tuple[tuple[int, str, float], ...]
     """Time [µs], name and value of each later change, in order; effective after the samples of that time."""
+    duration_s: float = 0.0
+    damaged: bool = False
+    """True if a part of the log could not be read."""
 
     @property
     def flown_us(self) -> TimeArray:
@@ -72,12 +75,13 @@ def read_samples(path: Path) -> FlightSamples:
     except OSError as error:
         raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
     try:
-        return _samples(path, parse_ulog(content, path, _TOPICS).log)
+        return _samples(path, parse_ulog(content, path, _TOPICS))
     except DAMAGE as error:
         raise ConfigError(path, "", f"is not a readable flight log: {error}") from error
 
 
-def _samples(path: Path, log: Any) -> FlightSamples:
+def _samples(path: Path, parsed: ParsedLog) -> FlightSamples:
+    log = parsed.log
     topics = {item.name: item.data for item in log.data_list}
     if "status" not in topics.get("wrench", {}):
         raise ConfigError(path, "", "is not a log of flightstack: it holds no wrench of its loops")
@@ -93,6 +97,8 @@ def _samples(path: Path, log: Any) -> FlightSamples:
         dict(log.msg_info_dict),
         dict(log.initial_parameters),
         tuple((int(at), str(name), float(value)) for at, name, value in log.changed_parameters),
+        (log.last_timestamp - log.start_timestamp) * 1e-6,
+        parsed.damaged,
     )
 
 

@@ -24,6 +24,7 @@ from flightstack.params.behaviour import SPECS
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
 from flightstack.params.vehicle import Vehicle, load_vehicle
 from gcs_cli.errors import NO_ANSWER, USAGE, CliError
+from gcs_cli.logs.reader import warn_if_damaged
 from gcs_cli.pil.code_facts import code_facts
 from gcs_cli.pil.compare import Difference, compared, deviation
 from gcs_cli.pil.flight_samples import FlightSamples, read_samples
@@ -89,8 +90,9 @@ def prepared(source: Path, vehicle: str | None) -> Replay:
 
 
 def read_flight(log: Path) -> tuple[FlightSamples, Recording]:
-    """Read a log; raise ConfigError."""
+    """Read a log, with a warning if it is damaged; raise ConfigError."""
     flight = read_samples(log)
+    warn_if_damaged(flight, log)
     try:
         return flight, recording(flight)
     except UnfitLogError as error:

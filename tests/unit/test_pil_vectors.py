@@ -77,6 +77,17 @@ def test_vectors_of_a_flight_replay_without_a_difference(log: Path, tmp_path: Pa
     assert {row["largest"] for row in of_log} == {0.0}
 
 
+def test_damaged_log_is_reported(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    half = tmp_path / "half.ulg"
+    content = log.read_bytes()
+    half.write_bytes(content[: len(content) // 2])
+    read_flight(log)
+    assert capsys.readouterr().err == ""
+    flight, _ = read_flight(half)
+    warning = f"gcs: warning: {half}: the log is damaged; read up to {flight.duration_s:.1f} s\n"
+    assert (capsys.readouterr().err, flight.duration_s > 1.0) == (warning, True)
+
+
 def test_excitation_is_replayed_without_a_flight(excited: Vectors, tmp_path: Path) -> None:
     file = tmp_path / "excitation.csv"
     write_vectors(file, excited)
