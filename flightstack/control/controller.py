@@ -10,6 +10,7 @@ from flightstack.control.control_law import ControlLaw
 from flightstack.control.guidance_direct import DIRECT
 from flightstack.control.mixer import ALLOCATION
 from flightstack.control.position_pid import POSITION_PID
+from flightstack.core.contract import AttitudeTarget, PositionSetpoint, Vector3, Wrench
 
 GUIDANCE, POSITION, ATTITUDE, MIXER = ROLES = ("guidance", "position", "attitude", "mixer")
 """Roles of laws, in the order of a tick; fields of ``Controller``."""
@@ -22,6 +23,27 @@ BUILT_IN: Mapping[str, tuple[ControlLaw, ...]] = {
 """Laws of each role that the firmware has."""
 TILT_FIELD = "max_tilt_rad"
 """Parameter of a position law that follows MPC_TILTMAX_AIR, if the law has it."""
+
+
+class StepForm(NamedTuple):
+    """What the step of a role takes, and the name and type of what it returns beside its memory."""
+
+    inputs: tuple[str, ...]
+    output: str
+    output_type: type
+
+
+STEP_FORMS: Mapping[str, StepForm] = {
+    GUIDANCE: StepForm(("memory", "state", "setpoint", "params", "dt_s"), "setpoint", PositionSetpoint),
+    POSITION: StepForm(
+        ("memory", "state", "setpoint", "params", "dt_s", "thrust_saturation"), "target", AttitudeTarget
+    ),
+    ATTITUDE: StepForm(("memory", "inputs", "params", "dt_s"), "torque", Vector3),
+    MIXER: StepForm(
+        ("memory", "wrench", "rotors", "params", "dt_s", "rotor_speed_rad_s", "work"), "achieved", Wrench
+    ),
+}
+"""Form of the step of each role; ``Controller`` explains it."""
 
 
 class Controller(NamedTuple):

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import ast
 import functools
+import inspect
 import os
 import re
 import sys
+import traceback
+from collections.abc import Callable
 from importlib.metadata import EntryPoint, EntryPoints, entry_points
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,12 +20,14 @@ from flightstack.control.control_law import ControlLaw, CStep
 from flightstack.control.controller import (
     BUILT_IN,
     POSITION,
+    STEP_FORMS,
     TILT_FIELD,
     Controller,
     controller_of,
     is_built_in,
 )
 from flightstack.control.position_pid import POSITION_PID
+from flightstack.core.compiled import IS_DISABLED
 from flightstack.core.contract import FloatArray
 from flightstack.core.errors import ConfigError
 from flightstack.params.toml_file import Table
@@ -28,6 +36,8 @@ from flightstack.params.vehicle import Vehicle
 
 ENTRY_POINT_GROUP = "flightstack.attitude_controllers"
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
+_PLACE = re.compile(r'File "([^"]+)", line (\d+)| at (/[^\n]+) \((\d+)\)')
+_UNKNOWN = re.compile(r"name '(\w+)' is not defined|has no attribute '(\w+)'")
 _LONGEST_REASON = 160
 
 
@@ -107,7 +117,18 @@ def _law_problem(role: str, law: object) -> str | None:
         return f"has {initial} initial values for the {fields} fields of its memory (one at least)"
     if not fields_of(law.params_type):
         return "has no parameters: params_type must be a NamedTuple of one float at least"
-    return _tunables_problem(law)
+    return _inputs_problem(role, law) or _tunables_problem(law)
+
+
+def _inputs_problem(role: str, law: ControlLaw) -> str | None:
+    if isinstance(law.step, CStep):
+        return None
+    form, signature = STEP_FORMS[role], inspect.signature(law.step)
+    try:
+        signature.bind(*form.inputs)
+    except TypeError:
+        return f"has a step({', '.join(signature.parameters)}), which must take ({', '.join(form.inputs)})"
+    return None
 
 
 def _tunables_problem(law: ControlLaw) -> str | None:
@@ -149,20 +170,100 @@ def law_params(role: str, law: ControlLaw, vehicle: Vehicle, gains: Table) -> Fl
 
 
 def check_python(controller: Controller) -> None:
-    """Raise ConfigError if a law of the controller is written in C: the loops in Python cannot fly it."""
+    """Raise ConfigError for a law that the loops in Python cannot fly: one in C, or one that is not compiled."""
     for role, law in controller.laws.items():
         if isinstance(law.step, CStep):
             problem = (
                 f"its law of {role} is written in C: fly it with --loops c, host, emulated or serial:DEVICE"
             )
             raise ConfigError("--controller", controller.name, problem)
+        if not (IS_DISABLED or hasattr(law.step, "py_func")):
+            raise controller_error(controller.name, f"its step of {role} is not marked @compiled")
 
 
-def compile_error(name: str, error: Exception) -> ConfigError:
-    """Return the error for a controller whose step does not compile, with reason and line."""
-    place = re.search(r'File "([^"]+)", line (\d+)', _COLOURS.sub("", str(error)))
-    where = f" ({place[1].rsplit('/', 1)[-1]}, line {place[2]})" if place else ""
-    return controller_error(name, f"its step cannot be compiled: {_reason(error)}{where}")
+def compile_error(controller: Controller, error: Exception) -> ConfigError:
+    """Return the error for a controller whose step does not compile, with reason, file and line of the user."""
+    own = controller.own_laws
+    sources = sorted({source.resolve() for law in own.values() for source in law.sources})
+    place = _unknown_name_place(error, sources) or _own_place(error, sources)
+    if place is None:
+        for role, law in own.items():
+            problem = _result_problem(role, law, sources)
+            if problem is not None:
+                step = "its step" if len(own) == 1 else f"its step of {role}"
+                return controller_error(controller.name, f"{step} {problem}")
+    where = f" ({place})" if place else ""
+    return controller_error(controller.name, f"its step cannot be compiled: {_reason(error)}{where}")
+
+
+def _own_place(error: Exception, sources: list[Path]) -> str | None:
+    """Return the innermost place in the user's files that the error names."""
+    places = [
+        (match[1] or match[3], int(match[2] or match[4]))
+        for match in _PLACE.finditer(_COLOURS.sub("", str(error)))
+    ]
+    frames = traceback.extract_tb(error.__traceback__)  # without a compiler, Python's error
+    places += [(frame.filename, frame.lineno or 0) for frame in reversed(frames)]
+    own = (f"{Path(file).name}, line {line}" for file, line in places if Path(file).resolve() in sources)
+    return next(own, None)
+
+
+def _unknown_name_place(error: Exception, sources: list[Path]) -> str | None:
+    """Return the place of a name that does not exist, which Numba's text lacks."""
+    text = _COLOURS.sub("", str(error))
+    unknown = _UNKNOWN.search(text)
+    if unknown is None:
+        return None
+    function = re.search(r"<function (\w+?)(?:__part)? at", text)
+    name = unknown[1] or unknown[2]
+    return _first_place(
+        sources,
+        None if function is None else function[1],
+        lambda node: name in (getattr(node, "id", None), getattr(node, "attr", None)),
+    )
+
+
+def _first_place(
+    sources: list[Path], function: str | None, is_meant: Callable[[ast.AST], bool]
+) -> str | None:
+    """Return the first place that ``is_meant`` in the function of this name, or in any function."""
+    for source in sources:
+        defined = [
+            node
+            for node in ast.walk(ast.parse(source.read_bytes()))
+            if isinstance(node, ast.FunctionDef) and function in (None, node.name)
+        ]
+        inner = (node for outer in defined for node in ast.walk(outer) if is_meant(node))
+        line = min((getattr(node, "lineno", 0) for node in inner), default=None)
+        if line is not None:
+            return f"{source.name}, line {line}"
+    return None
+
+
+def _result_problem(role: str, law: ControlLaw, sources: list[Path]) -> str | None:
+    """Return what is wrong with the result of a step that compiles, unlike the loop around it."""
+    form = STEP_FORMS[role]
+    wanted = f"({law.memory_type.__name__}, {form.output_type.__name__})"
+    part = getattr(law.step, "part", None)
+    results = [_type_name(signature.return_type) for signature in getattr(part, "nopython_signatures", ())]
+    found = next((result for result in results if result != wanted), None)
+    if found is None:
+        return None
+    name = getattr(law.step, "__name__", None)
+    place = _first_place(sources, name, lambda node: isinstance(node, ast.Return)) or _first_place(
+        sources, name, lambda node: isinstance(node, ast.FunctionDef)
+    )
+    where = "" if place is None else f" ({place})"
+    return f"must return (memory, {form.output}), of types {wanted}, and returns {found}{where}"
+
+
+def _type_name(kind: Any) -> str:
+    """Return the name of a type of Numba, without the fields of named tuples."""
+    if hasattr(kind, "instance_class"):
+        return str(kind.instance_class.__name__)
+    if hasattr(kind, "types"):
+        return f"({', '.join(map(_type_name, kind.types))})"
+    return str(kind).replace("none", "None")
 
 
 def _reason(error: Exception) -> str:

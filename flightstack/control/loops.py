@@ -116,16 +116,16 @@ class PythonLoops:
         self._last_arrays: tuple[FloatArray, FloatArray] | None = None
         self._bound: tuple[FloatArray, FloatArray] | None = None
         self._inner, self._outer = self.kernel, self._outer_kernel
-        self._compile(controller.name)
+        self._compile(controller)
 
-    def _compile(self, name: str) -> None:
+    def _compile(self, controller: Controller) -> None:
         """Compile the kernels, or load them from the cache; raise ConfigError."""
         state = np.array([0.0] * 6 + [1.0] + [0.0] * 6)
         self.reset(state)
         try:
             self.warm_up(state, np.zeros(SETPOINT_SIZE), np.zeros(MAX_ROTORS, np.float32))
         except Exception as error:  # a user's controller may fail in any way
-            raise compile_error(name, error) from error
+            raise compile_error(controller, error) from error
 
     @property
     def outer_kernel(self) -> Callable[..., Any]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from flightstack.control.controller import Controller
 from flightstack.control.controller_loading import (
     compile_error,
     load_controller,
@@ -34,6 +35,7 @@ def replaced(old: str, new: str) -> str:
     return MODULE.replace(old, new)
 
 
+RESULT = "its step must return (memory, torque), of types (Memory, Vector3), and returns "
 BROKEN = {
     "its module is missing": (None, "broken:CONTROLLER cannot be loaded: No module named 'broken'"),
     "its module fails": (
@@ -84,15 +86,45 @@ BROKEN = {
     ),
     "unknown name in the step": (
         replaced("+ ahead.x", "+ ahead_x"),
-        "its step cannot be compiled: NameError: name 'ahead_x' is not defined",
+        "its step cannot be compiled: NameError: name 'ahead_x' is not defined (broken.py, line 40)",
+    ),
+    "unknown name in a function that the step calls": (
+        replaced(
+            "class Memory(", "@compiled\ndef half(x):\n    return x * factor\n\n\nclass Memory("
+        ).replace("+ ahead.x", "+ half(ahead.x)"),
+        "its step cannot be compiled: NameError: name 'factor' is not defined (broken.py, line 17)",
+    ),
+    "unknown function of a module": (
+        replaced("params.rate_roll * (", "math.sqrtt("),
+        "its step cannot be compiled: module 'math' has no attribute 'sqrtt' (broken.py, line 40)",
+    ),
+    "torque alone": (
+        replaced("return memory, Vector3(", "return Vector3("),
+        f"{RESULT}Vector3 (broken.py, line 43)",
+    ),
+    "nothing returned": (
+        replaced("    return memory, Vector3(", "    Vector3("),
+        f"{RESULT}None (broken.py, line 36)",
     ),
     "torque that is no vector": (
         replaced("return memory, Vector3(", "return memory, ("),
-        "its step cannot be compiled: Unknown attribute 'x' of type",
+        f"{RESULT}(Memory, (float64, float64, float64)) (broken.py, line 43)",
+    ),
+    "memory that is a number": (
+        replaced("return memory, Vector3(", "return roll, Vector3("),
+        f"{RESULT}(float64, Vector3) (broken.py, line 43)",
     ),
     "one result too many": (
         replaced("return memory, Vector3(", "return memory, 0.0, Vector3("),
-        "its step cannot be compiled: ",
+        f"{RESULT}(Memory, float64, Vector3) (broken.py, line 43)",
+    ),
+    "one argument too few": (
+        replaced("params: Params, dt_s: float", "params: Params"),
+        "broken:CONTROLLER has a step(memory, inputs, params), which must take (memory, inputs, params, dt_s)",
+    ),
+    "a step that is not compiled": (
+        replaced("@compiled\ndef step", "def step"),
+        "its step of attitude is not marked @compiled",
     ),
 }
 
@@ -101,7 +133,7 @@ BROKEN = {
 def test_a_broken_controller_is_one_sentence_that_lists_the_installed_ones(site: Path, name: str) -> None:
     text, sentence = BROKEN[name]
     if text is not None:
-        if "CONTROLLER has" not in sentence and "calls itself" not in sentence:
+        if "CONTROLLER has" not in sentence.replace("has a step", "") and "calls itself" not in sentence:
             text = text.replace('AttitudeController("lqr"', 'AttitudeController("broken"')
         (site / "broken.py").write_text(text)
     info = site / "broken-1.0.dist-info"
@@ -121,7 +153,7 @@ def test_a_broken_controller_is_one_sentence_that_lists_the_installed_ones(site:
 def test_colours_of_the_compiler_do_not_hide_the_reason() -> None:
     """Numba colours its messages if colorama is installed."""
     text = '\x1b[1mFailed in nopython mode\x1b[0m\n\x1b[1mUnknown attribute\x1b[0m\n\x1b[1mFile "a.py", line 3:\x1b[0m'
-    assert "compiled: Unknown attribute (a.py, line 3)" in str(compile_error("pid", ValueError(text)))
+    assert "compiled: Unknown attribute; installed" in str(compile_error(Controller("pid"), ValueError(text)))
 
 
 def test_two_packages_with_one_name_are_not_guessed_between(installed: Path) -> None:
