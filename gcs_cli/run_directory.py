@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from flightstack.core.atomic_file import check_new, write_text_atomically
@@ -64,7 +64,7 @@ def results_directory(out: Path) -> Iterator[None]:
 
     Raise CliError (usage) when it cannot be made, or written to.
     """
-    new = [folder for folder in (out, *out.parents) if not folder.exists()]
+    new = new_folders(out)
     try:
         out.mkdir(parents=True, exist_ok=True)
         if not os.access(out, os.W_OK | os.X_OK):
@@ -74,10 +74,26 @@ def results_directory(out: Path) -> Iterator[None]:
     try:
         yield
     except BaseException:
-        with contextlib.suppress(OSError):  # of the first that holds something
-            for folder in new:
-                folder.rmdir()
+        _remove(new)
         raise
+
+
+def new_folders(folder: Path) -> list[Path]:
+    """Return the folders that have to be made for ``folder``, the innermost first."""
+    return [each for each in (folder, *folder.parents) if not each.exists()]
+
+
+def remove_run(folder: Path, new: Sequence[Path]) -> None:
+    """Remove the files of a flight that never began, and the folders that were made for it."""
+    for name in RESULTS:
+        (folder / name).unlink(missing_ok=True)
+    _remove(new)
+
+
+def _remove(folders: Sequence[Path]) -> None:
+    with contextlib.suppress(OSError):  # of the first that holds something
+        for folder in folders:
+            folder.rmdir()
 
 
 def _fresh(base: Path, name: str) -> Path:

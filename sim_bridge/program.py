@@ -33,11 +33,12 @@ def simulate(given: SimulatorOptions) -> int:
     Raises UsageProblemError, ConfigError.
     """
     served = server_options(given)
+    if given.view:
+        arguments.require("--view")
     if given.check:
         return 0
     if not given.view:
         return serve(served)
-    arguments.require("sim-bridge --view")
     window = LiveView(given.vehicle)
     try:
         return serve(served._replace(view=window))

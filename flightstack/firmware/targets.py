@@ -124,9 +124,27 @@ def make_filter(loops: ControlBackend) -> FilterCore | None:
     return TargetFilter(executor) if isinstance(executor, TargetLoops) else None
 
 
-def _check_clock(choice: LoopsChoice, loops: str, lockstep: bool) -> None:
+def check_loops(loops: str) -> None:
+    """Raise ConfigError for loops that cannot run on this machine; neither compile them nor open a target."""
+    choice = parse_loops(loops)
+    _check_free(choice, loops)
+    if choice.kind == SERIAL:
+        if choice.device.startswith("/") and not Path(choice.device).exists():
+            raise ConfigError("--loops", loops, "no such device")
+        return
+    try:
+        check_tools(choice)
+    except BuildError as error:
+        raise ConfigError("--loops", loops, str(error)) from error
+
+
+def _check_free(choice: LoopsChoice, loops: str) -> None:
     if choice.ending == FREE and choice.kind == EMULATED:
         raise ConfigError("--loops", loops, "cannot run by its own timer: an emulated target has none")
+
+
+def _check_clock(choice: LoopsChoice, loops: str, lockstep: bool) -> None:
+    _check_free(choice, loops)
     if choice.ending == FREE and lockstep:
         problem = f"a free-running target ({loops}) requires --clock realtime: it has its own time"
         raise ConfigError("--clock", "lockstep", problem)

@@ -49,6 +49,9 @@ def check(config: StackConfig) -> None:
     """Raise ConfigError for a configuration that ``build`` refuses; neither compile loops nor open a target."""
     setup = loops_setup(config, rates(config.inner_hz, config.outer_hz))
     if parse_loops(config.loops).kind != PYTHON:
+        from flightstack.firmware.targets import check_loops  # noqa: PLC0415  # 40 ms that loops in Python save
+
+        check_loops(config.loops)
         setup.numbers()
         law_tree(setup.controller)
     else:

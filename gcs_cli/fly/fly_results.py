@@ -101,8 +101,8 @@ def print_summary(console: Console, summary: dict[str, Any], folder: Path) -> No
         ("flown in", ", ".join(conditions(summary))),
         ("time", _time(summary)),
         ("mission", _mission(summary)),
-        ("tracking", _tracking(summary)),
-        ("effort", _effort(summary)),
+        *(() if summary["rms_tracking_error_m"] is None else (("tracking", _tracking(summary)),)),
+        *(() if summary["rms_torque_n_m"] is None else (("effort", _effort(summary)),)),
         *(() if errors is None else (("estimate", _estimate(errors)),)),
         ("files", f"{folder}/  {flight_files(folder)}"),
     )

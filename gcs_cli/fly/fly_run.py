@@ -34,10 +34,13 @@ from gcs_cli.link.tlog import TlogFile
 from gcs_cli.report.flight_outcome import Code, Outcome
 from gcs_cli.run_directory import (
     REPORT_NAME,
+    RUNS,
     SIMULATOR,
     STACK,
     TLOG_NAME,
     make_run_directory,
+    new_folders,
+    remove_run,
 )
 from gcs_cli.vehicle_link import open_signing
 
@@ -51,6 +54,7 @@ def fly(
 ) -> Flown:
     """Fly ``plan`` with a simulator and a flight stack of our own; raise CliError if they cannot be started.
 
+    Nothing is left behind if one of them refuses its options, such as a controller that does not compile.
     The vehicle sends to a port of our own, so that another ground station may use the default one.
     """
     vehicle = (LOOPBACK, vehicle_ground_port(options.instance))
@@ -58,6 +62,7 @@ def fly(
     signing = open_signing(options.signing_key)
     with Interruption() as interruption, Connection(own_port, signing=signing, vehicle=vehicle) as connection:
         check_ports(options)
+        new = new_folders(RUNS if out is None else out)
         folder = make_run_directory(options.plan_path, out, overwrite=overwrite)
         flight = Flight(
             connection.session,
@@ -78,12 +83,19 @@ def fly(
                 children.wait(_END_TIMEOUT_S)
             _show_notices(children, display)
     assert flight.outcome is not None
+    if flight.began_s is None and flight.outcome.exit_code == USAGE:
+        remove_run(folder, new if out is not None else [folder, *new])
+        raise CliError(flight.outcome.reason, USAGE)
+    return _flown(flight, flight.outcome, folder)
+
+
+def _flown(flight: Flight, outcome: Outcome, folder: Path) -> Flown:
     wall_time_s = None
     if flight.began_s is not None and flight.ended_s is not None:
         wall_time_s = flight.ended_s - flight.began_s
     timing = flight.view.timing
     overruns = None if timing is None else timing.overruns
-    return Flown(folder, flight.outcome, wall_time_s, overruns, flight.returned_by_us)
+    return Flown(folder, outcome, wall_time_s, overruns, flight.returned_by_us)
 
 
 @contextmanager

@@ -26,6 +26,7 @@ from gcs_cli.fly.processes import Child, Children
 from gcs_cli.report.analysis import read_flight
 from gcs_cli.tui.fly.panels import SEVERITIES, clock_text
 from tests.support.commands import Ended, gcs
+from tests.support.plugin_site import installed_site
 from tests.support.process import await_output, children_of, ends_of
 from tests.support.programs import NEW_INTERPRETERS, Program
 from tests.support.warm_children import warm_children
@@ -276,10 +277,30 @@ def test_no_vehicle_in_time(tmp_path: Path) -> None:
     assert result.returncode == 3
     assert "within 0.1 s" in result.stderr
     assert "outcome  no_vehicle\n" in result.stdout
+    assert "—" not in result.stdout
     assert "within 0.1 s" not in result.stdout  # each sentence is printed once
     assert summary_of(tmp_path / "run")["outcome"] == "no_vehicle"
     assert "within 0.1 s" in str(summary_of(tmp_path / "run")["outcome_text"])
     assert "within 0.1 s" in (tmp_path / "run" / "report.html").read_text()  # also without a log
+
+
+@pytest.mark.parametrize("is_there", [False, True])
+def test_controller_that_does_not_compile_leaves_nothing_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_there: bool
+) -> None:
+    site, out = installed_site(tmp_path / "site", monkeypatch), tmp_path / "new" / "run"
+    module = site / "lqr_controller.py"
+    module.write_text(module.read_text().replace("+ ahead.x", "+ ahead_x"))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(site), os.environ.get("PYTHONPATH", "")]))
+    if is_there:
+        out.mkdir(parents=True)
+    result = run(out, "--controller", "lqr")
+    assert result.returncode == 2
+    assert "name 'ahead_x' is not defined (lqr_controller.py, line 40)" in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert "—" not in result.stdout
+    assert out.parent.exists() == is_there
+    assert not is_there or not list(out.iterdir())
 
 
 def test_a_child_that_cannot_start_says_why(tmp_path: Path) -> None:

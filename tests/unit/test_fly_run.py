@@ -1,16 +1,20 @@
-"""The loop of ``gcs fly``: it exchanges messages while other work is done."""
+"""The loop of ``gcs fly``: it exchanges messages while other work is done; refusals before and without a flight."""
 
 from __future__ import annotations
 
 import errno
 import json
+import sys
 import threading
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from gcs_cli.errors import FAILED
+from flightstack.core.errors import INSTALL_FIRMWARE, INSTALL_MULTIBODY
+from flightstack.firmware.toolchain.build import BuildError
+from gcs_cli.__main__ import main
+from gcs_cli.errors import FAILED, USAGE
 from gcs_cli.fly import fly_results, fly_run
 from gcs_cli.fly.flight import Flown, Phase
 from gcs_cli.report.flight_outcome import COMPLETED
@@ -78,3 +82,44 @@ def test_full_disk_loses_neither_the_evaluation_nor_that_the_log_is_cut(
     summary, error = map(json.loads, ended.stdout.splitlines())
     assert "the flight log ends early" in summary["outcome_text"]
     assert error["message"] == failure
+
+
+def refusal(words: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    """Return the sentence that refuses a flight."""
+    assert main(["fly", "square", *words]) == USAGE
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    return printed.err
+
+
+@pytest.mark.parametrize("words", [["--view"], ["--plant", "multibody"]], ids=" ".join)
+def test_flight_without_mujoco_is_refused_before_anything_starts(
+    words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sim_bridge.arguments.find_spec", lambda _name: None)
+    assert refusal(words, capsys).endswith(f" needs MuJoCo: {INSTALL_MULTIBODY}\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_emulated_loops_without_emulator_are_refused_before_anything_starts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, "flightstack.firmware.toolchain.cortex_m4", None)
+    said = f"gcs: --loops: emulated: unicorn is not installed: {INSTALL_FIRMWARE}\n"
+    assert refusal(["--loops", "emulated"], capsys) == said
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_loops_in_c_without_compiler_are_refused_before_anything_starts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+
+    def no_compiler() -> None:
+        raise BuildError("no C compiler found")
+
+    monkeypatch.setattr("flightstack.firmware.targets.host_compiler", no_compiler)
+    assert refusal(["--loops", "c"], capsys) == "gcs: --loops: c: no C compiler found\n"
+    assert list(tmp_path.iterdir()) == []

@@ -120,6 +120,8 @@ def test_bad_connection_strings_are_usage_errors(text: str) -> None:
         ("--gains loud", "loud: is neither"),
         ("--vehicle hexa", "hexa: is neither"),
         ("--loops java", "--loops: java is not one of"),
+        ("--loops serial:/dev/nope", "--loops: serial:/dev/nope: no such device"),
+        ("--loops emulated,free --speed 1", "--loops: emulated,free cannot run by its own timer"),
         ("--drag --vehicle x_quad", "--drag: the file of the vehicle x_quad has no optional_drag"),
         ("--drag --plant paper", "--drag: the paper's model has no drag"),
         ("--inner-hz nan", "--inner-hz: nan"),
