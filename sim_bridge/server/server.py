@@ -154,11 +154,12 @@ def _quiet_exchanges(link: FlightStackEndpoint, descriptor: int) -> QuietExchang
 
 def _run(session: Session, connection: Connection, timeout_s: float) -> int:
     link = session.link
-    problem = ""
+    problem, is_stopped = "", False
     try:
         session.run()
         problem = link.error or ""
     except StoppedError:
+        is_stopped = True
         connection.send_last(link.poweroff())
     except PeerClosedError:
         if not link.peer_ended:
@@ -176,4 +177,6 @@ def _run(session: Session, connection: Connection, timeout_s: float) -> int:
     if problem:
         complain(problem)
         return FAILED
+    if is_stopped:
+        say("stopped")
     return DONE

@@ -219,7 +219,8 @@ def test_a_busy_port_is_named_and_nothing_is_started(tmp_path: Path, number: Cal
     [
         ("sim_bridge", signal.SIGKILL, "sim-bridge was killed by signal 9"),
         ("flightstack", signal.SIGKILL, "flightstack was killed by signal 9"),
-        ("sim_bridge", signal.SIGTERM, "sim-bridge ended with code 0"),
+        ("sim_bridge", signal.SIGINT, "sim-bridge ended with code 0: stopped"),
+        ("sim_bridge", signal.SIGTERM, "sim-bridge ended with code 0: stopped"),
         ("flightstack", signal.SIGTERM, "flightstack ended with code 0: stopped"),
     ],
 )

@@ -182,7 +182,8 @@ def test_signals_end_in_order(bridge: SimBridge, number: signal.Signals, connect
         bridge.process.send_signal(number)
         statuses = [m.system_status for m in client.messages() if m.get_type() == "HEARTBEAT"]
     assert statuses == [mavlink.MAV_STATE_POWEROFF]
-    assert bridge.end()[::2] == (0, "")
+    code, out, err = bridge.end()
+    assert (code, out.splitlines()[-1], err) == (0, "sim-bridge: stopped", "")
 
 
 def test_client_on_its_own_clock_gets_states_at_the_rate() -> None:
