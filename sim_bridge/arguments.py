@@ -174,7 +174,7 @@ def parse_faults(texts: list[str], vehicle: Vehicle, plant: str, options: PlantO
 def check_client(faults: tuple[Fault, ...], state: str | None, clock: str | None) -> None:
     """Check state and clock of the flight stack, and that each fault can act on it, if both are known."""
     if state is not None and state not in STATES:
-        problem = f"is not one of {', '.join(STATES)}; the directory is --state-dir"
+        problem = f"is not one of {', '.join(STATES)}"
         raise UsageProblemError(f"--state: {state}: {problem}")
     if clock is not None and clock not in CLOCKS:
         raise UsageProblemError(f"--clock: {clock}: is not one of {', '.join(CLOCKS)}")

@@ -17,13 +17,19 @@ from flightstack.params.vehicle import Vehicle, load_vehicle
 from flightstack.process.clock import Rates, rates
 from flightstack.vehicle.parameters import read_parameters
 
+DIRECTORY_HINT = "; the directory is --state-dir"
+"""End of the refusal of a state in a program that has this option."""
+
+
+def check_state(state: str, hint: str = "") -> None:
+    """Raise ConfigError for an unknown kind of state; ``hint`` ends its text."""
+    if state not in STATES:
+        raise ConfigError("--state", state, f"is not one of {', '.join(STATES)}{hint}")
+
 
 def vehicle_of(config: StackConfig) -> Vehicle:
     """Load the vehicle; raise ConfigError."""
-    if config.state not in STATES:
-        raise ConfigError(
-            "--state", config.state, f"is not one of {', '.join(STATES)}; the directory is --state-dir"
-        )
+    check_state(config.state)
     vehicle = load_vehicle(config.vehicle)
     if config.state == ESTIMATED and not vehicle.sensors.numbers:
         raise ConfigError(

@@ -22,6 +22,7 @@ from flightstack.process.app import App
 from flightstack.process.assembly import build, kernels_of
 from flightstack.process.clock import nearest_outer_hz
 from flightstack.process.compile_notice import announce_compilation
+from flightstack.process.config_check import DIRECTORY_HINT, check_state
 from flightstack.process.console import say
 from flightstack.process.log_files import default_log
 from flightstack.process.options import RunOptions
@@ -75,6 +76,7 @@ def _later(config: StackConfig) -> tuple[str, ...]:
 
 
 def _check_combinations(given: RunOptions) -> None:
+    check_state(given.state, DIRECTORY_HINT)
     if given.clock not in CLOCKS:
         raise ConfigError("--clock", given.clock, f"is not one of {', '.join(CLOCKS)}")
     if given.allow_unsigned and given.signing_key is None:

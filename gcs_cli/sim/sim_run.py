@@ -14,6 +14,7 @@ from pathlib import Path
 from flightstack.core.atomic_file import check_creatable, check_new
 from flightstack.core.port_numbers import system_id, vehicle_ground_port
 from flightstack.mavlink.dialect import mavlink
+from flightstack.process.config_check import DIRECTORY_HINT, check_state
 from flightstack.process.console import complain
 from flightstack.process.ports import ports_config
 from flightstack.process.supervised import supervised
@@ -166,6 +167,7 @@ class Fleet:
 
 def check_vehicle(vehicle: SimOptions) -> None:
     """Check options, files and ports as simulator and flight stack do at their start; raise CliError, ConfigError."""
+    check_state(vehicle.state, DIRECTORY_HINT)
     params = None if vehicle.params == Path(NONE) else vehicle.params
     if params is not None and not params.exists():  # the flight stack says so, and creates it
         check_creatable(params)

@@ -119,6 +119,7 @@ def test_bad_connection_strings_are_usage_errors(text: str) -> None:
         ("--controller fuzzy", "--controller: fuzzy: there is no such attitude controller; installed are "),
         ("--gains loud", "loud: is neither"),
         ("--vehicle hexa", "hexa: is neither"),
+        ("--state thruth", "--state: thruth: is not one of estimated, truth\n"),
         ("--loops java", "--loops: java is not one of"),
         ("--loops serial:/dev/nope", "--loops: serial:/dev/nope: no such device"),
         ("--loops emulated,free --speed 1", "--loops: emulated,free cannot run by its own timer"),

@@ -220,6 +220,7 @@ def test_notices_are_printed_after_the_view(
             "--vehicles 2 --log file/flight.ulg",
             "file/instance-0/flight.ulg: cannot be written: Not a directory",
         ),
+        ("--state here", "--state: here is not one of estimated, truth; the directory is --state-dir"),
         ("--state-dir file", "file: cannot be written: Not a directory"),
         ("--params file/new.params", "file/new.params: cannot be written: Not a directory"),
         ("--vehicles 2 --params missing.params", "missing.params: no such file"),
