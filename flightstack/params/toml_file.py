@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 import re
 import tomllib
+from collections.abc import Iterable
 from copy import deepcopy
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from flightstack.core.errors import ConfigError
+
+_LIKE = 0.85
+"""Similarity of a misspelt key; that of the coefficients of thrust and torque is 0.83."""
+_SHOWN = 8
 
 
 class Table:
@@ -33,9 +39,20 @@ class Table:
         self._read.add(key)
         if key not in self._values:
             if default is None:
-                raise self.error(key, "is missing")
+                raise self.missing(key)
             return default
         return self._values[key]
+
+    def missing(self, *keys: str) -> ConfigError:
+        """Return the error for a table without any of ``keys``; it names a misspelt key, or those that are there."""
+        others = sorted(set(self._values) - self._read)
+        near = next((other for key in keys for other in _like(key, others)), None)
+        either = "".join(f": give it or {key}" for key in keys[1:])
+        if near is not None:
+            hint = f"; did you misspell it as {near}?"
+        else:
+            hint = f"; there are {_listed(self._values)}" if self._values else ""
+        return self.error(keys[0], f"is missing{either}{hint}")
 
     def number(self, key: str, low: float, high: float, default: float | None = None) -> float:
         """Return a finite number in [low, high]."""
@@ -122,13 +139,27 @@ class Table:
         """Raise ConfigError for a key that is not in ``keys`` and does not begin with one of ``prefix``."""
         for key in self._values:
             if key not in keys and not key.startswith(prefix):
-                raise self.error(key, "is not a known key")
+                raise self._unknown(key, keys)
 
     def finish(self) -> None:
         """Raise ConfigError for a key that was not read, such as a misspelt one."""
         unknown = sorted(set(self._values) - self._read)
         if unknown:
-            raise self.error(unknown[0], "is not a known key")
+            raise self._unknown(unknown[0], sorted(self._read))
+
+    def _unknown(self, key: str, known: Iterable[str]) -> ConfigError:
+        near = _like(key, known)
+        hint = f"did you mean {near[0]}?" if near else f"known are {_listed(known)}"
+        return self.error(key, f"is not a known key; {hint}" if known else "is not a known key")
+
+
+def _like(key: str, others: Iterable[str]) -> list[str]:
+    return difflib.get_close_matches(key, list(others), 1, _LIKE)
+
+
+def _listed(keys: Iterable[str]) -> str:
+    names = list(keys)
+    return ", ".join(names if len(names) <= _SHOWN else [*names[:_SHOWN], "…"])
 
 
 def read_toml(path: Path) -> Table:

@@ -271,6 +271,8 @@ def _rotors(top: Table, rotor_type: Table, mass_kg: float) -> tuple[Rotor, ...]:
         raise top.error("rotor", f"{len(entries)} rotors given, 4 to {MAX_ROTORS} are allowed")
     thrust_coefficient = rotor_type.number("thrust_coefficient_n_s2", 1e-12, 1.0)
     min_speed = rotor_type.number("min_speed_rad_s", 0.0, 1e5, 0.0)
+    if not (rotor_type.has("max_speed_rad_s") or rotor_type.has("thrust_to_weight")):
+        raise rotor_type.missing("max_speed_rad_s", "thrust_to_weight")
     if rotor_type.has("max_speed_rad_s"):
         max_speed = rotor_type.number("max_speed_rad_s", 1.0, 1e5)
     else:

@@ -94,7 +94,10 @@ def test_its_own_table_in_a_gains_file_is_read_and_checked(installed: Path, tmp_
     path.write_text(tuned + "\n[attitude_lqr]\nlargest_angle_rad = [0.1, 0.1, 0.2]\n")
     build(StackConfig(controller="lqr", gains=str(path)), lambda: None)
     for bad, sentence in (
-        ("largest_angle = 1", "attitude_lqr.largest_angle: is not a known key"),
+        (
+            "largest_angle = 1",
+            "attitude_lqr.largest_angle: is not a known key; did you mean largest_angle_rad?",
+        ),
         (
             "largest_angle_rad = [9, 9, 9]",
             "attitude_lqr.largest_angle_rad: 9 is outside the allowed range 0.001 to 3",

@@ -61,9 +61,13 @@ def test_numbers_of_the_file_replace_those_of_the_grade(tmp_path: Path) -> None:
         ("[sensors.imu]\ncount = 4", "sensors.imu.count: 4 is outside the allowed range 1 to 3"),
         ("[sensors.imu]\ncount = 1.5", "sensors.imu.count: 1.5 is not a whole number"),
         ("[sensors.imu]\nposition_frd_m = [0, 0]", "sensors.imu.position_frd_m: must be a list of 3 numbers"),
-        ("[sensors.mag]\nnoise = 0.1", "sensors.mag.noise: is not a known key"),
+        (
+            "[sensors.mag]\nnoise = 0.1",
+            "sensors.mag.noise: is not a known key; known are current_gauss_a, hard_iron_gauss, noise_gauss, "
+            "range_gauss, rate_hz, resolution_gauss, soft_iron",
+        ),
         ("[sensors.sonar]\nrate_hz = 5", "sensors.sonar: is not a known key"),
-        ('[sensors]\ngrade = "none"\nmag = true', "sensors.mag: is not a known key"),
+        ('[sensors]\ngrade = "none"\nmag = true', "sensors.mag: is not a known key; known are grade"),
         ("[sensors.range]\nmin_m = 5\nmax_m = 4", "sensors.range.min_m: 5 is not below max_m, 4"),
         (
             "[sensors]\nimu = false",

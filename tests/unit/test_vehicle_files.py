@@ -158,6 +158,24 @@ BAD = {
         value("inertia_kg_m2", "[1e-3, 1e-3, 1e-2]"),
         "body.inertia_kg_m2: no rigid body has it: each must be at most the sum of the other two",
     ),
+    "misspelt mass": (
+        PAPER.replace("mass_kg", "mas_kg"),
+        "body.mass_kg: is missing; did you misspell it as mas_kg?",
+    ),
+    "mass without unit": (PAPER.replace("mass_kg", "mass"), "body.mass_kg: is missing; there are mass, "),
+    "misspelt body": (PAPER.replace("[body]", "[boddy]"), "body: is missing; did you misspell it as boddy?"),
+    "misspelt rotor": (
+        PAPER.replace("[[rotor]]", "[[rotors]]"),
+        "rotor: is missing; did you misspell it as rotors?",
+    ),
+    "misspelt largest speed": (
+        re.sub("thrust_to_weight|max_speed_rad_s", "max_sped_rad_s", PAPER),
+        "rotor_type.max_speed_rad_s: is missing: give it or thrust_to_weight; did you misspell it as max_sped_rad_s?",
+    ),
+    "misspelt optional key": (
+        PAPER.replace("lag_s", "lagg_s"),
+        "rotor_type.lagg_s: is not a known key; did you mean lag_s?",
+    ),
     "unknown key": (value("leg_height_m", "0.1\nwings = 2"), "body.wings: is not a known key"),
     "unknown key at the top": ("colour = 'red'\n" + PAPER, "colour: is not a known key"),
     "misspelt rotor key": (value("lag_s", "0.1\nlagg = 2"), "rotor_type.lagg: is not a known key"),
