@@ -11,7 +11,7 @@ from typing import Any
 
 import typer
 
-from flightstack.core.errors import ConfigError
+from flightstack.core.errors import ConfigError, WriteError
 from flightstack.process.command_line import UsageError, usage_sentence
 from flightstack.process.console import check_output, complain, drop, say
 from flightstack.process.interrupts import signals
@@ -83,7 +83,7 @@ def run_command(run: Callable[[], int | None], as_json: bool) -> int:
     except CliError as error:
         sentence, code = str(error), error.exit_code
     except ConfigError as error:
-        sentence, code = str(error), USAGE
+        sentence, code = str(error), FAILED if isinstance(error, WriteError) else USAGE
     signals.reported = True  # a second one neither replaces nor repeats the sentence
     if not sentence:
         return code

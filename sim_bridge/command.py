@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from flightstack.core.errors import ConfigError
+from flightstack.core.errors import ConfigError, WriteError
 from flightstack.process import collection, console
 from flightstack.process.command_line import (
     Overwrite,
@@ -118,6 +118,7 @@ def run_command(argv: list[str]) -> int:
         complain(usage_sentence(error))
     except (UsageProblemError, ConfigError) as error:
         complain(error)
+        return 1 if isinstance(error, WriteError) else 2
     except OSError as error:
         return console.report_os_error("sim-bridge", error)
     return 2

@@ -9,6 +9,7 @@ from typing import Any
 
 from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.core.contract import Vector3
+from flightstack.core.errors import WriteError
 from flightstack.core.port_numbers import simulator_port, system_id
 from flightstack.params.vehicle import Vehicle, hidden_vehicle, load_vehicle
 from flightstack.process import console
@@ -134,7 +135,7 @@ def _table(state: dict[str, Any]) -> str:
 
 
 def write_mjcf(name: str, out: Path | None, overwrite: bool, scene: bool) -> None:
-    """Write a vehicle's multibody model, to stdout if ``out`` is None; raise UsageProblemError, ConfigError."""
+    """Write a vehicle's multibody model, to stdout if ``out`` is None; raise ConfigError."""
     if out is not None:
         check_new(out, overwrite)
     vehicle = _named_vehicle(name)
@@ -149,7 +150,7 @@ def write_mjcf(name: str, out: Path | None, overwrite: bool, scene: bool) -> Non
     try:
         write_text_atomically(out, text)
     except OSError as error:
-        raise UsageProblemError(f"--out {out}: cannot be written: {error.strerror}") from None
+        raise WriteError(out, "", f"cannot be written: {error.strerror}") from None
 
 
 def _disturbance(given: SimulatorOptions | OpenLoopOptions) -> Disturbance:

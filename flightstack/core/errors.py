@@ -54,6 +54,10 @@ class ConfigError(Exception):
         return type(self), self._parts
 
 
+class WriteError(ConfigError):
+    """A file that was not written, although its name may be right: the exit code is 1."""
+
+
 def _key(option: str, keys: Mapping[str, str]) -> str:
     return keys.get(option, option.removeprefix("--").replace("-", "_"))
 

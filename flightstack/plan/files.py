@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from flightstack.core.atomic_file import write_text_atomically
-from flightstack.core.errors import ConfigError
+from flightstack.core.errors import ConfigError, WriteError
 from flightstack.plan.item import Plan
 from flightstack.plan.qgc_plan import plan_to_json, read_plan
 from flightstack.plan.waypoints import WAYPOINTS_HEADER, plan_to_waypoints, read_waypoints
@@ -52,7 +52,7 @@ def plan_of_text(text: str, path: Path) -> Plan:
 def save_plan(path: str | Path, plan: Plan) -> None:
     """Write ``plan`` atomically, in the format of the file's suffix.
 
-    Raise ConfigError for an unknown suffix, a file that cannot be written, or a plan that the format cannot represent.
+    Raise ConfigError for an unknown suffix or a plan that the format cannot represent, WriteError for the file.
     """
     path = Path(path)
     if path.suffix in PLAN_SUFFIXES:
@@ -66,4 +66,4 @@ def save_plan(path: str | Path, plan: Plan) -> None:
         write_text_atomically(path, text)
     except (OSError, ValueError) as error:
         problem = error.strerror if isinstance(error, OSError) else error
-        raise ConfigError(path, "", f"cannot be written: {problem}") from error
+        raise WriteError(path, "", f"cannot be written: {problem}") from error

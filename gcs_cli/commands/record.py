@@ -95,7 +95,7 @@ def _opened(path: Path, overwrite: bool) -> TlogFile:
         check_new(path, overwrite)
         temporary.replace(path)
     except OSError as error:
-        raise CliError(f"record: {path}: cannot be written: {error.strerror}", USAGE) from None
+        raise CliError(f"record: {path}: cannot be written: {error.strerror}") from None
     finally:
         temporary.unlink(missing_ok=True)
     return tlog

@@ -35,7 +35,7 @@ def run_build(board: str, controller: str, baud: int, compiler: str, out: Path |
     except BuildError as error:
         raise CliError(str(error), USAGE) from None
     except OSError as error:
-        raise CliError(f"{folder}: cannot be written: {error.strerror}", USAGE) from None
+        raise CliError(f"{folder}: cannot be written: {error.strerror}") from None
     Output(as_json).say(
         "firmware",
         f"{BOARDS[board].title} with {controller}, {baud} baud, sources {sources}: copy {flash} to its drive\n"

@@ -105,7 +105,7 @@ def run_generate(name: str, out: Path | None, as_json: bool) -> None:
     try:
         write_tree(controller, folder)
     except OSError as error:
-        raise CliError(f"{folder}: cannot be written: {error.strerror}", USAGE) from None
+        raise CliError(f"{folder}: cannot be written: {error.strerror}") from None
     names, parity = sorted(generated_names(controller)), law_parity(controller)
     if as_json:
         result = {"controller": name, "directory": str(folder), "files": names}
@@ -156,7 +156,7 @@ def _finish(
             content = pil_junit(outcome.result, command, time.monotonic() - began_s)
             write_bytes_atomically(verdict.junit, content)
         except OSError as error:
-            raise CliError(f"--junit {verdict.junit}: cannot be written: {error.strerror}", USAGE) from None
+            raise CliError(f"--junit {verdict.junit}: cannot be written: {error.strerror}") from None
     if verdict.open_report:
         webbrowser.open((folder / HTML_NAME).resolve().as_uri())
 

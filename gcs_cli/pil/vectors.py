@@ -17,7 +17,7 @@ import numpy as np
 
 from flightstack.core.atomic_file import write_bytes_atomically
 from flightstack.core.contract import MAX_ROTORS, FloatArray, LoopFlags
-from flightstack.core.errors import ConfigError
+from flightstack.core.errors import ConfigError, WriteError
 from gcs_cli.errors import CliError, library
 from gcs_cli.pil.flight_samples import FlightSamples, Samples, TimeArray
 from gcs_cli.pil.replay import INPUT_SIZE, OUTPUT_SIZE, OUTPUTS, Recording, as_flight
@@ -115,7 +115,7 @@ def write_vectors(path: Path, vectors: Vectors) -> None:
     try:
         write_bytes_atomically(path, write(json.dumps(about, ensure_ascii=True), columns))
     except OSError as error:
-        raise ConfigError(path, "", f"cannot be written: {error.strerror}") from error
+        raise WriteError(path, "", f"cannot be written: {error.strerror}") from error
 
 
 def _as_csv(about: str, columns: Mapping[str, Any]) -> bytes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -134,6 +135,25 @@ def test_convert_names_what_is_lost(tmp_path: Path) -> None:
     assert "lost in" in result.stdout
     result = gcs("mission", "convert", "square", tmp_path / "a.doc")
     assert (result.returncode, "the suffix '.doc' must be one of .plan" in result.stderr) == (2, True)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["mission", "convert", "square", "none/a.geojson"],
+        ["mission", "convert", "square", "none/a.plan"],
+        ["mission", "show", "square", "--html", "none/a.html"],
+        ["pil", "vectors", "none/a.csv"],
+    ],
+    ids=" ".join,
+)
+def test_file_that_cannot_be_written_is_exit_code_1(
+    words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = gcs(*words)
+    assert (result.stdout, result.returncode) == ("", 1)
+    assert re.fullmatch(r"gcs: \S+: cannot be written: No.* directory\n", result.stderr), result.stderr
 
 
 def test_show_prints_a_table_a_drawing_and_a_page(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import pytest
 from rich.console import Console
 from scipy.io import loadmat
 
-from flightstack.core.errors import ConfigError
+from flightstack.core.errors import ConfigError, WriteError
 from gcs_cli.errors import CliError
 from gcs_cli.pil.excitation import excitation
 from gcs_cli.pil.replay import Recording
@@ -172,7 +172,7 @@ def test_files_that_are_no_vectors_are_refused(excited: Vectors, tmp_path: Path)
             prepared(tmp_path / name, None)
     with pytest.raises(ConfigError, match="cannot be read"):
         read_vectors(tmp_path / "none.csv")
-    with pytest.raises(ConfigError, match="cannot be written"):
+    with pytest.raises(WriteError, match="cannot be written"):
         write_vectors(tmp_path / "none" / "vectors.csv", excited)
 
 

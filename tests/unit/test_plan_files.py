@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.mavwp import MAVWPLoader
 
-from flightstack.core.errors import ConfigError
+from flightstack.core.errors import ConfigError, WriteError
 from flightstack.core.geodesy import GeoPoint
 from flightstack.plan import UNSET_E7, Command, Frame, MissionItem, Plan, check_mission, load_plan, save_plan
 from flightstack.plan.qgc_plan import plan_to_json, read_plan
@@ -334,13 +334,13 @@ def test_a_failed_write_leaves_the_old_file_and_no_other(tmp_path: Path, monkeyp
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", fail)
-    with pytest.raises(ConfigError, match="cannot be written: No space left"):
+    with pytest.raises(WriteError, match="cannot be written: No space left"):
         save_plan(path, load_plan("missions/square.plan"))
     assert path.read_bytes() == before
     assert os.listdir(tmp_path) == ["a.plan"]
     with pytest.raises(ConfigError, match=r"'\.gpx' must be one of \.plan"):
         save_plan(tmp_path / "a.gpx", Plan((), HOME))
-    with pytest.raises(ConfigError, match="cannot be written"):
+    with pytest.raises(WriteError, match="cannot be written"):
         save_plan(tmp_path / "no" / "a.plan", Plan((), HOME))
 
 

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from flightstack.core.atomic_file import check_new, write_text_atomically
-from flightstack.core.errors import ConfigError
+from flightstack.core.errors import WriteError
 from flightstack.core.geodesy import GeoPoint
 from flightstack.plan import Plan
 from flightstack.process.command_line import IN_OUTPUT, expand_options, make_app
@@ -144,7 +144,7 @@ def show(
     try:
         write_text_atomically(html, page)
     except OSError as error:
-        raise ConfigError(html, "", f"cannot be written: {error.strerror or error}") from error
+        raise WriteError(html, "", f"cannot be written: {error.strerror or error}") from error
     output_of(context, link).say("written", f"page written to {html}", file=str(html))
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from flightstack.core.atomic_file import write_text_atomically
-from flightstack.core.errors import ConfigError
+from flightstack.core.errors import ConfigError, WriteError
 from flightstack.plan import Plan
 from flightstack.plan.files import PLAN_SUFFIXES, WAYPOINTS_SUFFIXES, plan_of_text, read_text
 from flightstack.plan.qgc_plan import plan_to_json
@@ -43,7 +43,7 @@ def _plan(text: str, path: Path, altitude_m: float) -> Plan:
 def save_any(path: Path, plan: Plan) -> str:
     """Write ``plan`` atomically in the format of the suffix; return what the format lost, or an empty text.
 
-    Raise ConfigError for an unknown suffix or a file that cannot be written.
+    Raise ConfigError for an unknown suffix, WriteError for a file that cannot be written.
     """
     text = _text(path, plan)
     after = _plan(text, path, DEFAULT_ALTITUDE_M)
@@ -51,7 +51,7 @@ def save_any(path: Path, plan: Plan) -> str:
         write_text_atomically(path, text)
     except (OSError, ValueError) as error:
         problem = error.strerror if isinstance(error, OSError) else error
-        raise ConfigError(path, "", f"cannot be written: {problem}") from error
+        raise WriteError(path, "", f"cannot be written: {problem}") from error
     return ", ".join(_losses(plan, after))
 
 
