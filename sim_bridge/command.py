@@ -76,7 +76,9 @@ def open_loop(given: options.OpenLoopOptions) -> None:
 def render(
     poses: Annotated[Path, typer.Argument(help="File of poses (.npz), as gcs log draw writes it.")],
     given: PictureOptions,
-    vehicle: Annotated[str | None, typer.Option(help="Vehicle to draw.  [default: the file's]")] = None,
+    vehicle: Annotated[
+        str | None, typer.Option(metavar="NAME|FILE", help="Vehicle to draw.  [default: the file's]")
+    ] = None,
     caller: Annotated[
         str, typer.Option(hidden=True, help="Command named in error messages.")
     ] = "sim-bridge render",

@@ -94,12 +94,12 @@ class SimulatorOptions:
 
 # of an open-loop flight
 Rotors = Annotated[str, typer.Option(metavar="W1,W2,…", help="Constant rotor speeds, rad/s.")]
-Seconds = Annotated[float, typer.Option(help="Duration of the flight, s.")]
+Seconds = Annotated[float, typer.Option(metavar="SECONDS", help="Duration of the flight, s.")]
 Position = Annotated[str, typer.Option(metavar="N,E,D", help="Initial position, m.")]
 Velocity = Annotated[str, typer.Option(metavar="N,E,D", help="Initial velocity, m/s.")]
 EulerDeg = Annotated[str, typer.Option(metavar="ROLL,PITCH,YAW", help="Initial attitude, degrees.")]
 Rates = Annotated[str, typer.Option(metavar="P,Q,R", help="Initial body rates FRD, rad/s.")]
-Step = Annotated[float, typer.Option(help="Integration step, s.")]
+Step = Annotated[float, typer.Option(metavar="SECONDS", help="Integration step, s.")]
 NoGround = Annotated[bool, typer.Option("--no-ground", help="Fly without ground.")]
 NoLag = Annotated[
     bool,

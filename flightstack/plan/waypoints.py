@@ -72,8 +72,8 @@ def _item(file: object, row: int, line_number: int, columns: list[str], rows: in
     if code != Command.DO_JUMP:
         return item
     if not 1.0 <= item.param1 < rows or not item.param1.is_integer():
-        problem = f"jumps to item {item.param1:g}, and the file's items are 1 to {rows - 1}"
-        raise ConfigError(file, f"{where}, param 1", problem)
+        problem = f"is {item.param1:g}, and the first column of the file's items has 1 to {rows - 1}"
+        raise ConfigError(file, f"{where}, param 1 (DO_JUMP)", problem)
     return replace(item, param1=item.param1 - 1.0)
 
 

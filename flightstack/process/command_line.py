@@ -278,18 +278,22 @@ class PictureOptions:
         typer.Option(metavar="T1[,T2,…]", help="Times of the pictures, s; several write numbered files."),
     ] = None
     camera: Annotated[
-        str, typer.Option(help="chase, fixed, top, side, or whole (the whole path from above).")
+        str,
+        typer.Option(metavar="NAME", help="chase, fixed, top, side, or whole (the whole path from above)."),
     ] = "chase"
     size: Annotated[
         str | None, typer.Option(metavar="WxH", help="Pixels.  [default: 1280x720; 480x270 for a gif]")
     ] = None
-    fps: Annotated[float | None, typer.Option(help="Frames per second.  [default: 30; 12.5 for a gif]")] = (
-        None
-    )
-    begin: Annotated[float | None, typer.Option("--from", help="Start of the film, s.")] = None
-    end: Annotated[float | None, typer.Option("--to", help="End of the film, s.")] = None
+    fps: Annotated[
+        float | None, typer.Option(metavar="N", help="Frames per second.  [default: 30; 12.5 for a gif]")
+    ] = None
+    begin: Annotated[
+        float | None, typer.Option("--from", metavar="SECONDS", help="Start of the film, s.")
+    ] = None
+    end: Annotated[float | None, typer.Option("--to", metavar="SECONDS", help="End of the film, s.")] = None
     speed: Annotated[
-        float | None, typer.Option(help="Speed of the playback over that of the flight.  [default: 1]")
+        float | None,
+        typer.Option(metavar="FACTOR", help="Speed of the playback over that of the flight.  [default: 1]"),
     ] = None
     no_words: Annotated[
         bool, typer.Option("--no-words", help="Omit figures, waypoint numbers and scale.")

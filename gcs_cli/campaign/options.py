@@ -27,7 +27,12 @@ File = Annotated[
 Workers = Annotated[
     int | None,
     typer.Option(
-        "--workers", "-j", min=1, max=256, help="Flights at once.  [default: one for each processor]"
+        "--workers",
+        "-j",
+        min=1,
+        max=256,
+        metavar="N",
+        help="Flights at once.  [default: one for each processor]",
     ),
 ]
 Scheduler = Annotated[
@@ -54,7 +59,8 @@ Seek = Annotated[
     ),
 ]
 Flights = Annotated[
-    int | None, typer.Option(min=20, max=100_000, help="Flights of a search, about.  [default: 200]")
+    int | None,
+    typer.Option(min=20, max=100_000, metavar="N", help="Flights of a search, about.  [default: 200]"),
 ]
 
 

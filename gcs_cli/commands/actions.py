@@ -296,7 +296,7 @@ def inject(
     failure: Annotated[
         str, typer.Argument(help="Kind of failure: off, stuck, garbage, wrong, slow, delayed; ok repairs.")
     ],
-    number: Annotated[int, typer.Option("--number", "-n", min=0, help="Which one; 0: all.")] = 0,
+    number: Annotated[int, typer.Option("--number", "-n", min=0, metavar="N", help="Which one; 0: all.")] = 0,
 ) -> None:
     """Inject a failure (MAV_CMD_INJECT_FAILURE).
 

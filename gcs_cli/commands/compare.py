@@ -33,6 +33,11 @@ from gcs_cli.settings import JsonOption, OverwriteOption, check_page
 
 app = make_app(add_completion=False)
 
+_DEFAULT = f"[default: {PAGE_NAME} beside the first log]"
+_Page = Annotated[
+    Path | None, typer.Option("--out", "-o", metavar="FILE", help=f"The page to write.  {_DEFAULT}")
+]
+
 
 @app.command()
 def compare(
@@ -40,10 +45,7 @@ def compare(
         list[Path],
         typer.Argument(metavar="RUN RUN...", help="Directories of flights, or logs.", show_default=False),
     ],
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", help=f"The page to write.  [default: {PAGE_NAME} beside the first log]"),
-    ] = None,
+    out: _Page = None,
     overwrite: OverwriteOption = False,
     open_page: Annotated[bool, typer.Option("--open", help="Open the page afterwards.")] = False,
     as_json: JsonOption = False,

@@ -20,7 +20,10 @@ from gcs_cli.settings import JsonOption, OpenOption, settings_of
 app = make_app(add_completion=False)
 
 _Out = Annotated[
-    Path, typer.Option("--out", "-o", help="Directory of the results; replaces those of a previous run.")
+    Path,
+    typer.Option(
+        "--out", "-o", metavar="DIR", help="Directory of the results; replaces those of a previous run."
+    ),
 ]
 _NoPil = Annotated[bool, typer.Option("--no-pil", help="Leave out the loops on a target.")]
 _NoMultibody = Annotated[bool, typer.Option("--no-multibody", help="Leave out the multibody plant.")]
@@ -33,7 +36,8 @@ _Port = Annotated[
     ),
 ]
 _Jobs = Annotated[
-    int | None, typer.Option(min=1, max=64, help="Flights at once.  [default: one for each processor]")
+    int | None,
+    typer.Option(min=1, max=64, metavar="N", help="Flights at once.  [default: one for each processor]"),
 ]
 
 

@@ -81,7 +81,10 @@ def replay(
         str, typer.Option(metavar="TARGET", help="emulated, host, c, or serial:DEVICE[:BAUD].")
     ] = "emulated",
     vehicle: Annotated[
-        str | None, typer.Option(help="The vehicle's TOML file.  [default: the log's vehicle, by its name]")
+        str | None,
+        typer.Option(
+            metavar="FILE", help="The vehicle's TOML file.  [default: the log's vehicle, by its name]"
+        ),
     ] = None,
 ) -> None:
     """Feed a target with the inputs of a flight log.
@@ -145,8 +148,10 @@ def build(
             "--controller", metavar="NAME", help="Attitude controller that the firmware flies with."
         ),
     ] = "pid",
-    baud: Annotated[int, typer.Option(min=1_200, max=2_500_000, help="Rate of the serial port.")] = 115_200,
-    compiler: Annotated[str, typer.Option(help="zig, or gcc for arm-none-eabi-gcc.")] = "zig",
+    baud: Annotated[
+        int, typer.Option(min=1_200, max=2_500_000, metavar="BAUD", help="Rate of the serial port.")
+    ] = 115_200,
+    compiler: Annotated[str, typer.Option(metavar="NAME", help="zig, or gcc for arm-none-eabi-gcc.")] = "zig",
     out: Annotated[
         Path | None, typer.Option("--out", "-o", metavar="DIR", help="Directory.  [default: build/<board>]")
     ] = None,
@@ -170,9 +175,15 @@ def doctor(
     ] = None,
     baud: Annotated[
         list[int] | None,
-        typer.Option(min=1_200, help="Rate to try; may be repeated.  [default: 115200 230400 460800 921600]"),
+        typer.Option(
+            min=1_200,
+            metavar="BAUD",
+            help="Rate to try; may be repeated.  [default: 115200 230400 460800 921600]",
+        ),
     ] = None,
-    exchanges: Annotated[int, typer.Option(min=1, max=100_000, help="Steps to measure at each rate.")] = 300,
+    exchanges: Annotated[
+        int, typer.Option(min=1, max=100_000, metavar="N", help="Steps to measure at each rate.")
+    ] = 300,
     conformance: Annotated[
         bool,
         typer.Option("--conformance", help="Check that a port keeps the contract of the firmware instead."),

@@ -29,13 +29,22 @@ Selection = Annotated[
 ]
 Jobs = Annotated[
     int | None,
-    typer.Option("--jobs", "-j", min=1, max=256, help="Flights at once.  [default: one for each processor]"),
+    typer.Option(
+        "--jobs",
+        "-j",
+        min=1,
+        max=256,
+        metavar="N",
+        help="Flights at once.  [default: one for each processor]",
+    ),
 ]
 Repeat = Annotated[
-    int | None, typer.Option(min=1, max=1_000_000, help="Flights of each scenario, with following seeds.")
+    int | None,
+    typer.Option(min=1, max=1_000_000, metavar="N", help="Flights of each scenario, with following seeds."),
 ]
 Seed = Annotated[
-    int | None, typer.Option(min=0, max=2**31 - 1, help="Seed of the first flight of each scenario.")
+    int | None,
+    typer.Option(min=0, max=2**31 - 1, metavar="N", help="Seed of the first flight of each scenario."),
 ]
 JUnit = Annotated[
     Path | None, typer.Option(metavar="FILE", help="Write the results as JUnit XML, for CI servers.")

@@ -137,6 +137,20 @@ def test_convert_names_what_is_lost(tmp_path: Path) -> None:
     assert (result.returncode, "the suffix '.doc' must be one of .plan" in result.stderr) == (2, True)
 
 
+def test_check_prints_each_of_several_problems_once(tmp_path: Path) -> None:
+    square, path = load_plan(MISSIONS / "square.plan"), tmp_path / "far.plan"
+    far = [replace(item, x=476000000) if seq in (1, 3) else item for seq, item in enumerate(square.items)]
+    save_plan(path, replace(square, items=tuple(far)))
+    result = gcs("mission", "check", path)
+    assert [line.split(" (")[0] for line in result.stdout.splitlines()] == [
+        "mission: item 1",
+        "mission: item 2",
+        "mission: item 3",
+        "mission: item 4",
+    ]
+    assert (result.stderr, result.returncode) == (f"gcs: {path}: has 4 problems\n", 2)
+
+
 @pytest.mark.parametrize(
     "words",
     [

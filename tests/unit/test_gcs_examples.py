@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import functools
+import re
 import shlex
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from typer import Context
 from typer.main import get_command
 
+import flightstack.process.command
+import sim_bridge.command
 from gcs_cli.__main__ import main
 from gcs_cli.commands.examples import EXAMPLES
 from gcs_cli.commands.lazy_group import LazyGroup
@@ -33,6 +37,22 @@ def all_commands() -> dict[str, Any]:
 
 def test_examples_are_those_of_the_commands() -> None:
     assert set(EXAMPLES) == set(all_commands())
+
+
+def test_help_names_the_value_of_each_option() -> None:
+    """Typer shows the type, as in ``<int range>``, of an option without a name of its value."""
+    simulator = get_command(sim_bridge.command.app)
+    every = {**all_commands(), **simulator.commands, "sim-bridge": simulator}
+    every["flightstack"] = get_command(flightstack.process.command.app)
+    unnamed = [
+        f"{name} {record[0]}"
+        for name, command in every.items()
+        for option in command.params
+        if option.param_type_name == "option"
+        and (record := option.get_help_record(Context(command)))
+        and re.search(r"<(?!.*\|)", record[0])
+    ]
+    assert unnamed == []
 
 
 @pytest.mark.parametrize("name", EXAMPLES)

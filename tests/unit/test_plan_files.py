@@ -281,7 +281,7 @@ BAD_PLANS: dict[str, tuple[Any, str]] = {
     "text infinity": (waypoints(ROW.replace("47.4", "inf")), "line 3: inf must be a finite"),
     "text jump": (
         waypoints("1 0 2 177 5 1 0 0 0 0 0 1"),
-        "line 3, item 0, param 1: jumps to item 5, and the file's items are 1 to 1",
+        "line 3, item 0, param 1 (DO_JUMP): is 5, and the first column of the file's items has 1 to 1",
     ),
     "no home": (
         "QGC WPL 110\n" + ROW.replace("16", "22"),

@@ -29,7 +29,9 @@ _END_TIMEOUT_S = 10.0
 def draw(
     run: Annotated[Path, typer.Argument(help="Directory of a flight, or its log.", show_default=False)],
     options: PictureOptions,
-    vehicle: Annotated[str | None, typer.Option(help="Vehicle to draw.  [default: the log's]")] = None,
+    vehicle: Annotated[
+        str | None, typer.Option(metavar="NAME|FILE", help="Vehicle to draw.  [default: the log's]")
+    ] = None,
 ) -> None:
     """Draw a flight: pictures, a film, or a window.
 

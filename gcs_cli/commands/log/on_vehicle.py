@@ -56,7 +56,13 @@ def download(
     ] = "latest",
     output: Annotated[
         Path | None,
-        typer.Option("--out", "-o", help="File to write; with --all, the folder.", show_default=False),
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="FILE|DIR",
+            help="File to write; with --all, the folder.",
+            show_default=False,
+        ),
     ] = None,
     everything: Annotated[
         bool, typer.Option("--all", help="All logs, except those that are already in the folder.")

@@ -93,11 +93,9 @@ def check(
                 "good", f"{part.name} of {len(part.items)} items: good", part=part.name, items=len(part.items)
             )
     if problems:
-        first, more = problems[0], len(problems) - 1
-        raise CliError(
-            f"{file}: {first.part}: {first.reason}" + (f" (and {more} more)" if more else ""),
-            FAILED if on_vehicle else USAGE,
-        )
+        first, count = problems[0], len(problems)
+        sentence = f"{first.part}: {first.reason}" if count == 1 else f"has {count} problems"
+        raise CliError(f"{file}: {sentence}", FAILED if on_vehicle else USAGE)
 
 
 def _uses_vehicle(link: LinkOptions, vehicle: bool) -> bool:
