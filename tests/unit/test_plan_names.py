@@ -81,7 +81,7 @@ def test_plan_that_no_vehicle_accepts_is_a_bad_file(
     text = (ROOT / "missions" / "fenced_square.plan").read_text()
     bad.write_text(text.replace('"radius": 4.0', '"radius": 15.0'))
     assert main([*command, str(bad)]) == USAGE
-    assert "mission: item 1 (NAV_WAYPOINT)" in capsys.readouterr().err
+    assert "mission: item 1 (NAV_WAYPOINT)" in "".join(capsys.readouterr())
 
 
 def test_wheel_holds_the_examples_where_they_are_looked_for() -> None:
