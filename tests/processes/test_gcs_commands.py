@@ -227,7 +227,7 @@ def test_files_are_checked_as_the_vehicle_checks_them(tmp_path: Path) -> None:
     result = gcs("mission", "check", bad)
     assert result.returncode == 2
     assert "good" not in result.stdout
-    assert "mission: item 1 (NAV_WAYPOINT)" in result.stderr
+    assert "mission: item 1 (NAV_WAYPOINT)" in result.stdout + result.stderr
 
 
 def test_a_refused_mission_names_the_item() -> None:
