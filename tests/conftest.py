@@ -117,4 +117,5 @@ def _keeps_the_signals() -> Iterator[None]:
     yield
     for number, handler in zip(numbers, handlers, strict=True):
         signal.signal(number, handler)
+    signal.set_wakeup_fd(-1)  # that of a simulator in this process, whose socket is closed
     sys.unraisablehook = hook
