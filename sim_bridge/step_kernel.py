@@ -36,11 +36,11 @@ STEP_CALLS = dtype_of(StepCalls)
 
 
 @compiled
-def _next_row(noise: FloatArray, cursor: Any) -> Any:
-    """Return the next row of a stream of deviates."""
-    at = cursor[0]
+def _next_row(cursor: Any) -> int:
+    """Return the index of the next row of a stream of deviates."""
+    at: int = cursor[0]
     cursor[0] = at + 1
-    return noise[at]
+    return at
 
 
 @compiled
@@ -51,7 +51,7 @@ def _measure_slow(
     due_us, period_us, parts, mag, baro, gnss = slow
     if take_due(due_us, period_us, MAG, time_us):
         mags, out, noise, cursor, current_a = mag
-        call_kernel(calls["measure_mag"], (mags, state, current_a[0], _next_row(noise, cursor)))
+        call_kernel(calls["measure_mag"], (mags, state, current_a[0], noise[_next_row(cursor)]))
         for i in range(3):
             parts[0]["mag_gauss"][i] = out[i]
         news["has_mag"] = 1
@@ -60,7 +60,7 @@ def _measure_slow(
         airspeed_m_s = call_kernel_float(calls["airspeed"], (memory,))
         call_kernel(
             calls["measure_baro"],
-            (baros, time_us, state, airspeed_m_s, rotor_speeds, _next_row(noise, cursor)),
+            (baros, time_us, state, airspeed_m_s, rotor_speeds, noise[_next_row(cursor)]),
         )
         values = parts[0]
         values["pressure_hpa"], values["altitude_m"], values["temperature_c"] = out[0], out[1], out[2]

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from flightstack.core.contract import FloatArray
+
 
 def as_tuple(array: Any, count: int) -> Any:
     """Return the first ``count`` (a constant) values of a float64 array as a tuple."""
@@ -19,3 +21,11 @@ def store(out: np.ndarray[Any, np.dtype[np.float64]], values: Any) -> None:
     """
     for index in range(len(values)):
         out[index] = values[index]
+
+
+def local_zeros(*shape: int) -> FloatArray:
+    """Return an array of zeros for use in the calling function alone, which must not return it.
+
+    Sizes are constants. Compiled code has it on the stack: no memory is allocated.
+    """
+    return np.zeros(shape)

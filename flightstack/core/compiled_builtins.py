@@ -8,18 +8,21 @@ all. Kernels that are read from the cache do without this module.
 from __future__ import annotations
 
 import importlib
+import math
 from functools import cache
 from typing import Any
 
 import numba
+from llvmlite import ir
 from numba.core import cgutils
 from numba.core.imputils import lower_builtin
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import register_jitable, type_callable
 from numba.np import linalg
-from numba.np.arrayobj import load_item, make_array, store_item
+from numba.np.arrayobj import load_item, make_array, populate_array, store_item
 
 from flightstack.core import portable_math
-from flightstack.core.array_items import as_tuple, store
+from flightstack.core.array_items import as_tuple, local_zeros, store
 
 
 @cache
@@ -109,3 +112,33 @@ def _lower_store_array(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         item = context.cast(builder, item, values_type.dtype, out_type.dtype)
         store_item(context, builder, out_type, item, _pointer(context, builder, out_type, out, loop.index))
     return context.get_dummy_value()
+
+
+@infer_global(local_zeros)
+class _LocalZeros(AbstractTemplate):  # type: ignore[misc]  # Numba has no types
+    def generic(self, args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
+        """Return the signature for constant sizes, else None."""
+        if kws or not args or not all(isinstance(size, numba.types.IntegerLiteral) for size in args):
+            return None
+        return signature(numba.types.Array(numba.types.float64, len(args), "C"), *args)
+
+
+@lower_builtin(local_zeros, numba.types.VarArg(numba.types.IntegerLiteral))
+def _lower_local_zeros(context: Any, builder: Any, sig: Any, _args: Any) -> Any:
+    shape = [size.literal_value for size in sig.args]
+    item = context.get_value_type(numba.types.float64)
+    memory = ir.ArrayType(item, math.prod(shape))
+    place = cgutils.alloca_once(builder, memory)
+    builder.store(ir.Constant(memory, None), place)
+    word = context.get_constant
+    strides = [8 * math.prod(shape[axis + 1 :]) for axis in range(len(shape))]
+    array = make_array(sig.return_type)(context, builder)
+    populate_array(
+        array,
+        data=builder.bitcast(place, item.as_pointer()),
+        shape=[word(numba.types.intp, size) for size in shape],
+        strides=[word(numba.types.intp, stride) for stride in strides],
+        itemsize=word(numba.types.intp, 8),
+        meminfo=None,
+    )
+    return array._getvalue()

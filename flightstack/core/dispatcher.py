@@ -6,7 +6,7 @@ import gc
 from collections.abc import Callable
 from functools import cached_property
 from types import FunctionType
-from typing import Any, ClassVar
+from typing import Any
 
 import numba
 import numpy as np
@@ -21,11 +21,18 @@ _TESTED_NUMBA = {(0, minor) for minor in range(60, 69)}
 """Versions whose compiler ``kernel_compiler`` extends; another compiles the same in a longer time."""
 
 KernelCompiler: type[Compiler] = Compiler
+PartDispatcher: type[CPUDispatcher] = CPUDispatcher
 PartCompiler: type[Compiler] = Compiler
 KernelCache: type[FunctionCache] = FunctionCache
 PartCache: type[FunctionCache] = FunctionCache
 if numba.version_info.short in _TESTED_NUMBA:
-    from flightstack.core.kernel_compiler import KernelCache, KernelCompiler, PartCache, PartCompiler
+    from flightstack.core.kernel_compiler import (
+        KernelCache,
+        KernelCompiler,
+        PartCache,
+        PartCompiler,
+        PartDispatcher,
+    )
 else:
     from flightstack.core.compiled_builtins import register
 
@@ -66,13 +73,21 @@ def _enable_cache(dispatcher: CPUDispatcher, modules: frozenset[str], cache: typ
         numba.config.CACHE_DIR = others
 
 
+def _options(function: Callable[..., Any]) -> dict[str, bool | str]:
+    """Return Numba's options. Kernels of this project allocate no memory, so that no references need be counted."""
+    return {
+        "nopython": True,
+        "error_model": "numpy",
+        "no_cfunc_wrapper": True,
+        "_nrt": not is_own(function.__module__),
+    }
+
+
 class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]  # Numba has no types
     """A compiled function that Python calls. Compiled functions call its ``part``."""
 
-    _OPTIONS: ClassVar = {"nopython": True, "error_model": "numpy", "no_cfunc_wrapper": True}
-
     def __init__(self, function: Callable[..., Any], modules: frozenset[str]) -> None:
-        super().__init__(function, targetoptions=self._OPTIONS, pipeline_class=KernelCompiler)
+        super().__init__(function, targetoptions=_options(function), pipeline_class=KernelCompiler)
         self._modules = modules
         _enable_cache(self, modules, KernelCache)
 
@@ -81,10 +96,15 @@ class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]  # Numba has no typ
         """The same function without machine code and without the wrapper for Python."""
         assert isinstance(self.py_func, FunctionType)
         copy = renamed(self.py_func, "part", self.py_func.__globals__)
-        options = {**self._OPTIONS, "no_cpython_wrapper": True}
-        part = CPUDispatcher(copy, targetoptions=options, pipeline_class=PartCompiler)
+        options = {**_options(copy), "no_cpython_wrapper": True}
+        part = PartDispatcher(copy, targetoptions=options, pipeline_class=PartCompiler)
         _enable_cache(part, self._modules, PartCache)  # under the name of the copy
         return part
+
+    def part_result(self, *kinds: Any) -> Any:
+        """Compile the part for Numba's types ``kinds``, or read it from the cache; return the type of its result."""
+        _template, _signature, found, _ = self.part.get_call_template(kinds, {})
+        return self.part.overloads[tuple(found)].signature.return_type
 
     @property
     def _numba_type_(self) -> numba.types.Type:

@@ -6,6 +6,7 @@ for each function as well as for the kernel, because Python may call the functio
 
 from __future__ import annotations
 
+import importlib
 import operator
 import os
 from pickle import UnpicklingError
@@ -14,14 +15,25 @@ from typing import Any
 
 import numba
 from llvmlite.binding import parse_assembly, parse_bitcode
-from numba.core import types
+from numba.core import errors, types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult, Flags
 from numba.core.environment import lookup_environment
+from numba.core.registry import CPUDispatcher
 from numba.core.runtime import rtsys
 from numba.core.sigutils import normalize_signature
+from numba.core.typed_passes import AnnotateTypes, DumpParforDiagnostics, InlineOverloads, NopythonRewrites
 from numba.core.typing.templates import AbstractTemplate, Signature, infer_global, signature
+from numba.core.untyped_passes import (
+    FindLiterallyCalls,
+    InlineClosureLikes,
+    InlineInlinables,
+    LiteralPropagationSubPipelinePass,
+    LiteralUnroll,
+    MakeFunctionToJitFunction,
+    WithLifting,
+)
 
 from flightstack.core.kernel_cache import is_own
 
@@ -37,6 +49,17 @@ _DAMAGED = (
     ValueError,
 )
 """Exceptions of ``pickle`` for a file that is not what was written."""
+_COLOURS = "_termcolor_inst"
+"""Numba's name of the colours of its messages."""
+_NO_COLOURS = SimpleNamespace(
+    **{name: lambda text: text for name in ("code", "errmsg", "filename", "indicate", "highlight", "reset")}
+)
+"""Numba formats a message for each operation before it fails; for a terminal that takes a twentieth of its time."""
+_NEEDLESS = {
+    InlineClosureLikes, MakeFunctionToJitFunction, WithLifting, InlineInlinables, FindLiterallyCalls, LiteralUnroll,
+    LiteralPropagationSubPipelinePass, InlineOverloads, NopythonRewrites, AnnotateTypes, DumpParforDiagnostics,
+}  # fmt: skip
+"""Passes for closures, comprehensions, ``with``, inlining and expressions of arrays, which our kernels do not have."""
 _NO_ENVIRONMENT = SimpleNamespace(set_env=lambda name, environment: None)
 
 
@@ -69,15 +92,27 @@ class _Compiler(Compiler):  # type: ignore[misc]
         from flightstack.core.compiled_builtins import register
 
         register(PartCompiler)
+        importlib.import_module("flightstack.core.compiled_items")
         super().__init__(typingctx, targetctx, library, args, return_type, _Flags(flags), locals)
 
     def compile_extra(self, func: Any) -> CompileResult:
         """Compile ``func``."""
         _Compiler.active += 1
+        names = vars(errors)
+        colours, names[_COLOURS] = names[_COLOURS], _NO_COLOURS
         try:
             return super().compile_extra(func)
         finally:
+            names[_COLOURS] = colours
             _Compiler.active -= 1
+
+    def define_pipelines(self) -> Any:
+        """Return Numba's passes, for functions of this project the fewer that they need."""
+        passes = super().define_pipelines()
+        if is_own(self.state.func_id.modname):
+            for manager in passes:
+                manager.passes = [each for each in manager.passes if each[0] not in _NEEDLESS]
+        return passes
 
 
 class KernelCompiler(_Compiler):
@@ -100,6 +135,29 @@ class PartCompiler(_Compiler):
         """Return Numba's passes, which fill the library given here."""
         self.state.library = _PartLibrary(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
         return super().define_pipelines()
+
+
+def _general(kind: Any) -> Any:
+    """Return the type for which a function is compiled: of a constant any, of a vector in a record that of all."""
+    if isinstance(kind, types.NestedArray) and kind.ndim == 1:
+        return types.Array(kind.dtype, 1, "C")
+    return numba.types.unliteral(kind)
+
+
+class PartDispatcher(CPUDispatcher):  # type: ignore[misc]
+    """A function that compiled functions call."""
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Return Numba's template of the call: of a function for all constants, unless it asks for theirs.
+
+        Kernels include it, where LLVM computes with the constants anyway.
+        """
+        try:
+            return super().get_call_template(
+                tuple(map(_general, args)), {name: _general(kind) for name, kind in kws.items()}
+            )
+        except errors.TypingError:
+            return super().get_call_template(args, kws)
 
 
 class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]

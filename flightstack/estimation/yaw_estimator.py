@@ -9,8 +9,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple, TypeAlias
 
-import numpy as np
-
+from flightstack.core.array_items import local_zeros
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Quaternion, Record, RecordArray, Vector3
 from flightstack.core.geometry import normalised, quaternion_product, rotate, rotation_over, wrap_pi
@@ -123,7 +122,7 @@ def _update_model(model: YawModelRecord, north_m_s: float, east_m_s: float, vari
     north, east = north_m_s - model["north_m_s"], east_m_s - model["east_m_s"]
     square = north * (i00 * north + i01 * east) + east * (i01 * north + i11 * east)
     share = math.sqrt(_LARGEST_SQUARE / square) if square > _LARGEST_SQUARE else 1.0
-    gain, column = np.zeros((_STATES, 2)), np.zeros((_STATES, 2))
+    gain, column = local_zeros(_STATES, 2), local_zeros(_STATES, 2)
     for i in range(_STATES):
         column[i, 0], column[i, 1] = p[i, 3], p[i, 4]
         gain[i, 0] = column[i, 0] * i00 + column[i, 1] * i01
@@ -149,7 +148,7 @@ def _update_model(model: YawModelRecord, north_m_s: float, east_m_s: float, vari
 def update_models(bank: YawBankRecord, north_m_s: float, east_m_s: float, variance: float) -> None:
     """Fuse a velocity with all models, and multiply the weight of each by its likelihood."""
     models = bank["models"]
-    costs, least, total = np.zeros(MODELS), math.inf, 0.0
+    costs, least, total = local_zeros(MODELS), math.inf, 0.0
     for k in range(MODELS):
         costs[k] = _update_model(models[k], north_m_s, east_m_s, variance)
         least = min(least, costs[k])

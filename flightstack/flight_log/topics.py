@@ -65,9 +65,8 @@ class Group(NamedTuple):
 
 
 @compiled
-def outer_heading(rows: FloatArray) -> FloatArray:
-    """Return the heading [rad] of each row, which begins with a state as that of the outer loop's trace."""
-    headings = np.empty(len(rows))
+def write_headings(rows: FloatArray, headings: FloatArray) -> None:
+    """Write the heading [rad] of each row, which begins with a state as that of the outer loop's trace."""
     for i in range(len(rows)):
         w, x, y, z = (
             rows[i, ATTITUDE_AT],
@@ -76,6 +75,12 @@ def outer_heading(rows: FloatArray) -> FloatArray:
             rows[i, ATTITUDE_AT + 3],
         )
         headings[i] = heading(Quaternion(w, x, y, z))
+
+
+def outer_heading(rows: FloatArray) -> FloatArray:
+    """Return the heading [rad] of each row, shape (rows,): see ``write_headings``."""
+    headings = np.empty(len(rows))
+    write_headings(rows, headings)
     return headings
 
 

@@ -102,7 +102,7 @@ def take_fix(push: int, slow: Any, time_us: int, filters: Any, following: Any) -
         _push(push, filters, GNSS_RING, sample, copy)
     copy_all(new, marks["fix"])
     marks["gnss_us"] = time_us
-    store_gnss(_log_row(log, marks["gnss_rows"], time_us), time_us, fix, math.nan)
+    store_gnss(log[0][_new_row(log, marks["gnss_rows"], time_us)], time_us, fix, math.nan)
     marks["gnss_rows"] += 1
 
 
@@ -125,7 +125,7 @@ def take_slow(push: int, slow: Any, time_us: int, filters: Any, following: Any) 
             mag_sample[0] = time_us * 1e-6 - mag_delay_s
             mag_sample[1], mag_sample[2], mag_sample[3] = x, y, z
             _push(push, filters, MAG_RING, mag_sample, mag_copy)
-            store_mag(_log_row(mag_log, marks["mag_rows"], time_us), time_us, x, y, z)
+            store_mag(mag_log[0][_new_row(mag_log, marks["mag_rows"], time_us)], time_us, x, y, z)
             marks["mag_rows"] += 1
             marks["mag_us"] = time_us
             marks["field_gauss"][0], marks["field_gauss"][1], marks["field_gauss"][2] = x, y, z
@@ -134,7 +134,7 @@ def take_slow(push: int, slow: Any, time_us: int, filters: Any, following: Any) 
         if math.isfinite(altitude_m):
             baro_sample[0], baro_sample[1] = time_us * 1e-6 - baro_delay_s, altitude_m
             _push(push, filters, BARO_RING, baro_sample, baro_copy)
-            row = _log_row(baro_log, marks["baro_rows"], time_us)
+            row = baro_log[0][_new_row(baro_log, marks["baro_rows"], time_us)]
             marks["baro_rows"] += 1
             pressure_hpa, temperature_c = float(values["pressure_hpa"]), float(values["temperature_c"])
             store_baro(row, time_us, pressure_hpa, altitude_m, temperature_c)
@@ -143,12 +143,12 @@ def take_slow(push: int, slow: Any, time_us: int, filters: Any, following: Any) 
 
 
 @compiled
-def _log_row(log: Any, count: int, time_us: int) -> Any:
-    """Return the row of a log behind ``count`` new ones."""
-    rows, times_us, begin = log
-    at = begin + count
+def _new_row(log: Any, count: int, time_us: int) -> int:
+    """Give the row of a log behind ``count`` new ones its time, and return its index."""
+    _rows, times_us, begin = log
+    at: int = begin + count
     times_us[at] = time_us
-    return rows[at]
+    return at
 
 
 @compiled
@@ -159,11 +159,11 @@ def log_truth(slow: Any, time_us: int, following: Any) -> None:
         return
     state, offset_m, place, interval_us, global_interval_us = slow[4]
     marks["truth_us"] = (time_us // interval_us + 1) * interval_us
-    store_truth(_log_row(logs[3], marks["truth_rows"], time_us), state, offset_m)
+    store_truth(logs[3][0][_new_row(logs[3], marks["truth_rows"], time_us)], state, offset_m)
     marks["truth_rows"] += 1
     if time_us >= marks["global_us"]:
         marks["global_us"] = (time_us // global_interval_us + 1) * global_interval_us
-        store_global(_log_row(logs[4], marks["global_rows"], time_us), state, place)
+        store_global(logs[4][0][_new_row(logs[4], marks["global_rows"], time_us)], state, place)
         marks["global_rows"] += 1
 
 

@@ -21,7 +21,7 @@
 #define FS_LARGEST_SQUARE FS_LIT(25.0)
 #define FS_LEAST_WEIGHT FS_LIT(1e-05)
 
-/* yaw_estimator.py:55 */
+/* yaw_estimator.py:54 */
 fs_quaternion fs_attitude_of(const fs_yaw_model *model)
 {
     return (fs_quaternion){
@@ -32,7 +32,7 @@ fs_quaternion fs_attitude_of(const fs_yaw_model *model)
     };
 }
 
-/* yaw_estimator.py:69 */
+/* yaw_estimator.py:68 */
 static void write_attitude(fs_yaw_model *model, const fs_quaternion *attitude)
 {
     model->attitude[0] = attitude->w;
@@ -41,7 +41,7 @@ static void write_attitude(fs_yaw_model *model, const fs_quaternion *attitude)
     model->attitude[3] = attitude->z;
 }
 
-/* yaw_estimator.py:93 */
+/* yaw_estimator.py:92 */
 void fs_predict_models(fs_yaw_bank *bank, const fs_vector3 *angle, const fs_vector3 *delta_velocity, fs_real dt_s)
 {
     const fs_quaternion half = fs_rotation_over(angle, FS_LIT(0.5));
@@ -74,7 +74,7 @@ void fs_predict_models(fs_yaw_bank *bank, const fs_vector3 *angle, const fs_vect
     }
 }
 
-/* yaw_estimator.py:75 */
+/* yaw_estimator.py:74 */
 void fs_start_models(fs_yaw_bank *bank, const fs_quaternion *attitude, fs_real north_m_s, fs_real east_m_s,
                      fs_real variance)
 {
@@ -101,7 +101,7 @@ void fs_start_models(fs_yaw_bank *bank, const fs_quaternion *attitude, fs_real n
 
 /*
  * Fuse a velocity; return the squared innovation by its variance plus the logarithm's share of that variance.
- * yaw_estimator.py:117
+ * yaw_estimator.py:116
  */
 static fs_real update_model(fs_yaw_model *model, fs_real north_m_s, fs_real east_m_s, fs_real variance)
 {
@@ -147,7 +147,7 @@ static fs_real update_model(fs_yaw_model *model, fs_real north_m_s, fs_real east
     return cost;
 }
 
-/* yaw_estimator.py:149 */
+/* yaw_estimator.py:148 */
 void fs_update_models(fs_yaw_bank *bank, fs_real north_m_s, fs_real east_m_s, fs_real variance)
 {
     fs_real costs[5] = {0};
@@ -168,7 +168,7 @@ void fs_update_models(fs_yaw_bank *bank, fs_real north_m_s, fs_real east_m_s, fs
     }
 }
 
-/* yaw_estimator.py:165 */
+/* yaw_estimator.py:164 */
 fs_real fs_mean_turn(const fs_yaw_bank *bank, const fs_quaternion *attitude)
 {
     fs_real x = FS_LIT(0.0);
@@ -185,7 +185,7 @@ fs_real fs_mean_turn(const fs_yaw_bank *bank, const fs_quaternion *attitude)
     return fs_atan2(y, x);
 }
 
-/* yaw_estimator.py:177 */
+/* yaw_estimator.py:176 */
 fs_real fs_variance_of(const fs_yaw_bank *bank, const fs_quaternion *attitude, fs_real turn_rad)
 {
     fs_real total = FS_LIT(0.0);
@@ -198,7 +198,7 @@ fs_real fs_variance_of(const fs_yaw_bank *bank, const fs_quaternion *attitude, f
     return total;
 }
 
-/* yaw_estimator.py:188 */
+/* yaw_estimator.py:187 */
 int32_t fs_likeliest(const fs_yaw_bank *bank)
 {
     int32_t best = 0;
@@ -210,7 +210,7 @@ int32_t fs_likeliest(const fs_yaw_bank *bank)
     return best;
 }
 
-/* yaw_estimator.py:62 */
+/* yaw_estimator.py:61 */
 fs_real fs_tilt_variance(const fs_yaw_model *model, int32_t axis)
 {
     const fs_real variance = model->covariance[axis][axis];

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import ast
 import math
+from typing import Any
 
 import numpy as np
 
+from flightstack.core.array_items import local_zeros
 from flightstack.firmware.generator.expressions import Expressions
 from flightstack.firmware.generator.law import Function, python_function
 from flightstack.firmware.generator.subset import construct_of
@@ -29,6 +31,7 @@ from flightstack.firmware.generator.values import PRODUCT, SUM, Form, Value, as_
 from flightstack.firmware.generator.writer import Variable, Writer, declaration
 
 _AUGMENTED = {ast.Add: ("+", SUM), ast.Sub: ("-", SUM), ast.Mult: ("*", PRODUCT), ast.Div: ("/", PRODUCT)}
+_NEW_ARRAYS = (np.zeros, np.empty, local_zeros)
 
 
 class Assignments:
@@ -60,23 +63,25 @@ class Assignments:
             return
         if isinstance(source, ast.Call):
             function = self.expressions.constant(source.func)
-            if function in (np.zeros, np.empty):
-                self._local_array(target, source, function is np.zeros)
+            if function in _NEW_ARRAYS:
+                self._local_array(target, source, function)
                 return
             self._put(target, self.expressions.calls.call(source, alone=True))
             return
         self._put(target, self.expressions.value(source))
 
-    def _local_array(self, target: ast.expr, source: ast.Call, is_zero: bool) -> None:
+    def _local_array(self, target: ast.expr, source: ast.Call, function: Any) -> None:
         shape_node = source.args[0] if len(source.args) == 1 and not source.keywords else source
         sizes = shape_node.elts if isinstance(shape_node, ast.Tuple) else [shape_node]
+        if function is local_zeros:
+            sizes = source.args
         shape = tuple(self.expressions.constant(size) for size in sizes)
         if not isinstance(target, ast.Name) or not all(type(size) is int and size > 0 for size in shape):
             raise self.function.refusal(source, "array of unknown shape")
         variable, is_new = self.writer.declare(target, target.id, Array(shape))
         if not is_new or not variable.is_stable:
             raise self.function.refusal(target, "array value", f"array {target.id} assigned twice")
-        self.writer.array(variable.name, Array(shape), is_zero)
+        self.writer.array(variable.name, Array(shape), function is not np.empty)
 
     def _unpack(self, target: ast.Tuple, source: ast.expr) -> None:
         if isinstance(source, ast.Tuple):
