@@ -101,7 +101,7 @@ def work(m: MemoryRecord, f: Filter, r: Rings, horizon_s: float, params: Estimat
     for _ in range(SOURCES):
         if agenda["source"] >= SOURCES:
             break
-        following = _part(m, f, r, params)
+        following = fuse_next(m, f, r, params)
         if following != NOTHING:
             agenda["axis"], agenda["has_fused"] = following, 1
             if count_of_resets(m) != m["followed"]:  # users of the output follow the count at once
@@ -183,7 +183,7 @@ def _move_output(m: MemoryRecord, f: Filter, r: Rings, share: float, params: Est
 
 
 @compiled
-def _part(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorParams) -> int:
+def fuse_next(m: MemoryRecord, f: Filter, r: Rings, params: EstimatorParams) -> int:
     """Fuse the next scalar of the source at hand."""
     source, axis = m["agenda"]["source"], m["agenda"]["axis"]
     if source == EARTH_SOURCE:

@@ -14,26 +14,28 @@ import sys
 import threading
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from flightstack.commander.estimate_checks import LIMITS, watch_estimate
 from flightstack.commander.failsafe_monitor import FailsafeMonitor
-from flightstack.core.compiled import IS_DISABLED, direct
+from flightstack.core.compiled import IS_DISABLED, Kernel, direct
 from flightstack.core.contract import STATE_SIZE
 from flightstack.core.kernel_cache import is_shared
+from flightstack.estimation.agenda import fuse_next
 from flightstack.estimation.delayed_filter import field_kernel, push_kernel
+from flightstack.estimation.estimator_params import PARAMS_SIZE, EstimatorParams
 from flightstack.estimation.health import HealthMonitor
 from flightstack.estimation.imu_track import ImuTrack
-from flightstack.estimation.memory import MEMORY
+from flightstack.estimation.memory import MEMORY, filter_of, rings_of
 from flightstack.estimation.rings import MAG_RING
 from flightstack.flight_log.recorder import FlightRecorder
 from flightstack.guidance.kernels import goal_kernel
 from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.params import guidance_params
 from flightstack.params.behaviour import Behaviour
-from flightstack.params.config import DEFAULT_HOME
+from flightstack.params.config import DEFAULT_HOME, ESTIMATED, StackConfig
 from flightstack.params.vehicle import DEFAULT_VEHICLE, load_vehicle
 from flightstack.process.clock import rates
 from flightstack.process.compile_notice import announce_compilation
@@ -41,11 +43,17 @@ from flightstack.simulator_link.endpoint import SimulatorEndpoint
 
 GUIDANCE = "flightstack.process.compile_helper:compile_guidance"
 COMMANDER = "flightstack.process.compile_helper:compile_commander"
+MEASUREMENTS = "flightstack.process.compile_helper:compile_measurements"
 ESTIMATOR = "flightstack.process.compile_helper:compile_estimator"
 QUIET_TICKS = "flightstack.process.quiet_exchange:compile_any"
 
 helper: subprocess.Popen[bytes] | None = None
 _tasks: tuple[str, ...] = ()
+
+
+def estimator_tasks(config: StackConfig) -> tuple[str, ...]:
+    """Return the tasks for the estimator of a vehicle that flies on its sensors, none on the true state."""
+    return (MEASUREMENTS, ESTIMATOR) if config.state == ESTIMATED else ()
 
 
 def start(
@@ -140,6 +148,16 @@ def compile_estimator() -> None:
     direct(watch_estimate, memory, watch, ImuTrack().memory, np.zeros(1, LIMITS), False, False, 0.0)
     direct(push_kernel, memory, MAG_RING, np.zeros(4))
     direct(field_kernel, memory)
+
+
+def compile_measurements() -> None:
+    """Compile the part of the filter's kernel that fuses measurements, while the parent compiles what comes before."""
+    numba = importlib.import_module("numba")
+    memory = numba.typeof(np.zeros(1, MEMORY)).dtype
+    params = numba.typeof(EstimatorParams(*np.zeros(PARAMS_SIZE).tolist()))
+    filter_kernel, rings_kernel, kernel = cast("tuple[Kernel, ...]", (filter_of, rings_of, fuse_next))
+    views = filter_kernel.dispatcher.part_result(memory), rings_kernel.dispatcher.part_result(memory)
+    kernel.dispatcher.part_result(memory, *views, params)
 
 
 def _run(tasks: str) -> None:

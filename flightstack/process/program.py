@@ -13,7 +13,7 @@ from flightstack.core.atomic_file import check_creatable, check_new
 from flightstack.core.errors import ConfigError, TargetError
 from flightstack.core.port_numbers import simulator_port, system_id
 from flightstack.firmware.choice import PYTHON
-from flightstack.params.config import CLOCKS, DEFAULT_HOME, ESTIMATED, FLOWN_ON, StackConfig, parse_home
+from flightstack.params.config import CLOCKS, DEFAULT_HOME, FLOWN_ON, StackConfig, parse_home
 from flightstack.params.gains_file import hidden_gains
 from flightstack.params.param_file import begin_param_file
 from flightstack.params.vehicle import hidden_vehicle
@@ -71,8 +71,8 @@ def _start(given: RunOptions) -> tuple[App, StackConfig, ProcessConfig] | None:
 
 def _later(config: StackConfig) -> tuple[str, ...]:
     """Return the tasks of the compile helper for which nothing waits."""
-    estimator = (compile_helper.ESTIMATOR,) if config.state == ESTIMATED else ()
-    return (compile_helper.QUIET_TICKS, *estimator) if config.lockstep else estimator
+    ticks = (compile_helper.QUIET_TICKS,) if config.lockstep else ()
+    return (*compile_helper.estimator_tasks(config), *ticks)
 
 
 def _check_combinations(given: RunOptions) -> None:

@@ -67,7 +67,8 @@ class Engine:
         self._boot_us = 0
         self._flight_logs = flight_logs
         self._wrap_loops = wrap_loops
-        compile_helper.start(tasks=(compile_helper.GUIDANCE, _PLANT))
+        later = compile_helper.estimator_tasks(self.config)
+        compile_helper.start(tasks=(compile_helper.GUIDANCE, _PLANT), later=later)
         self.stack = self._build()
         self._simulator: Simulator = setup.simulator(vehicle_of(self.config))
         self._simulator.set_interval_us(self.stack.rates.interval_us)

@@ -48,7 +48,7 @@ os.write(1, str(compile_helper.helper.pid).encode())
 os._exit(0)
 """
 
-LAST_KERNEL = "topics.outer_heading"
+LAST_KERNEL = "topics.write_headings"
 """The last one of the task COMMANDER."""
 
 
@@ -100,6 +100,39 @@ def test_cold_cache_is_compiled_once_and_gives_the_same_log(tmp_path: Path) -> N
     assert {"kernels.goal_kernel", "kernels.rest_kernel", "integrator._advance"} <= there
     assert "kernels.stream_kernel" not in here
     assert digest == digest_of_flight()
+
+
+MEASUREMENTS = """
+from numba.core import event
+import numpy as np
+from flightstack.estimation.agenda import fuse_next
+from flightstack.estimation.delayed_filter import imu_kernel
+from flightstack.estimation.imu_track import ImuTrack
+from flightstack.estimation.memory import MEMORY
+from flightstack.process.compile_helper import compile_measurements
+
+class Listener(event.Listener):
+    def on_start(self, event):
+        print(event.data["dispatcher"].py_func.__name__)
+    def on_end(self, event):
+        pass
+
+if __import__("sys").argv[1] == "helper":
+    compile_measurements()
+else:
+    event.register("numba:compile", Listener())
+    imu_kernel.dispatcher.result_for(np.zeros(1, MEMORY), ImuTrack().ring[0])
+"""
+
+
+@pytest.mark.skipif(not NIGHTLY, reason="a quarter of a minute of CPU time")
+def test_helper_and_parent_each_compile_a_part_of_the_filter(tmp_path: Path) -> None:
+    """The type of each argument of ``fuse_next`` is the one that the filter's kernel passes."""
+    run(MEASUREMENTS, "helper", cache=tmp_path)
+    compiled = run(MEASUREMENTS, "parent", cache=tmp_path).stdout.split()
+    assert "imu_kernel" in compiled
+    assert "_begin__part" in compiled
+    assert not {"fuse_next__part", "take_gnss__part", "fuse__part"} & set(compiled)
 
 
 @pytest.mark.skipif(CPUS < 2, reason="the helper needs a second CPU")

@@ -238,8 +238,8 @@ static int32_t measured(fs_estimator_memory *m, fs_filter *f, fs_rings *r, int32
     return following;
 }
 
-/* Fuse the next scalar of the source at hand. agenda.py:186 */
-static int32_t part(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_estimator_params *params)
+/* agenda.py:186 */
+int32_t fs_fuse_next(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_estimator_params *params)
 {
     const int32_t source = m->agenda.source;
     const int32_t axis = m->agenda.axis;
@@ -298,7 +298,7 @@ bool fs_work(fs_estimator_memory *m, fs_filter *f, fs_rings *r, fs_real horizon_
         if (agenda->source >= FS_SOURCES) {
             break;
         }
-        const int32_t following = part(m, f, r, params);
+        const int32_t following = fs_fuse_next(m, f, r, params);
         if (following != FS_NOTHING) {
             agenda->axis = following;
             agenda->has_fused = 1;

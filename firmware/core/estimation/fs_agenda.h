@@ -17,6 +17,9 @@
 #include "fs_types.h"
 #include "fs_yaw_estimator.h"
 
+/* Fuse the next scalar of the source at hand. agenda.py:186 */
+int32_t fs_fuse_next(fs_estimator_memory *m, fs_filter *f, fs_rings *r, const fs_estimator_params *params);
+
 /*
  * Do the next part of the work; return False if no step older than the horizon is open or waits.
  *
