@@ -15,8 +15,8 @@ from typing import Any
 
 import numba
 from llvmlite.binding import parse_assembly, parse_bitcode
-from numba.core import errors, types
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
+from numba.core import caching, errors, types
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult, Flags
 from numba.core.environment import lookup_environment
@@ -188,7 +188,11 @@ class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
         return library
 
 
-class _Locator(UserProvidedCacheLocator):  # type: ignore[misc]
+_UserLocator: Any = vars(caching).get("UserProvidedCacheLocator") or vars(caching)["_UserProvidedCacheLocator"]
+"""Renamed after Numba 0.60."""
+
+
+class _Locator(_UserLocator):  # type: ignore[misc]
     """Files of a kernel in a cache directory that is keyed by its sources: every copy of them shares its kernels."""
 
     def __init__(self, function: FunctionType, file: str) -> None:
