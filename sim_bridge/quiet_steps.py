@@ -9,6 +9,7 @@ import numpy as np
 from flightstack.core.compiled import IS_DISABLED
 from flightstack.core.contract import ByteArray, FloatArray, RecordArray, SingleArray
 from flightstack.core.kernel_calls import address_of, as_bytes
+from flightstack.core.periods import NEVER_US
 from flightstack.simulator_link.frame_kernels import SENSOR_NEWS
 from flightstack.simulator_link.gps_kernels import GPS_SIZE
 from flightstack.simulator_link.sensor_frames import BARO as BARO_FIELDS
@@ -18,7 +19,6 @@ from sim_bridge.plant.compiled_plant import CompiledPlant
 from sim_bridge.plant.layout import CONTACT
 from sim_bridge.plant.near_ground import airspeed
 from sim_bridge.sensors.barometer import Barometer, measure_baro
-from sim_bridge.sensors.faults import NEVER_US
 from sim_bridge.sensors.gnss import receive_gnss
 from sim_bridge.sensors.imu import measure_imu
 from sim_bridge.sensors.layout import IMU, MOTION

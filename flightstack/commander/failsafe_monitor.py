@@ -270,6 +270,8 @@ class FailsafeMonitor:
         self._update_battery_level()
         if not self.states.is_new or self.fence.is_breached:
             return False
+        if phase is Phase.DISARMED:
+            return self._memory is IDLE
         return not self._has_conditions or self._goes_on(phase, mode)
 
     def _goes_on(self, phase: Phase, mode: Mode) -> bool:

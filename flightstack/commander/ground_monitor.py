@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from flightstack.commander.transitions import Event
+from flightstack.core.periods import NEVER_US
 from flightstack.params.behaviour import Behaviour
 
 OFF_GROUND_M = 0.05
@@ -82,10 +84,23 @@ class GroundMonitor:
         """Return the disarming event that is due on the ground, after a landing or without a takeoff, or None."""
         if self._makes_progress(standing) or abs(standing.down_m_s) > STANDING_M_S:
             self._since_us = time_us
-        after_landing = self._has_flown and not standing.goes_on
-        event = Event.LANDED_LONG_ENOUGH if after_landing else Event.NO_TAKEOFF
-        wait_s = behaviour.disarm_after_landing_s if after_landing else behaviour.disarm_without_takeoff_s
+        event, wait_s = self._next_event(standing.goes_on, behaviour)
         return event if 0.0 < wait_s <= (time_us - self._since_us) * 1e-6 else None
+
+    def _next_event(self, goes_on: bool, behaviour: Behaviour) -> tuple[Event, float]:
+        """Return the event that follows, and the time after which it does [s]; 0 for never."""
+        if self._has_flown and not goes_on:
+            return Event.LANDED_LONG_ENOUGH, behaviour.disarm_after_landing_s
+        return Event.NO_TAKEOFF, behaviour.disarm_without_takeoff_s
+
+    def due_us(self, *, goes_on: bool, behaviour: Behaviour) -> int:
+        """Return a time before which no event is due if the vehicle stands, with its loops stopped."""
+        _event, wait_s = self._next_event(goes_on, behaviour)
+        return self._since_us + math.floor(wait_s * 1e6) if wait_s > 0.0 else NEVER_US
+
+    def stand(self) -> None:
+        """Follow calls of ``due_event`` in which the vehicle stood, with its loops stopped."""
+        self._takeoff = None
 
     def _makes_progress(self, now: Standing) -> bool:
         """Return True if a takeoff begins, is off the ground, or exceeds its extreme heights or largest thrust."""

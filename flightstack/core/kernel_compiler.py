@@ -188,7 +188,9 @@ class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
         return library
 
 
-_UserLocator: Any = vars(caching).get("UserProvidedCacheLocator") or vars(caching)["_UserProvidedCacheLocator"]
+_UserLocator: Any = (
+    vars(caching).get("UserProvidedCacheLocator") or vars(caching)["_UserProvidedCacheLocator"]
+)
 """Renamed after Numba 0.60."""
 
 

@@ -6,6 +6,9 @@ from typing import Any
 
 from flightstack.core.compiled import compiled
 
+NEVER_US = 1 << 62
+"""A time that does not come [µs]."""
+
 
 def next_due(time_us: int, interval_us: int) -> int:
     """Return the first multiple of ``interval_us`` after ``time_us``."""

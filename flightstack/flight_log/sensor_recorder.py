@@ -10,7 +10,7 @@ import numpy as np
 from flightstack.core.compiled import plain
 from flightstack.core.contract import FloatArray
 from flightstack.core.geodesy import GeoPoint, LocalFrame
-from flightstack.core.periods import next_due
+from flightstack.core.periods import NEVER_US, next_due
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import Sample
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, MagSample, RangeSample
@@ -48,7 +48,6 @@ SENSOR_GROUPS = (
 )  # fmt: skip
 TRUTH_INTERVAL_US, GLOBAL_INTERVAL_US, ESTIMATOR_INTERVAL_US = 10_000, 100_000, 500_000
 """Intervals of PX4's logger."""
-NEVER_US = 1 << 62
 LOCAL_INTERVAL_US = 200_000
 """Interval of the validity and accuracy of the local position: a report of the estimator takes 0.1 ms."""
 _FILLS: dict[type, tuple[Group, Callable[[FloatArray, Any], None]]] = {

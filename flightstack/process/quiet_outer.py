@@ -23,7 +23,8 @@ from flightstack.vehicle.outer_kernel import OUTER_CALLS, OUTER_MARKS, PROGRESS,
 
 _NEVER_M = -1.0
 """A distance to the takeoff altitude that is never reached."""
-_FLAGS = int(LoopFlags.OUTER_DUE)
+_FLYING, _STANDING = int(LoopFlags.OUTER_DUE), 0
+"""Flags in the log of a vehicle that flies, and of one that must not."""
 
 
 def _bytes(memory: Any) -> Any:
@@ -48,7 +49,7 @@ class QuietOuter:
         self._control = loops.outer_arrays
         columns = OUTER.size + len(self._recorder.estimate)
         self._no_log = Trace(DEFAULT_CAPACITY, columns, lambda: None)
-        self._key: tuple[Any, ...] = (None,) * 9
+        self._key: tuple[Any, ...] = (None,) * 11
         self._arguments: tuple[Any, ...] = ()
         self._seen_bytes = b""
         self._progress_is: MissionProgress | None = None
@@ -71,24 +72,25 @@ class QuietOuter:
                 loops.outer_kernel, now.state, now.setpoint, memory, parameters, last, outer_dt_s, target
             ),
             store=address_of(
-                store_outer_row, self._no_log.rows[0], now.state, now.setpoint, target, _FLAGS
+                store_outer_row, self._no_log.rows[0], now.state, now.setpoint, target, _FLYING
             ),
         )  # fmt: skip
         return np.array([calls], OUTER_CALLS)
 
     def room(self, time_us: int) -> int:
         """Return for how many ticks from the outer tick at ``time_us`` the open log takes rows without other work."""
-        log = self._recorder.log
-        if log is None:
-            return self._no_log.capacity
-        until_battery = -((time_us - self._recorder.battery_due_us) // self._period_us)
-        return self._divisor * min(until_battery, log.outer.capacity - log.outer.n)
+        log, until_us = self._recorder.log, self._autopilot.nominal_until_us
+        outers = self._no_log.capacity
+        if log is not None:
+            until_us = min(until_us, self._recorder.battery_due_us)
+            outers = log.outer.capacity - log.outer.n
+        return self._divisor * max(0, min(-((time_us - until_us) // self._period_us), outers))
 
     def arguments(self) -> tuple[Any, ...]:
         """Return the kernel's argument ``outer``."""
         now, log, link = self._now, self._recorder.log, self._link
         trace = self._no_log if log is None else log.outer
-        self._marks["at"] = trace.n
+        self._marks["at"], self._marks["found"] = trace.n, self._faults.found
         if link.seen is not self._seen_bytes:
             self._seen_bytes = link.seen
             self._seen[:] = np.frombuffer(link.seen, np.uint8) if link.seen else 0
@@ -98,7 +100,7 @@ class QuietOuter:
         goal = self._navigator.goal
         key = (
             goal.plan, goal.jumps_left, self._navigator.modes, self._fence.arguments, self._faults.limits, trace,
-            now.status.mode, self._takeoff.altitude_m, now.behaviour,
+            now.status.mode, self._takeoff.altitude_m, now.behaviour, now.status.armed, now.flying,
         )  # fmt: skip
         if any(map(is_not, key, self._key)):
             self._key, self._arguments = key, self._made(now.status.mode, goal, trace)
@@ -112,12 +114,12 @@ class QuietOuter:
         )  # fmt: skip
         views = tuple(_bytes(memory) for memory in memories)
         acceptance_m = self._now.behaviour.altitude_acceptance_m if mode is Mode.TAKEOFF else _NEVER_M
-        is_mission = mode is Mode.MISSION
+        is_mission, flags = mode is Mode.MISSION, _FLYING if self._now.flying else _STANDING
         return (
             self._marks,
             (
                 self._state, self._seen, float(self._takeoff.altitude_m), float(acceptance_m), is_mission,
-                self._progress, False,
+                self._progress, False, self._now.status.armed,
             ),
             fence,
             (faults.rotors, faults.detectors, faults.limits),
@@ -126,7 +128,7 @@ class QuietOuter:
                 goal.mode_target, goal.land, goal.params, goal.dt_s, setpoint,
             ),
             self._control,
-            (trace.rows, trace.times_us, OUTER.size, self._recorder.estimate, _FLAGS),
+            (trace.rows, trace.times_us, OUTER.size, self._recorder.estimate, flags),
             (views, tuple(np.zeros_like(view) for view in views)),
         )  # fmt: skip
 

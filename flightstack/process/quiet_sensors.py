@@ -10,6 +10,7 @@ import numpy as np
 from flightstack.commander.estimate_checks import LIMITS, watch_estimate
 from flightstack.core.contract import STATE_SIZE, ByteArray, RecordArray, SingleArray, Vector3
 from flightstack.core.kernel_calls import address_of, as_bytes
+from flightstack.core.periods import NEVER_US
 from flightstack.estimation.delayed_filter import push_kernel
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.fusion import GNSS_SIZE
@@ -19,7 +20,7 @@ from flightstack.estimation.rings import MAG_RING
 from flightstack.estimation.sensor_feed import SlowSamples, fix_row, fix_sample
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, MagSample
 from flightstack.flight_log.flight_log import DEFAULT_CAPACITY, FlightLog, Trace
-from flightstack.flight_log.sensor_recorder import GLOBAL_INTERVAL_US, NEVER_US, TRUTH_INTERVAL_US
+from flightstack.flight_log.sensor_recorder import GLOBAL_INTERVAL_US, TRUTH_INTERVAL_US
 from flightstack.flight_log.sensor_topics import (
     BARO_GROUP,
     GNSS_GROUP,

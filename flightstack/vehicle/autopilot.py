@@ -8,6 +8,7 @@ from flightstack.commander.failsafe_monitor import FailsafeMonitor
 from flightstack.control.backend import ControlBackend
 from flightstack.core.contract import FloatArray, LoopFlags, LoopRow, LoopStatus
 from flightstack.core.enums import Mode, Severity
+from flightstack.core.periods import NEVER_US
 from flightstack.flight_log.recorder import FlightRecorder
 from flightstack.guidance.navigator import Navigator
 from flightstack.simulator_link.endpoint import SimulatorEndpoint
@@ -101,10 +102,21 @@ class Autopilot:
         return 0 if self._failsafes.states.holds_rotors else self.next_outer
 
     def is_nominal(self) -> bool:
-        """Return True if the next outer tick only guides and controls, unless the new state makes an event."""
+        """Return True if the next outer tick does nothing but these, unless the new state makes an event.
+
+        In flight it guides and controls, on the ground it leaves the rotors at idle speed.
+        """
         now = self.now
-        flies = now.flying and not (now.rests or now.loops_reset or now.attitude_is_given)
-        return flies and self._monitor.is_nominal()
+        if now.rests:
+            return False
+        if not now.flying:
+            return self._monitor.stands()
+        return not (now.loops_reset or now.attitude_is_given) and self._monitor.is_nominal()
+
+    @property
+    def nominal_until_us(self) -> int:
+        """Time from which an outer tick on the ground is not nominal, because it disarms."""
+        return NEVER_US if self.now.flying else self._monitor.stands_until_us
 
     def pass_outer(self, time_us: int, row: FloatArray, found: int, fell_us: int) -> None:
         """Follow nominal outer ticks, whose kernels ran. The last was at ``time_us`` and wrote ``row``.

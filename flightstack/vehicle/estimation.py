@@ -23,7 +23,7 @@ from flightstack.core.compiled import plain
 from flightstack.core.contract import FloatArray, SingleArray, Vector3
 from flightstack.core.enums import Severity
 from flightstack.core.geodesy import earth_field_ned_gauss
-from flightstack.core.periods import next_due
+from flightstack.core.periods import NEVER_US, next_due
 from flightstack.core.portable_math import distance
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits, tuning_of
@@ -34,7 +34,7 @@ from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples, SensorFeed, SlowSamples
 from flightstack.estimation.sensor_samples import BaroSample, ImuSample
 from flightstack.estimation.snapshot import snapshot
-from flightstack.flight_log.sensor_recorder import NEVER_US, SensorRecorder
+from flightstack.flight_log.sensor_recorder import SensorRecorder
 from flightstack.guidance.navigator import Navigator
 from flightstack.params.estimator import ESTIMATOR_SPECS, MULTI_IMU
 from flightstack.params.store import ParamStore

@@ -7,6 +7,7 @@ from flightstack.commander.failsafe_monitor import EVENTS_OF_ACTION, FailsafeMon
 from flightstack.commander.ground_monitor import GroundMonitor, Standing
 from flightstack.commander.transitions import Event
 from flightstack.core.enums import STREAM_MODES, Mode, Severity
+from flightstack.core.periods import NEVER_US
 from flightstack.guidance.navigator import Navigator
 from flightstack.vehicle.flight_state import FlightState, Journal
 from flightstack.vehicle.mode_control import ModeControl, Takeoff
@@ -14,6 +15,9 @@ from flightstack.vehicle.plans import FlightArea, Mission
 
 AIRBORNE_MODES = (Mode.TAKEOFF, Mode.MISSION)
 """Modes that take off, at once or after a delay."""
+
+_LEAVE_GROUND = frozenset((*AIRBORNE_MODES, *STREAM_MODES))
+"""Modes in which an armed vehicle on the ground may begin to fly in any tick."""
 
 # used in every outer tick: a member of an enumeration takes seven times as long to look up as a name
 _MISSION, _TAKEOFF = Mode.MISSION, Mode.TAKEOFF
@@ -83,10 +87,25 @@ class FlightMonitor:
         armed, mode = self._now.status
         return phase_of(armed, self._now.landed, mode, self._navigator.goes_elsewhere)
 
+    def stands(self) -> bool:
+        """Return True if the next update of a vehicle on the ground changes nothing, as ``is_nominal``."""
+        (armed, mode), now = self._now.status, self._now
+        if not now.landed or (armed and (mode in _LEAVE_GROUND or not self._navigator.landed)):
+            return False
+        return self._failsafes.is_nominal(self._phase, mode)
+
+    @property
+    def stands_until_us(self) -> int:
+        """Time at which the vehicle, if it stands on, is disarmed."""
+        armed, behaviour = self._now.status.armed, self._now.behaviour
+        return self._ground.due_us(goes_on=False, behaviour=behaviour) if armed else NEVER_US
+
     def pass_by(self, time_us: int, found: int, fell_us: int) -> None:
         """Follow updates up to ``time_us`` that did nothing; arguments as in ``Autopilot.pass_outer``."""
         if fell_us:
             self._ground.note_fall(fell_us)
+        if self._now.status.armed and not self._now.flying:
+            self._ground.stand()
         self._failsafes.pass_by(time_us, found)
 
     def _apply_failsafes(self, conditions: frozenset[Failsafe]) -> None:

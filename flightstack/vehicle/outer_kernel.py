@@ -1,4 +1,6 @@
-"""A nominal outer tick as compiled code: failsafe detectors, guidance and outer loop, for the kernel of quiet ticks.
+"""A nominal outer tick as compiled code, for the kernel of quiet ticks.
+
+In flight it runs failsafe detectors, guidance and outer loop, on the ground the detectors.
 
 It calls the kernels that monitor, guidance and loops run in any other tick, on the same arrays and in the same order.
 If one of them finds an event, such as a breached fence, a reached mission item or ground contact, it puts their
@@ -10,7 +12,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from flightstack.commander.fault_detector import MOVING
-from flightstack.commander.ground_monitor import FALL_M_S
+from flightstack.commander.ground_monitor import FALL_M_S, STANDING_M_S
 from flightstack.core.arrays import copy_all
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
@@ -41,7 +43,7 @@ class OuterMarks(NamedTuple):
     fell_us: int
     """Time of the last fall, or 0."""
     found: int
-    """Bits of ``detect``."""
+    """Bits of ``detect``, as before if it was not called."""
 
 
 class Progress(NamedTuple):
@@ -89,10 +91,10 @@ def _leaves_fence(calls: Any, fence: Any, state: FloatArray) -> bool:
 def _is_nominal(calls: Any, outer: Any, state: FloatArray, row: FloatArray) -> bool:
     """Advance fence, detectors and guidance; return False after an event, when memories may have changed."""
     marks, watch, fence, faults, guidance, control, _log, _saved = outer
-    state_bytes, seen, altitude_m, acceptance_m, is_mission, progress, on_ground = watch
+    _state_bytes, _seen, altitude_m, acceptance_m, is_mission, progress, on_ground, _is_armed = watch
     number, trajectory, mission, plan, jumps_left, mode_target, land, params, dt_s, setpoint = guidance
     rotors, detectors, limits = faults
-    if _are_equal(state_bytes, seen) or _touches(land) or (is_mission and _has_progress(mission, progress)):
+    if _touches(land) or (is_mission and _has_progress(mission, progress)):
         return False
     if abs(state[2] + altitude_m) <= acceptance_m or _leaves_fence(calls, fence, state):
         return False
@@ -115,23 +117,50 @@ def _is_nominal(calls: Any, outer: Any, state: FloatArray, row: FloatArray) -> b
 
 
 @compiled
-def guide(calls: Any, outer: Any, tick: int, time_us: int, state: FloatArray, row: FloatArray) -> bool:
+def _stands(calls: Any, outer: Any, state: FloatArray, row: FloatArray) -> bool:
+    """Advance fence and detectors of a vehicle on the ground, without a target; return False after an event."""
+    marks, watch, fence, faults, guidance, _control, _log, _saved = outer
+    if abs(state[5]) > STANDING_M_S or _leaves_fence(calls, fence, state):
+        return False
+    is_armed = watch[7]
+    if is_armed:
+        rotors, detectors, limits = faults
+        on_ground, dt_s = True, guidance[8]
+        place = state  # as setpoint: the position is not controlled
+        found = call_kernel_int(
+            calls["detect"], (state, place, row, rotors, detectors, limits, on_ground, dt_s)
+        )
+        if found & ~MOVING != 0:
+            return False
+        marks[0]["found"] = found
+    return True
+
+
+@compiled
+def guide(
+    calls: Any, outer: Any, tick: int, time_us: int, flies: bool, state: FloatArray, row: FloatArray
+) -> bool:
     """Run the outer tick ``tick`` up to the outer loop; return False, with nothing changed, if it is not nominal.
 
     ``row`` is the newest row of the inner loop.
     """
     marks, watch, _fence, _faults, guidance, control, _log, saved = outer
     memories, copies = saved
+    if _are_equal(watch[0], watch[1]):  # no new state
+        return False
     for k in range(len(memories)):
         copy_all(memories[k], copies[k])
-    if not _is_nominal(calls, outer, state, row):
+    is_nominal = _is_nominal(calls, outer, state, row) if flies else _stands(calls, outer, state, row)
+    if not is_nominal:
         for k in range(len(memories)):
             copy_all(copies[k], memories[k])
         return False
     copy_all(watch[0], watch[1])
+    marks[0]["last"] = tick
+    if not flies:
+        return True
     if abs(state[5]) > FALL_M_S:
         marks[0]["fell_us"] = time_us
-    marks[0]["last"] = tick
     target, last_target, memory, parameters, last, outer_dt_s = control
     copy_all(target, last_target)
     call_kernel(calls["command"], (state, guidance[9], memory, parameters, last, outer_dt_s, target))

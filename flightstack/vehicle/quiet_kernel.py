@@ -154,7 +154,7 @@ def fly_quiet_ticks(
     state, row, counters, marks = control[0], last_row, counters_array[0], outer[0][0]
     counters["ticks"], counters["flown"], counters["result"], counters["sensed"] = 0, 0, 0, 0
     counters["waits"] = 0
-    marks["outers"], marks["fell_us"], marks["found"] = 0, 0, 0
+    marks["outers"], marks["fell_us"] = 0, 0
     for i in range(count):
         time_us += interval_us
         if (i > 0 or not is_taken) and not _advance(
@@ -164,10 +164,11 @@ def fly_quiet_ticks(
             return
         outer_due = (i - outer_in) % divisor == 0
         if outer_due:
-            if not guide(outer_calls, outer, i, time_us, state, row):
+            if not guide(outer_calls, outer, i, time_us, flies, state, row):
                 counters["waits"] = 1
                 return
-            control[3][0] = 0.0
+            if flies:
+                control[3][0] = 0.0
         row = rows[row_at + i]
         row_times[row_at + i] = time_us
         _control(calls, control, flies, row, commands)

@@ -15,12 +15,11 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from flightstack.core.contract import FloatArray, RecordArray, Vector3
+from flightstack.core.periods import NEVER_US
 from sim_bridge.plant.faults.table import Fault, Kind
 from sim_bridge.sensors.noise import UniformStream
 
 T = TypeVar("T")
-
-NEVER_US = 1 << 62
 _STILL = Vector3(0.0, 0.0, 0.0)
 
 

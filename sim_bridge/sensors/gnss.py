@@ -20,10 +20,10 @@ from flightstack.core.arrays import copy_all
 from flightstack.core.compiled import compiled, direct
 from flightstack.core.contract import FloatArray, Record, RecordArray, Vector3
 from flightstack.core.geodesy import GeoPoint, LocalFrame, geographic
+from flightstack.core.periods import NEVER_US
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.vehicle import Vehicle
 from flightstack.simulator_link.gps_kernels import FIX_SIZE, FixRow
-from sim_bridge.sensors.faults import NEVER_US
 from sim_bridge.sensors.layout import GNSS, write_numbers
 from sim_bridge.sensors.noise import NormalStream, gauss_markov, step_to, with_fault
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from flightstack.core.contract import FloatArray, RecordArray, SingleArray
 from flightstack.core.geodesy import GeoPoint, earth_field_ned_gauss
-from flightstack.core.periods import next_due
+from flightstack.core.periods import NEVER_US, next_due
 from flightstack.core.portable_math import sin_cos
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
@@ -42,7 +42,7 @@ from flightstack.simulator_link.sensor_frames import (
 from sim_bridge.plant.faults.table import Fault, Kind
 from sim_bridge.plant.plant import Plant, PlantOptions
 from sim_bridge.sensors.barometer import Barometer
-from sim_bridge.sensors.faults import HEALTHY, NEVER_US, Channel, channel_faults
+from sim_bridge.sensors.faults import HEALTHY, Channel, channel_faults
 from sim_bridge.sensors.gnss import GnssReceiver
 from sim_bridge.sensors.imu import ImuSet
 from sim_bridge.sensors.magnetometer import Magnetometer

@@ -13,6 +13,7 @@ from flightstack.testing.state import State
 from sim_bridge.sensors.gnss import GnssReceiver
 from sim_bridge.sensors.magnetometer import Magnetometer
 from tests.support.bytes_engine import BytesEngine
+from tests.support.equal_flights import assert_flies_equally
 
 
 def mission(world: World) -> None:
@@ -146,25 +147,8 @@ FLIGHTS = (
     ("state", "fly"),
     [(state, fly) for state in ("truth", "estimated") for fly in FLIGHTS],
 )
-def test_a_flight_is_the_same_as_by_single_ticks_with_bytes(
-    fly: Callable[[World], None], state: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def flown(world: World) -> tuple[bytes, list[tuple[float, bytes]], list[object], float]:
-        received: list[tuple[float, bytes]] = []
-        receive = world.gcs.receive
-
-        def recorded(data: bytes, now_s: float) -> None:
-            received.append((now_s, data))
-            receive(data, now_s)
-
-        monkeypatch.setattr(world.gcs, "receive", recorded)
-        world.wait_until_ready()
-        fly(world)
-        return world.engine.newest_log(), received, list(world.events), world.time_s
-
-    conditions = {"state": state, "vehicle": "x_quad", "seed": 5}
-    with World(**conditions) as quiet, World(make_engine=BytesEngine, **conditions) as exchanged:
-        assert flown(quiet) == flown(exchanged)
+def test_a_flight_is_the_same_as_by_single_ticks_with_bytes(fly: Callable[[World], None], state: str) -> None:
+    assert_flies_equally(fly, state=state, vehicle="x_quad", seed=5)
 
 
 def test_one_call_flies_many_periods(monkeypatch: pytest.MonkeyPatch) -> None:
