@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from benchmarks import (
+    campaigns,
     emulated,
     ground_load,
     one_process,
@@ -49,6 +50,7 @@ MEASUREMENTS = (
     Measurement("steps", "costs", "the parts of a step", step_costs.costs, (2, 0.01), (7, 0.05)),
     Measurement("flights", "one_process", "flights in one process", one_process.flights, (2,), (7,)),
     Measurement("flights", "three_processes", "flights of three processes", _flights, (2,), (7,)),
+    Measurement("campaigns", "campaigns", "flights of campaigns", campaigns.campaigns, (2, 0.25), (5, 1.0)),
     Measurement(
         "emulated", "emulated", "flights with loops on an emulated processor", emulated.flights, (1,), (3,)
     ),
@@ -81,9 +83,10 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--only", choices=SECTIONS, action="append", help="measure only this (repeatable)")
     parser.add_argument(
         "--against",
-        type=peers.checkouts_of,
-        metavar="NAME=DIRECTORY,…",
-        help="fly in turns with the builds in checkouts of ardupilot and px4; only this without --only",
+        type=peers.peers_of,
+        metavar="NAME=PATH,…",
+        help="fly in turns with the builds in checkouts of ardupilot and px4, and with the packages of rotorpy, "
+        "pybullet_drones and jax, each by the Python that has it; only this without --only",
     )
     return parser.parse_args()
 
@@ -100,7 +103,7 @@ def main() -> int:
             print(f"measuring {each.name} …", file=sys.stderr, flush=True)
             results[each.key] = each.measure(*(each.quick if arguments.quick else each.whole))
     if arguments.against:
-        print("measuring flights in turns with other autopilots …", file=sys.stderr, flush=True)
+        print("measuring flights in turns with other programs …", file=sys.stderr, flush=True)
         results["peers"] = peers.flights(arguments.against, 2 if arguments.quick else 7)
     machine = {
         "system": f"{platform.system()} {platform.machine()}",

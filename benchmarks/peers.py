@@ -1,201 +1,58 @@
-"""Own flights and those of other autopilots in turns: ``--against ardupilot=DIRECTORY,px4=DIRECTORY``, their builds.
+"""Own flights and those of other programs in turns: ``--against ardupilot=DIRECTORY,rotorpy=PYTHON``.
 
-Own flights are ``missions/square.plan`` on sensors. A peer takes off and hovers as fast as it can on its own
-simulation, with its estimator, its log and its telemetry as they come, read by a ``Connection`` in this process. Its
-factor is that of 60 s of hover, by the time in its messages. It flies no mission: at a hundred times real time the
-upload exceeds what the vehicle's clock allows for an answer.
+Beside autopilots fly ``missions/square.plan`` on sensors, by wall time; beside simulators the flights of a campaign, by
+processor time.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
-import os
-import signal
-import socket
-import subprocess
 import sys
-import tempfile
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Protocol
 
-from benchmarks import one_process, three_processes
+from benchmarks import campaigns, one_process, three_processes
+from benchmarks.autopilots import AUTOPILOTS
 from benchmarks.measure import Figure, figure
-from benchmarks.ports import is_free
-from flightstack.mavlink.dialect import mavlink
+from benchmarks.peer_error import PeerError
+from benchmarks.simulators import SIMULATORS
 from flightstack.params.config import ESTIMATED
-from gcs_cli.actions.in_flight import takeoff
 from gcs_cli.errors import CliError
-from gcs_cli.link.connection import Connection
-from gcs_cli.link.endpoint import parse_endpoint
-from gcs_cli.link.perform import perform
-from gcs_cli.output import Output
-from gcs_cli.vehicle.view_types import VehicleView
 
-_LATITUDE, _LONGITUDE, _ALTITUDE = "47.397742", "8.545594", "488"
-"""Home of the plan."""
-_UNLIMITED = "1000"
-"""Speed factor that no machine reaches."""
-_ALTITUDE_M, _HOVER_S = 5.0, 60.0
-_LIMIT_S, _PAUSE_S = 60.0, 0.05
+Fly = Callable[[], float]
+"""Flies once and returns the real-time factor."""
 
 
-class Peer(NamedTuple):
-    """Another autopilot: how its build is started, and where it answers."""
+class Peer(Protocol):
+    """A program that own flights are compared with."""
 
-    title: str
-    program: str
-    """Path in the checkout."""
-    arguments: Callable[[Path], tuple[str, ...]]
-    """Arguments of the program, from the checkout."""
-    environment: dict[str, str]
-    endpoint: str
-    port: int
-    """The port of ``endpoint``, which has to be free before."""
-    autopilot: int
-    """Its MAV_AUTOPILOT."""
+    def problem(self, path: Path, /) -> str:
+        """Return the reason why it cannot fly from ``path``, or an empty text."""
+
+    def opened(self, path: Path, /) -> contextlib.AbstractContextManager[dict[str, Fly]]:
+        """Yield what flies once, by the name of its row."""
 
 
-PEERS = {
-    "ardupilot": Peer(
-        "ArduCopter's SITL, one process",
-        "build/sitl/bin/arducopter",
-        lambda checkout: (
-            *("--model", "quad", "--speedup", _UNLIMITED, "--wipe"),
-            *("--defaults", str(checkout / "Tools" / "autotest" / "default_params" / "copter.parm")),
-            *("--home", f"{_LATITUDE},{_LONGITUDE},{_ALTITUDE},0"),
-        ),
-        {},
-        "tcp:127.0.0.1:5760",
-        5760,
-        mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA,
-    ),
-    "px4": Peer(
-        "PX4's SIH, one process",
-        "build/px4_sitl_default/bin/px4",
-        lambda checkout: ("-d", "-w", ".", str(checkout / "build" / "px4_sitl_default" / "etc")),
-        {
-            "PX4_SIM_MODEL": "sihsim_quadx",
-            "PX4_SIM_SPEED_FACTOR": _UNLIMITED,
-            "PX4_HOME_LAT": _LATITUDE,
-            "PX4_HOME_LON": _LONGITUDE,
-            "PX4_HOME_ALT": _ALTITUDE,
-        },
-        "udpin:127.0.0.1:14550",
-        14550,
-        mavlink.MAV_AUTOPILOT_PX4,
-    ),
-}
+PEERS: dict[str, Peer] = {**AUTOPILOTS, **SIMULATORS}
 
 
-class PeerError(RuntimeError):
-    """A peer that cannot be measured."""
-
-
-class _Silent(Output):
-    def say(self, event: str, sentence: str, **facts: object) -> None:
-        """Print nothing."""
-
-
-def checkouts_of(text: str) -> dict[str, Path]:
-    """Return the checkout of each peer in ``ardupilot=DIRECTORY,px4=DIRECTORY``; raise ArgumentTypeError."""
+def peers_of(text: str) -> dict[str, Path]:
+    """Return the path of each peer in ``ardupilot=DIRECTORY,rotorpy=PYTHON``; raise ArgumentTypeError."""
     found: dict[str, Path] = {}
     for part in text.split(","):
-        name, _, directory = part.partition("=")
-        if name not in PEERS or not directory:
-            raise argparse.ArgumentTypeError(
-                f"{part!r} is not NAME=DIRECTORY with a NAME of {', '.join(PEERS)}"
-            )
-        checkout = Path(directory).resolve()
-        if not (checkout / PEERS[name].program).is_file():
-            raise argparse.ArgumentTypeError(f"{checkout} has no {PEERS[name].program}: build it first")
+        name, _, given = part.partition("=")
+        if name not in PEERS or not given:
+            raise argparse.ArgumentTypeError(f"{part!r} is not NAME=PATH with a NAME of {', '.join(PEERS)}")
+        path = Path(given).absolute()  # not resolved: the Python of a virtual environment is a link
+        if problem := PEERS[name].problem(path):
+            raise argparse.ArgumentTypeError(problem)
         if name in found:
-            raise argparse.ArgumentTypeError(f"{name} has two directories")
-        found[name] = checkout
+            raise argparse.ArgumentTypeError(f"{name} has two paths")
+        found[name] = path
     return found
-
-
-@contextlib.contextmanager
-def _running(peer: Peer, checkout: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """Run a peer in an empty directory, and end it."""
-    for kind in (socket.SOCK_STREAM, socket.SOCK_DGRAM):
-        if not is_free(kind, peer.port):
-            raise PeerError(f"{peer.title}: port {peer.port} is in use")
-    command = [str(checkout / peer.program), *peer.arguments(checkout)]
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        process = subprocess.Popen(
-            command,
-            cwd=folder,
-            env={**os.environ, **peer.environment},
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
-        try:
-            yield process
-        finally:
-            os.killpg(process.pid, signal.SIGKILL)  # with PX4's shells
-            process.wait()
-
-
-def _connected(peer: Peer, process: subprocess.Popen[bytes]) -> Connection:
-    """Return a connection once the peer listens."""
-    end_s = time.monotonic() + _LIMIT_S
-    while True:
-        try:
-            return Connection(parse_endpoint(peer.endpoint))
-        except CliError as error:
-            if process.poll() is not None or time.monotonic() > end_s:
-                raise PeerError(f"{peer.title}: {error}") from None
-        time.sleep(_PAUSE_S)
-
-
-def _is_in_air(view: VehicleView) -> bool:
-    return view.armed and view.landed_state == mavlink.MAV_LANDED_STATE_IN_AIR
-
-
-def _take_off(connection: Connection) -> None:
-    """Take off as soon as the vehicle can: its estimator needs half a minute of its time."""
-    end_s = time.monotonic() + _LIMIT_S
-    while True:
-        try:
-            perform(connection, takeoff(_ALTITUDE_M), _Silent(as_json=False))
-            return
-        except CliError:  # also if an answer was lost, as some of PX4's at this speed
-            view = connection.session.view
-            if _is_in_air(view):
-                return
-            if time.monotonic() > end_s:
-                raise
-        connection.step(connection.now_s + _PAUSE_S)
-
-
-def fly(peer: Peer, checkout: Path) -> float:
-    """Hover once; return the real-time factor."""
-    with _running(peer, checkout) as process, _connected(peer, process) as connection:
-        connection.wait_for_vehicle(_LIMIT_S)
-        session = connection.session
-        identity = session.view.identity
-        if process.poll() is not None or identity is None or identity.autopilot != peer.autopilot:
-            raise PeerError(f"{peer.title}: another vehicle answers at {peer.endpoint}")
-        _take_off(connection)
-        mode, began_s, from_s = session.view.mode, time.perf_counter(), _time_s(session.view)
-        if not connection.wait_for(lambda: _time_s(session.view) > from_s + _HOVER_S, _LIMIT_S):
-            raise PeerError(f"{peer.title} did not fly for {_HOVER_S:g} s within {_LIMIT_S:g} s")
-        took_s = time.perf_counter() - began_s
-        if not _is_in_air(session.view) or session.view.mode != mode:
-            raise PeerError(f"{peer.title} did not hover: {session.view.mode} after {mode}")
-        return (_time_s(session.view) - from_s) / took_s
-
-
-def _time_s(view: VehicleView) -> float:
-    if view.time_s is None:
-        raise PeerError("the vehicle sends no time")
-    return view.time_s
 
 
 def _one_process(variant: one_process.Variant) -> float:
@@ -207,25 +64,50 @@ def _three_processes() -> float:
     return float(summary["real_time_factor"])
 
 
-def flights(checkouts: dict[str, Path], rounds: int) -> dict[str, Figure]:
-    """Return the factors of own flights on sensors and of the peers', flown in turns; the first round warms caches."""
-    flown: dict[str, Callable[[], float]] = {
+def _beside_autopilots() -> dict[str, Fly]:
+    return {
         **{
             f"one process, {each.name}": partial(_one_process, each)
             for each in one_process.VARIANTS
             if each.state == ESTIMATED
         },
         "three processes, sensors and estimator, log": _three_processes,
-        **{PEERS[name].title: partial(fly, PEERS[name], checkout) for name, checkout in checkouts.items()},
     }
-    seen: dict[str, list[float]] = {name: [] for name in flown}
-    for number in range(rounds + 1):
-        for name, once in flown.items():
-            try:
-                factor = once()
-            except (CliError, PeerError) as error:
-                print(f"round {number} left out: {error}", file=sys.stderr, flush=True)
-                continue
-            if number:
-                seen[name].append(factor)
-    return {name: figure(factors) for name, factors in seen.items() if factors}
+
+
+def _beside_simulators() -> dict[str, Fly]:
+    return {f"campaign, {kind.name}": campaigns.Flights(kind).fly for kind in campaigns.KINDS}
+
+
+GROUPS: dict[str, tuple[Mapping[str, Peer], Callable[[], dict[str, Fly]]]] = {
+    "autopilots": (AUTOPILOTS, _beside_autopilots),
+    "simulators": (SIMULATORS, _beside_simulators),
+}
+"""Peers that are compared with the same own flights."""
+
+
+def flights(paths: dict[str, Path], rounds: int) -> dict[str, dict[str, Figure]]:
+    """Return the factors of own flights and of the peers' by group, each group flown in turns."""
+    return {
+        group: _in_turns(own(), {name: paths[name] for name in paths if name in members}, rounds)
+        for group, (members, own) in GROUPS.items()
+        if any(name in members for name in paths)
+    }
+
+
+def _in_turns(flown: dict[str, Fly], paths: dict[str, Path], rounds: int) -> dict[str, Figure]:
+    """Fly each in every round; the first round warms caches."""
+    seen: dict[str, list[float]] = {}
+    with contextlib.ExitStack() as stack:
+        for name, path in paths.items():
+            flown |= stack.enter_context(PEERS[name].opened(path))
+        for number in range(rounds + 1):
+            for name, once in flown.items():
+                try:
+                    factor = once()
+                except (CliError, PeerError) as error:
+                    print(f"round {number} left out: {error}", file=sys.stderr, flush=True)
+                    continue
+                if number:
+                    seen.setdefault(name, []).append(factor)
+    return {name: figure(seen[name]) for name in flown if name in seen}

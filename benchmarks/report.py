@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
-from benchmarks import step_costs, three_processes
-from benchmarks.emulated import Flown
+from benchmarks import campaigns, emulated, step_costs, three_processes
+from benchmarks.campaigns import Flown
 from benchmarks.ground_load import Seen
 from benchmarks.measure import Figure, short
 from benchmarks.plants import PlantCost
@@ -25,6 +25,19 @@ THREE_PROCESSES = (("≥ 20", "PX4 10"), ("≥ 40", "PX4 18–23"), ("goal 55", 
 PLANT_FLOORS = {"rigid": "≥ 20", "multibody": "≥ 15"}
 ONE_PROCESS = ("≥ 60, goal 150", "ArduCopter 70–76")
 ON_SENSORS = ("goal 120", "ArduCopter 70–76")
+CAMPAIGNS = (("goal 1000", "RotorPy 1, PyBullet 6, JAX 28"), ("goal 400", ""))
+"""Others: simulators without autopilot, one vehicle, on the true state."""
+FLIGHTS_A_MINUTE = "goal 1000"
+PEER_HEADS = {
+    "autopilots": (
+        "FLIGHTS IN TURNS WITH OTHER AUTOPILOTS",
+        ("square.plan, or 60 s of hover", "× real time"),
+    ),
+    "simulators": (
+        "CAMPAIGN FLIGHTS IN TURNS WITH SIMULATORS WITHOUT AUTOPILOT",
+        ("minute.plan, or rounds of a square, 500 Hz", "× real time, a core"),
+    ),
+}
 
 
 def texts(results: dict[str, Any], machine: dict[str, Any]) -> Iterator[str]:
@@ -34,30 +47,9 @@ def texts(results: dict[str, Any], machine: dict[str, Any]) -> Iterator[str]:
         f"other programs used {100 * machine['used_by_others']:.0f} % of the machine meanwhile.\n"
         "Median (least–greatest) of interleaved rounds. Steps are those of the inner loop.\n"
     )
-    if "three_processes" in results:
-        yield _flights(results) + "\n"
-    if "peers" in results:
-        yield _peers(results["peers"]) + "\n"
-    if "emulated" in results:
-        yield _emulated(results["emulated"]) + "\n"
-    if "plants" in results:
-        yield _plants(results["plants"]) + "\n"
-    if "costs" in results:
-        yield _costs(results) + "\n"
-    if "round_trips" in results:
-        yield _round_trips(results["round_trips"]) + "\n"
-    if "lateness" in results:
-        yield _lateness(*results["lateness"]) + "\n"
-    if "load" in results:
-        yield _load(results["load"]) + "\n"
-    if "transfers" in results:
-        yield _transfers(results["transfers"]) + "\n"
-    if "start" in results:
-        yield _start(results) + "\n"
-    if "startup" in results:
-        yield _startup(results["startup"]) + "\n"
-    if "watch" in results:
-        yield _watched(results["watch"]) + "\n"
+    for key, section in _SECTIONS:
+        if key in results:
+            yield section(results) + "\n"
 
 
 def _flights(results: dict[str, Any]) -> str:
@@ -74,14 +66,33 @@ def _flights(results: dict[str, Any]) -> str:
     return table("FLIGHTS", head, rows)
 
 
-def _peers(flown: dict[str, Figure]) -> str:
-    rows = [(name, factor.text()) for name, factor in flown.items()]
-    return table(
-        "FLIGHTS IN TURNS WITH OTHER AUTOPILOTS", ("square.plan, or 60 s of hover", "× real time"), rows
+def _campaigns(results: dict[str, Flown]) -> str:
+    rows = [
+        (
+            f"campaign, {name}",
+            flown.factor.text(),
+            mark,
+            flown.flights_a_minute.text(),
+            FLIGHTS_A_MINUTE,
+            others,
+        )
+        for (name, flown), (mark, others) in zip(results.items(), CAMPAIGNS, strict=True)
+    ]
+    head = (
+        *("benchmarks/minute.plan, x_quad, gusts, 500 Hz", "× real time, a core", "mark"),
+        *(f"60 s flights a minute, {campaigns.WORKERS} workers", "mark", "others"),
+    )
+    return table("CAMPAIGNS, kernels warm; a core: processor time of a flight", head, rows)
+
+
+def _peers(results: dict[str, dict[str, Figure]]) -> str:
+    return "\n\n".join(
+        table(*PEER_HEADS[group], [(name, factor.text()) for name, factor in flown.items()])
+        for group, flown in results.items()
     )
 
 
-def _emulated(results: dict[str, Flown]) -> str:
+def _emulated(results: dict[str, emulated.Flown]) -> str:
     plain_s = results["python"].minute_s.median
     rows: list[Row] = [
         (
@@ -230,6 +241,24 @@ def _watched(seen: Watched) -> str:
     ]
     title = f"GCS WATCH, {seen.messages_hz:.0f} messages a second: processor time, % of a core"
     return table(title, ("", *(f"{columns}x{rows}" for columns, rows in SIZES)), rows)
+
+
+_SECTIONS: tuple[tuple[str, Callable[[dict[str, Any]], str]], ...] = (
+    ("three_processes", _flights),
+    ("campaigns", lambda results: _campaigns(results["campaigns"])),
+    ("peers", lambda results: _peers(results["peers"])),
+    ("emulated", lambda results: _emulated(results["emulated"])),
+    ("plants", lambda results: _plants(results["plants"])),
+    ("costs", _costs),
+    ("round_trips", lambda results: _round_trips(results["round_trips"])),
+    ("lateness", lambda results: _lateness(*results["lateness"])),
+    ("load", lambda results: _load(results["load"])),
+    ("transfers", lambda results: _transfers(results["transfers"])),
+    ("start", _start),
+    ("startup", lambda results: _startup(results["startup"])),
+    ("watch", lambda results: _watched(results["watch"])),
+)
+"""The key of each section's figures, and what writes it."""
 
 
 def plain(results: dict[str, Any]) -> dict[str, Any]:

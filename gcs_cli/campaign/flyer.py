@@ -20,7 +20,8 @@ from gcs_cli.scenarios.result import Wanted
 from gcs_cli.scenarios.selection import Case
 
 _RATES = ("inner_hz", "outer_hz")
-_WANTED = Wanted(metrics=True)
+WANTED = Wanted(metrics=True)
+"""What each flight of a campaign returns besides the verdict."""
 
 
 class LostWorkerError(CliError):
@@ -84,7 +85,7 @@ class Flyer:
     def _fly(self, missing: Sequence[PlannedFlight], cases: Cases) -> list[tuple[int, str]]:
         """Return number and reason of each flight that was lost."""
         lost: list[tuple[int, str]] = []
-        with contextlib.closing(self._pool.fly(cases, _WANTED)) as messages:
+        with contextlib.closing(self._pool.fly(cases, WANTED)) as messages:
             for message in messages:
                 if isinstance(message, Started):
                     self._display.begin(missing[message.case].number)
