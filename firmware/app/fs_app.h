@@ -54,8 +54,9 @@
 #define FS_SENSE_CLEAR 14UL
 #define FS_SENSE_START 15UL
 #define FS_SENSE_READ 16UL
+#define FS_SENSE_ORIGIN 17UL
 
-#define FS_APP_PROTOCOL 3U /* version of the FS_PIL messages: FS_PIL_IDENTITY.protocol */
+#define FS_APP_PROTOCOL 4U /* version of the FS_PIL messages: FS_PIL_IDENTITY.protocol */
 #define FS_APP_WINDOW 8U   /* steps whose answers are kept, so that a host may send as many before the first answer */
 
 #define FS_APP_STEP_TIMEOUT_MS 1000UL /* without a step: no host steps any more */

@@ -165,6 +165,9 @@ uint16_t fs_sensing_take(const fs_pil_sense *event, fs_pil_estimate *estimate)
     case FS_SENSE_PARAMS:
         is_valid = set_params(event);
         break;
+    case FS_SENSE_ORIGIN:
+        fs_move_clock_kernel(memory, row[0]);
+        break;
     case FS_SENSE_CLEAR:
         clear();
         break;

@@ -53,6 +53,7 @@ class CFilter:
         self._item = "f8" if real == "double" else "f4"
         self.memory: RecordArray = np.zeros(1, c_layout(EstimatorMemory, self._item))
         """The memory in C, shape (1,)."""
+        self._real = ctypes.c_double if real == "double" else ctypes.c_float
         self._library = _library(real)
         self._place = self.memory.ctypes.data_as(ctypes.c_void_p)
         self._row = np.zeros(MOST_VALUES, self._item)
@@ -65,13 +66,17 @@ class CFilter:
         self.memory[0]["params"] = params
         self._library.fs_start_memory(self._place)
 
-    def imu(self, row: FloatArray) -> None:
-        """Take a sample of the IMU in its array form, shape (8,)."""
-        self._library.fs_imu_kernel(self._place, self._pointer(row))
+    def imu(self, row: FloatArray, origin_s: float = 0.0) -> None:
+        """Take a sample of the IMU in its array form, shape (8,); the filter's clock counts from ``origin_s``."""
+        self._library.fs_imu_kernel(self._place, self._pointer(row, origin_s))
 
-    def push(self, ring: int, row: FloatArray) -> None:
+    def push(self, ring: int, row: FloatArray, origin_s: float = 0.0) -> None:
         """Store a measurement of a ring."""
-        self._library.fs_push_kernel(self._place, ring, self._pointer(row), len(row))
+        self._library.fs_push_kernel(self._place, ring, self._pointer(row, origin_s), len(row))
+
+    def move_clock(self, by_s: float) -> None:
+        """Let the clock count from an origin that is ``by_s`` later."""
+        self._library.fs_move_clock_kernel(self._place, self._real(by_s))
 
     def field(self) -> None:
         """Take the Earth's field in the memory."""
@@ -90,8 +95,9 @@ class CFilter:
         result: float = function(*numbers)
         return result
 
-    def _pointer(self, row: FloatArray) -> ctypes.c_void_p:
+    def _pointer(self, row: FloatArray, origin_s: float) -> ctypes.c_void_p:
         self._row[: len(row)] = row
+        self._row[0] = row[0] - origin_s
         return self._row_place
 
     def read(self) -> RecordArray:

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flightstack.estimation.clock_origin import SPAN_S
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.memory import EstimatorMemory
 from flightstack.estimation.rings import BARO_RING, GNSS_RING, MAG_RING
-from flightstack.firmware.c_filter import c_layout
-from flightstack.firmware.pil.sensing import CLEAR, EARTH, IMU, LANDED, PARAMS, READ, START
+from flightstack.firmware.c_filter import CFilter, c_layout
+from flightstack.firmware.pil.sensing import CLEAR, EARTH, IMU, LANDED, ORIGIN, PARAMS, READ, START
 from flightstack.firmware.pil.target_filter import HostFilter
 from flightstack.mavlink.dialect import mavlink
 from tests.firmware.app_support import BAD_INPUT, OUT_OF_ORDER, REPEATED, Target
@@ -21,6 +22,8 @@ from tests.support.filter_events import FIELD as FIELD_EVENT
 from tests.support.filter_events import LANDING
 from tests.support.filter_flights import flown
 
+LATER_S = 600.0
+"""Time of the flight's start, so that the origin can move before it."""
 SAMPLE = (0.002, 0.002, 0.01, -0.02, 0.03, 0.1, 0.2, -9.8)
 
 
@@ -72,6 +75,28 @@ def test_flight_through_the_application_has_the_bits_of_the_filter(target: Targe
         if kind in (IMU, FIELD_EVENT):
             assert answer.flags == sum(int(bit != 0) << at for at, bit in enumerate(flags))
     assert moved > 500
+
+
+def test_origin_of_the_clock_moves_as_in_the_filter(target: Target) -> None:
+    here, number, moved_s = CFilter(real="float"), begin(target), 0.0
+    for kind, values in flown()[:1500]:
+        if kind not in (IMU, GNSS_RING, MAG_RING, BARO_RING):
+            continue
+        row = values.copy()
+        if number == 800:
+            moved_s = SPAN_S
+            assert sense(target, number, ORIGIN, (moved_s,)).status == 0
+            here.move_clock(moved_s)
+            number += 1
+        row[0] += LATER_S - moved_s
+        answer = sense(target, number, kind, row)
+        _ = here.imu(row) if kind == IMU else here.push(kind, row)
+        assert answer.status == 0
+        if kind == IMU:
+            assert answer.state == here.memory[0]["state"].tolist()
+        number += 1
+    assert number > 1000
+    assert here.memory[0]["gaps"]["number"] == 0.0
 
 
 def test_repeated_event_is_answered_again_and_not_computed_again(target: Target) -> None:

@@ -62,7 +62,7 @@ def test_a_window_of_steps_makes_the_reports_of_single_ones(target: Target) -> N
 
 def test_identity_tells_protocol_and_window(target: Target) -> None:
     identity = target.request("FS_PIL_IDENTITY")
-    assert (identity.protocol, identity.window) == (3, WINDOW)
+    assert (identity.protocol, identity.window) == (4, WINDOW)
 
 
 def test_the_largest_window_has_room_behind_news_and_answers(target: Target) -> None:

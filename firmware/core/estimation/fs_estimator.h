@@ -2,6 +2,7 @@
 #ifndef FS_ESTIMATOR_H
 #define FS_ESTIMATOR_H
 
+#include "fs_clock_origin.h"
 #include "fs_delayed_filter.h"
 #include "fs_health.h"
 #include "fs_memory.h"

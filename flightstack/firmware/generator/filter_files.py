@@ -7,6 +7,7 @@ from typing import Any
 
 from flightstack.core import geometry, portable_math
 from flightstack.estimation import kalman, rings
+from flightstack.estimation.clock_origin import move_clock_kernel
 from flightstack.estimation.delayed_filter import field_kernel, imu_kernel, push_kernel
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.health import health_kernel
@@ -16,7 +17,9 @@ from flightstack.firmware.generator.text import identifier
 from flightstack.firmware.generator.unit import NOTICE, Program
 from flightstack.firmware.numbers import Laws
 
-KERNELS: tuple[Any, ...] = (start_memory, push_kernel, imu_kernel, field_kernel, health_kernel)
+KERNELS: tuple[Any, ...] = (
+    start_memory, push_kernel, imu_kernel, field_kernel, move_clock_kernel, health_kernel,
+)  # fmt: skip
 """Functions that the firmware calls."""
 NAMES = {geometry.__name__: "fs_estimation_geometry", portable_math.__name__: "fs_estimation_math"}
 """Files of functions that the control laws do not use; those that they use stand in ``firmware/core``."""
@@ -56,7 +59,8 @@ def _interface() -> str:
     for module, names in INDICES:
         lines += [f"#define FS_{name} {getattr(module, name)}" for name in names]
     lines += ["", "extern const fs_estimator_params fs_default_estimator_params;", ""]
-    includes = '"fs_delayed_filter.h"\n#include "fs_health.h"\n#include "fs_memory.h"'
+    files = ("fs_clock_origin.h", "fs_delayed_filter.h", "fs_health.h", "fs_memory.h")
+    includes = "\n#include ".join(f'"{file}"' for file in files)
     return header("FS_ESTIMATOR_H", includes, "\n".join(lines))
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from flightstack.firmware.pil.record import COST_UNITS
 
-PROTOCOL = 3
+PROTOCOL = 4
 """Version of the FS_PIL messages; FS_APP_PROTOCOL in firmware/app/fs_app.h."""
 
 

@@ -14,7 +14,7 @@ from flightstack.mavlink.dialect import LAYOUT_BY_NAME
 from flightstack.mavlink.frames import pack_frame
 from flightstack.mavlink.link import Link, Message
 
-IMU, EARTH, LANDED, PARAMS, CLEAR, START, READ = 10, 11, 12, 13, 14, 15, 16
+IMU, EARTH, LANDED, PARAMS, CLEAR, START, READ, ORIGIN = 10, 11, 12, 13, 14, 15, 16, 17
 """Kinds of FS_PIL_SENSE beside the estimator's rings."""
 VALUES = 10
 MOST_PARAMS = VALUES - 2
