@@ -14,15 +14,18 @@ from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Record, RecordArray
 from flightstack.core.portable_math import atan2, exp, log
 from flightstack.estimation import filter_core
+from flightstack.estimation.clock_origin import move_clock_kernel
 from flightstack.estimation.delayed_filter import field_kernel, imu_kernel, push_kernel
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.health import SUMMARY, health_kernel
 from flightstack.firmware.c_filter import CFilter
 from flightstack.testing import quiet_ticks
 
-IMU, FIELD, LANDING, EARTH, PARAMS, HEALTH, NUMBERS = 10, 11, 12, 13, 14, 15, 16
+IMU, FIELD, LANDING, EARTH, PARAMS, HEALTH, NUMBERS, ORIGIN = 10, 11, 12, 13, 14, 15, 16, 17
 """Kinds of events beside the rings' numbers: an IMU sample, the Earth's field is known, changes of the memory, the
-health, and calls of functions with numbers that the filter does not give them."""
+health, calls of functions with numbers that the filter does not give them, and a move of the clock's origin."""
+TIMED = frozenset(range(4)) | {IMU}
+"""Kinds of events that begin with a time: measurements of the rings, and of the IMU."""
 FIELDS = {EARTH: "earth", PARAMS: "params"}
 
 
@@ -100,6 +103,8 @@ class InPython:
             health_kernel(memory, self.summary)
         elif kind == NUMBERS:
             self.numbers += _functions(*row)
+        elif kind == ORIGIN:
+            move_clock_kernel(memory, row[0])
         elif kind in FIELDS:
             record[FIELDS[kind]] = row
         elif kind == LANDING:
@@ -140,6 +145,8 @@ class InC:
             x, y = row
             call = self.filter.call
             self.numbers += [call("exp", x), call("log", x), call("atan2", x, y)]
+        elif kind == ORIGIN:
+            self.filter.move_clock(row[0])
         elif kind in FIELDS:
             record[FIELDS[kind]] = row
         elif kind == LANDING:

@@ -7,10 +7,22 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from flightstack.estimation.clock_origin import SPAN_S
 from flightstack.estimation.estimator_params import EstimatorParams
 from flightstack.estimation.rings import BARO_RING, GNSS_RING, MAG_RING, RANGE_RING
 from flightstack.testing import World
-from tests.support.filter_events import EARTH, FIELD, HEALTH, IMU, NUMBERS, PARAMS, Event, recorded
+from tests.support.filter_events import (
+    EARTH,
+    FIELD,
+    HEALTH,
+    IMU,
+    NUMBERS,
+    ORIGIN,
+    PARAMS,
+    TIMED,
+    Event,
+    recorded,
+)
 
 Events = Sequence[Event]
 
@@ -291,11 +303,26 @@ def _checked(events: Events) -> list[Event]:
     return [*made, *(Event(NUMBERS, np.array([x, y])) for x in edges for y in (0.0, -1.0, 2.0))]
 
 
+def later(events: Events, by_s: float) -> list[Event]:
+    """Return the events of a flight that starts ``by_s`` later."""
+    return [
+        Event(kind, np.array([row[0] + by_s, *row[1:]]) if kind in TIMED else row) for kind, row in events
+    ]
+
+
+def _with_new_origin(events: Events) -> list[Event]:
+    """Start a flight at the end of the clock's second span, and move its origin twice."""
+    half, late, move = len(events) // 2, 3 * len(events) // 4, Event(ORIGIN, np.array([0.5 * SPAN_S]))
+    first, second = later(events[:half], 2.0 * SPAN_S), later(events[half:late], 1.5 * SPAN_S)
+    return [*first, move, *second, move, *later(events[late:], SPAN_S)]
+
+
 _LONG = functools.partial(flown, "square")
 _CLIMB_S, _LATE_S, _DOWN_S = 4.0, 18.0, 24.3
 """Times in the square after its take-off, before its descent, and within it."""
 _DRAG = {"drag_is_fused": 1.0, "momentum_drag_1_s": 0.13, "ballistic_x_kg_m2": 20.0, "ballistic_y_kg_m2": 0.0}
 
+NEW_ORIGIN = "origin of the clock moves"
 STREAMS: dict[str, Callable[[], Events]] = {
     "as flown": lambda: _checked(flown()),
     "no magnetometer": lambda: _without(_LONG(), MAG_RING, end_s=_LATE_S),
@@ -362,6 +389,7 @@ STREAMS: dict[str, Callable[[], Events]] = {
     "output at once": lambda: _with_params(flown(), output_s=0.0, delay_s=0.0, mag_corrects_tilt=1.0),
     "output slow": lambda: _with_params(_new_earth_field(flown(), 1e-4), output_s=0.5),
     "long delay": lambda: _with_params(flown(), delay_s=0.9),
+    NEW_ORIGIN: lambda: _with_new_origin(_moved_fixes(_LONG(), 0.0, -0.6)),
     "broken samples": lambda: _broken(flown()),
 }
 """A flight as it was given to the filter, and with its sensors changed."""

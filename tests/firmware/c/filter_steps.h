@@ -14,6 +14,7 @@
 #define FILTER_PARAMS 14U
 #define FILTER_HEALTH 15U
 #define FILTER_NUMBERS 16U /* calls of functions with numbers that the filter does not give them */
+#define FILTER_ORIGIN 17U
 #define FILTER_ROOM 64U
 #define FILTER_PARTS 16U
 
