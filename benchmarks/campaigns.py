@@ -53,7 +53,7 @@ class Flown(NamedTuple):
 
 _FOLDER = Path(__file__).parent
 TRUTH = Kind("truth", _FOLDER / "campaign_truth.toml", 24)
-SENSORS = Kind("sensors and estimator", _FOLDER / "campaign_sensors.toml", 6)
+SENSORS = Kind("sensors and estimator", _FOLDER / "campaign_sensors.toml", 4)
 KINDS = (TRUTH, SENSORS)
 
 
