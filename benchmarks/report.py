@@ -25,7 +25,7 @@ THREE_PROCESSES = (("≥ 20", "PX4 10"), ("≥ 40", "PX4 18–23"), ("goal 55", 
 PLANT_FLOORS = {"rigid": "≥ 20", "multibody": "≥ 15"}
 ONE_PROCESS = ("≥ 60, goal 150", "ArduCopter 70–76")
 ON_SENSORS = ("goal 120", "ArduCopter 70–76")
-CAMPAIGNS = (("goal 1000", "RotorPy 1, PyBullet 6, JAX 28"), ("goal 400", ""))
+CAMPAIGNS = (("goal 1000", "RotorPy 0.8, PyBullet 5, JAX 29"), ("goal 400", ""))
 """Others: simulators without autopilot, one vehicle, on the true state."""
 FLIGHTS_A_MINUTE = "goal 1000"
 PEER_HEADS = {
