@@ -54,6 +54,8 @@ _KERNELS = (
 )  # fmt: skip
 _LOOP_KERNELS = ("inner_kernel", "outer_kernel")
 _ESTIMATOR_KERNELS = ("imu_kernel", "push_kernel", "field_kernel", "update_health")
+_C_FILTER_KERNELS = ("move_clock_kernel",)
+"""Kernels that read the memory of the estimator in C."""
 _REAL_TIME_KERNELS = ("stream_kernel",)
 """Kernels that a vehicle in lockstep compiles or loads at their first use."""
 
@@ -113,6 +115,7 @@ def kernels_of(config: StackConfig) -> tuple[str, ...]:
     needs_loops = config.loops == PYTHON
     kernels = tuple(name for name in _KERNELS if needs_loops or name not in _LOOP_KERNELS)
     kernels += _ESTIMATOR_KERNELS if config.state == ESTIMATED else ()
+    kernels += () if needs_loops or config.state != ESTIMATED else _C_FILTER_KERNELS
     return kernels if config.lockstep else kernels + _REAL_TIME_KERNELS
 
 
