@@ -50,7 +50,7 @@ MEASUREMENTS = (
     Measurement("steps", "costs", "the parts of a step", step_costs.costs, (2, 0.01), (7, 0.05)),
     Measurement("flights", "one_process", "flights in one process", one_process.flights, (2,), (7,)),
     Measurement("flights", "three_processes", "flights of three processes", _flights, (2,), (7,)),
-    Measurement("campaigns", "campaigns", "flights of campaigns", campaigns.campaigns, (2, 0.25), (5, 1.0)),
+    Measurement("campaigns", "campaigns", "flights of campaigns", campaigns.campaigns, (2, 0.25), (4, 1.0)),
     Measurement(
         "emulated", "emulated", "flights with loops on an emulated processor", emulated.flights, (1,), (3,)
     ),

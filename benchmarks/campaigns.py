@@ -52,7 +52,7 @@ class Flown(NamedTuple):
 
 
 _FOLDER = Path(__file__).parent
-TRUTH = Kind("truth", _FOLDER / "campaign_truth.toml", 24)
+TRUTH = Kind("truth", _FOLDER / "campaign_truth.toml", 20)
 SENSORS = Kind("sensors and estimator", _FOLDER / "campaign_sensors.toml", 4)
 KINDS = (TRUTH, SENSORS)
 
