@@ -1,19 +1,40 @@
 """Items of arrays and of records as LLVM values, without the copies on the stack that Numba makes of each array.
 
 Numba stores an array, which is a structure of seven fields, on the stack at each access to one of its items, and reads
-the fields back. LLVM removes these copies; most of its work on an estimator was that. The code does the same here.
+the fields back. LLVM removes these copies; most of its work on an estimator was that. The code does the same here, for
+kernels alone: Numba compiles all other functions of the process in its own way, and all of them with NUMBA_BOUNDSCHECK.
 """
 # mypy: disable-error-code="untyped-decorator,attr-defined"
 
 from __future__ import annotations
 
 import operator
-from typing import Any
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, TypeAlias
 
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.imputils import impl_ret_borrowed, lower_builtin, lower_cast, lower_getattr_generic
 from numba.np import arrayobj
+
+from flightstack.core.kernel_compiler import compiles_kernel
+
+_Lowering: TypeAlias = Callable[..., Any]
+
+
+def _instead_of(other: _Lowering) -> Callable[[_Lowering], _Lowering]:
+    """Return a decorator of code for kernels; other functions have that of Numba."""
+
+    def decorate(own: _Lowering) -> _Lowering:
+        @wraps(own)
+        def lower(context: Any, builder: Any, *rest: Any) -> Any:
+            is_own = compiles_kernel() and not context.enable_boundscheck
+            return (own if is_own else other)(context, builder, *rest)
+
+        return lower
+
+    return decorate
 
 
 def _part(builder: Any, whole: Any, index: int) -> Any:
@@ -101,26 +122,27 @@ def _get(context: Any, builder: Any, sig: Any, array: Any, kinds: Any, indices: 
 
 
 @lower_builtin(operator.getitem, types.Array, types.Integer)
+@_instead_of(arrayobj.getitem_arraynd_intp)
 def _get_item(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    if context.enable_boundscheck:
-        return arrayobj.getitem_arraynd_intp(context, builder, sig, args)
     return _get(context, builder, sig, args[0], sig.args[1:], args[1:])
 
 
 @lower_builtin(operator.getitem, types.Array, types.BaseTuple)
+@_instead_of(arrayobj.getitem_array_tuple)
 def _get_item_of_matrix(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     kinds = sig.args[1].types
-    if context.enable_boundscheck or not kinds or not _is_plain(kinds):
+    if not kinds or not _is_plain(kinds):
         return arrayobj.getitem_array_tuple(context, builder, sig, args)
     indices = [_part(builder, args[1], axis) for axis in range(len(kinds))]
     return _get(context, builder, sig, args[0], kinds, indices)
 
 
 @lower_builtin(operator.setitem, types.Array, types.Any, types.Any)
+@_instead_of(arrayobj.setitem_array)
 def _set_item(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     kind, index, item = sig.args
     kinds = index.types if isinstance(index, types.BaseTuple) else (index,)
-    if context.enable_boundscheck or len(kinds) != kind.ndim or not _is_plain(kinds):
+    if len(kinds) != kind.ndim or not _is_plain(kinds):
         return arrayobj.setitem_array(context, builder, sig, args)
     is_tuple = isinstance(index, types.BaseTuple)
     indices = [_part(builder, args[1], axis) for axis in range(len(kinds))] if is_tuple else [args[1]]
@@ -131,11 +153,13 @@ def _set_item(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 
 @lower_builtin(len, types.Array)
+@_instead_of(arrayobj.array_len)
 def _length(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return _Fields(context, builder, sig.args[0], args[0]).sizes("shape")[0]
 
 
 @lower_getattr_generic(types.Record)
+@_instead_of(arrayobj.record_getattr)
 def _field_of_record(context: Any, builder: Any, kind: Any, record: Any, name: Any) -> Any:
     """Return a field of a record: of an array in the record, a view with a constant shape."""
     field = kind.typeof(name)
@@ -159,5 +183,6 @@ def _field_of_record(context: Any, builder: Any, kind: Any, record: Any, name: A
 
 
 @lower_cast(types.NestedArray, types.Array)
+@_instead_of(arrayobj.array_to_array)
 def _array_of_record(_context: Any, _builder: Any, _from: Any, _to: Any, value: Any) -> Any:
     return value

@@ -115,6 +115,11 @@ class _Compiler(Compiler):  # type: ignore[misc]
         return passes
 
 
+def compiles_kernel() -> bool:
+    """Return True while a kernel is compiled."""
+    return _Compiler.active > 0
+
+
 class KernelCompiler(_Compiler):
     """Compiles a function that Python calls."""
 
@@ -191,7 +196,7 @@ class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
 _UserLocator: Any = (
     vars(caching).get("UserProvidedCacheLocator") or vars(caching)["_UserProvidedCacheLocator"]
 )
-"""Renamed after Numba 0.60."""
+"""Its name before Numba 0.62 was private."""
 
 
 class _Locator(_UserLocator):  # type: ignore[misc]
@@ -305,7 +310,7 @@ class FloatOperator(AbstractTemplate):  # type: ignore[misc]
 
     def generic(self, args: tuple[Any, ...], kws: dict[str, Any]) -> Signature | None:
         """Return the signature of two floats, or None for Numba's own."""
-        if not _Compiler.active or kws or args != (types.float64, types.float64):
+        if not compiles_kernel() or kws or args != (types.float64, types.float64):
             return None
         return signature(self.result, *args)
 
