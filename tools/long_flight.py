@@ -2,7 +2,7 @@
 
 python -m tools.long_flight --hours 24 --state estimated
 
-A line after each simulated hour. The log is counted and not kept: a world keeps it in memory, and a flight writes some
+A line after each simulated hour, or after a third of less than three. The log is counted and not kept: a world keeps it in memory, and a flight writes some
 400 MB an hour. It exits with 1 if memory grows by more than ``LIMITS`` an hour, if a step is not exact, or if the
 vehicle does not hold its place.
 """
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import gc
+import math
 import sys
 import time
 from collections.abc import Iterator
@@ -25,6 +26,9 @@ from flightstack.testing import Setup, World
 from flightstack.testing.engine import Engine
 
 HOUR_S = 3600.0
+_LEAST_H, _MOST_H = 0.05, 1000.0
+_SAMPLES = 3
+"""Least number of samples."""
 ALTITUDE_M = 5.0
 PLACE_M = {TRUTH: 0.1, ESTIMATED: 5.0}
 """Largest distance from the place that is held, in wind and gusts: on sensors mostly the error of GNSS in a day."""
@@ -152,7 +156,7 @@ def samples(conditions: Setup, interval_s: float, count: int, telemetry: bool = 
             passed_us = engine.stack.now.time_us - from_us, engine.simulator.time_us - start_us
             state = world.state
             yield Sample(
-                (number - 1) * step_us * 1e-6,
+                number * step_us * 1e-6,
                 time.perf_counter() - began_s,
                 Kept(memory_mb(), *counted(), engine.log.buffers_mb),
                 engine.file.size * 1e-6,
@@ -178,9 +182,9 @@ def counted() -> tuple[int, int]:
 
 
 def growth(first: Sample, last: Sample) -> Kept:
-    """Return the growth in a simulated hour."""
-    hours = (last.flown_s - first.flown_s) / HOUR_S
-    return Kept(*((after - before) / hours for before, after in zip(first.kept, last.kept, strict=True)))
+    """Return the growth in a simulated hour, or in a shorter time between the samples."""
+    flown_h = max(1.0, (last.flown_s - first.flown_s) / HOUR_S)
+    return Kept(*((after - before) / flown_h for before, after in zip(first.kept, last.kept, strict=True)))
 
 
 def problems(first: Sample, last: Sample, state: str) -> list[str]:
@@ -207,13 +211,30 @@ def line(sample: Sample, before_s: float) -> str:
     )
 
 
+def hours(text: str) -> float:
+    """Return a number of hours; raise ArgumentTypeError."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not _LEAST_H <= number <= _MOST_H:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number from {_LEAST_H} to {_MOST_H}")
+    return number
+
+
+def intervals(flown_h: float) -> tuple[float, int]:
+    """Return the time between samples [s], an hour at most, and their number: some, so that growth can be seen."""
+    count = max(_SAMPLES, math.ceil(flown_h))
+    return flown_h / count * HOUR_S, count
+
+
 HEAD = "  flown, h  wall, s  memory, MB   objects    blocks  buffers, MB  log, MB  late, µs  uneven  error, m"
 
 
 def main() -> int:
     """Fly and print; return 1 if something grows or is not exact."""
     parser = argparse.ArgumentParser(prog="python -m tools.long_flight", description=__doc__)
-    parser.add_argument("--hours", type=int, default=24, help="simulated time (default %(default)s)")
+    parser.add_argument("--hours", type=hours, default=24.0, help="simulated time (default %(default)g)")
     parser.add_argument("--state", choices=STATES, default=TRUTH)
     parser.add_argument("--loops", default="python", help="as those of flightstack")
     parser.add_argument(
@@ -222,10 +243,11 @@ def main() -> int:
     given = parser.parse_args()
     print(HEAD)
     seen: list[Sample] = []
-    for sample in samples(setup(given.state, given.loops), HOUR_S, given.hours, given.telemetry):
+    interval_s, count = intervals(given.hours)
+    for sample in samples(setup(given.state, given.loops), interval_s, count, given.telemetry):
         print(line(sample, seen[-1].wall_s if seen else 0.0), flush=True)
         seen.append(sample)
-    found = problems(seen[0], seen[-1], given.state) if len(seen) > 1 else []
+    found = problems(seen[0], seen[-1], given.state)
     print("\n".join(found) or "nothing grows, and each step is exact")
     return 1 if found else 0
 

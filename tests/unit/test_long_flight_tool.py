@@ -2,10 +2,23 @@
 
 from __future__ import annotations
 
+import argparse
+
 import pytest
 
 from flightstack.params.config import TRUTH
-from tools.long_flight import HOUR_S, LIMITS, CountedFile, EvenLog, Kept, Sample, growth, problems
+from tools.long_flight import (
+    HOUR_S,
+    LIMITS,
+    CountedFile,
+    EvenLog,
+    Kept,
+    Sample,
+    growth,
+    hours,
+    intervals,
+    problems,
+)
 
 PERIODS_US = (2000, 10_000)
 
@@ -41,6 +54,23 @@ def test_flight_within_the_limits_has_no_problem() -> None:
 def test_problem_is_named(last: Sample, problem: str) -> None:
     (found,) = problems(FIRST, last, TRUTH)
     assert found.startswith(problem)
+
+
+def test_growth_of_a_short_flight_is_not_extrapolated() -> None:
+    assert growth(FIRST, sample(0.1, 100.5, 1004.0, 5000.0, 0.5)) == Kept(0.5, 4.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("flown_h", "expected"), [(24.0, (3600.0, 24)), (1.0, (1200.0, 3)), (3.5, (3150.0, 4)), (0.05, (60.0, 3))]
+)
+def test_samples_come_each_hour_and_at_least_three_times(flown_h: float, expected: tuple[float, int]) -> None:
+    assert intervals(flown_h) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("text", ["0", "-1", "0.01", "nan", "inf", "day", "1001"])
+def test_hours_out_of_range_are_refused(text: str) -> None:
+    with pytest.raises(argparse.ArgumentTypeError, match=r"is not a number from 0\.05 to 1000"):
+        hours(text)
 
 
 def even_log() -> EvenLog:
