@@ -78,7 +78,7 @@ _LONG = ("watch",)
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="few and short rounds: half a minute")
+    parser.add_argument("--quick", action="store_true", help="few and short rounds: about a minute")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures to FILE too")
     parser.add_argument("--only", choices=SECTIONS, action="append", help="measure only this (repeatable)")
     parser.add_argument(

@@ -20,6 +20,7 @@ from typing import NamedTuple
 from rich.console import Console
 
 from benchmarks.measure import Figure, figure
+from benchmarks.peer_error import PeerError
 from gcs_cli.campaign.definition import Campaign, load_campaign
 from gcs_cli.campaign.display import make_display
 from gcs_cli.campaign.flyer import WANTED, Flyer, case_of
@@ -73,7 +74,7 @@ class Flights:
         result = fly_case(case, WANTED)
         spent_s = time.process_time() - began_s
         if not result.passed:
-            raise RuntimeError(f"{case.label}: {result.failures[0]}")
+            raise PeerError(f"{case.label}: {result.failures[0]}")
         return result.duration_s / spent_s
 
 

@@ -10,8 +10,10 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import signal
 import subprocess
 import tempfile
+import threading
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -23,6 +25,8 @@ _FOLDER = Path(__file__).parent / "simulator_flights"
 _LARGEST_ERROR_M = 1.0
 _ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "JAX_PLATFORMS": "cpu"}
 """Threads that wait for each other would count as processor time."""
+_LIMIT_S = 300.0
+"""Longest wall time of an answer: the first one includes imports and compilation."""
 
 
 class Flight(NamedTuple):
@@ -49,7 +53,13 @@ class Simulator(NamedTuple):
         if not (python.is_file() and os.access(python, os.X_OK)):
             return f"{python} is no Python: give that of a virtual environment with {self.package}"
         seek = f"import importlib.util, sys; sys.exit(importlib.util.find_spec({self.package!r}) is None)"
-        if subprocess.run([python, "-I", "-c", seek], capture_output=True, check=False).returncode:
+        try:
+            found = subprocess.run(
+                [python, "-I", "-c", seek], capture_output=True, check=False, timeout=_LIMIT_S
+            )
+        except subprocess.TimeoutExpired:
+            return f"{python} does not answer within {_LIMIT_S:g} s"
+        if found.returncode:
             return f'{python} has no {self.package}: {python} -m pip install "{self.requirement}"'
         return ""
 
@@ -95,14 +105,24 @@ class _Process(NamedTuple):
     def ask(self, line: str) -> str:
         """Send a line; return the answer, or an empty text if the process has ended.
 
-        Lines that are no JSON are what the simulator prints.
+        It is ended after ``_LIMIT_S``. Lines that are no JSON are what the simulator prints.
         """
         stdin, stdout = self.program.stdin, self.program.stdout
         assert stdin is not None
         assert stdout is not None
-        with contextlib.suppress(BrokenPipeError):
-            print(line, file=stdin, flush=True)
-        return next((line for line in iter(stdout.readline, "") if line.startswith("{")), "")
+        late = threading.Timer(_LIMIT_S, self.end)
+        late.start()
+        try:
+            with contextlib.suppress(BrokenPipeError):
+                print(line, file=stdin, flush=True)
+            return next((line for line in iter(stdout.readline, "") if line.startswith('{"')), "")
+        finally:
+            late.cancel()
+
+    def end(self) -> None:
+        """End the process and those that it started."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.program.pid, signal.SIGKILL)
 
     def last_error(self) -> str:
         """Return the last line that the process wrote to stderr."""
@@ -125,11 +145,13 @@ def _running(python: Path, script: str, flight: Flight) -> Iterator[_Process]:
             stdout=subprocess.PIPE,
             stderr=errors,
             text=True,
+            start_new_session=True,
         )
+        process = _Process(program, errors)
         try:
-            yield _Process(program, errors)
+            yield process
         finally:
-            program.kill()
+            process.end()
             program.communicate()
 
 
@@ -138,7 +160,13 @@ def fly(flight: Flight, process: _Process) -> float:
     answer = process.ask(f"{flight.seconds:g}")
     if not answer:
         raise PeerError(f"{flight.title}: {process.last_error()}")
-    flown: dict[str, float] = json.loads(answer)
-    if not flown["error_m"] < _LARGEST_ERROR_M:
-        raise PeerError(f"{flight.title} did not fly the square: {flown['error_m']:.3g} m from it at the end")
-    return flown["simulated_s"] / flown["processor_s"]
+    try:
+        flown = json.loads(answer)
+        error_m, simulated_s, processor_s = (
+            float(flown[name]) for name in ("error_m", "simulated_s", "processor_s")
+        )
+    except (ValueError, KeyError, TypeError):
+        raise PeerError(f"{flight.title}: no figures in its answer {answer.strip()!r}") from None
+    if not error_m < _LARGEST_ERROR_M:
+        raise PeerError(f"{flight.title} did not fly the square: {error_m:.3g} m from it at the end")
+    return simulated_s / processor_s

@@ -2,9 +2,9 @@
 
 python -m tools.long_flight --hours 24 --state estimated
 
-A line after each simulated hour, or after a third of less than three. The log is counted and not kept: a world keeps it in memory, and a flight writes some
-400 MB an hour. It exits with 1 if memory grows by more than ``LIMITS`` an hour, if a step is not exact, or if the
-vehicle does not hold its place.
+A line after each simulated hour, or after a third of less than three. The log is counted and not kept: a world keeps
+it in memory, and a flight writes some 400 MB an hour. It exits with 1 if memory grows by more than ``LIMITS`` an hour,
+if a step is not exact, or if the vehicle does not hold its place.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@
 #define MOST_VALUES 8U /* in an event: all behind VALUES_AT */
 #define WORDS 60U
 #define HALF FS_LIT(0.5)
+#define LONGEST_MOVE FS_LIT(1.0e9) /* s, of the origin of the clock */
 
 typedef union {
     fs_estimator_params fields;
@@ -138,6 +139,18 @@ static int32_t size_of(uint32_t kind)
     return size;
 }
 
+/* Move the origin of the clock by a time that is not negative; tell whether it is one. */
+static uint16_t move_clock(fs_real by_s)
+{
+    uint16_t is_valid = 0U;
+
+    if ((by_s >= FS_LIT(0.0)) && (by_s <= LONGEST_MOVE)) {
+        fs_move_clock_kernel(memory, by_s);
+        is_valid = 1U;
+    }
+    return is_valid;
+}
+
 uint16_t fs_sensing_take(const fs_pil_sense *event, fs_pil_estimate *estimate)
 {
     fs_real row[ROW];
@@ -166,7 +179,7 @@ uint16_t fs_sensing_take(const fs_pil_sense *event, fs_pil_estimate *estimate)
         is_valid = set_params(event);
         break;
     case FS_SENSE_ORIGIN:
-        fs_move_clock_kernel(memory, row[0]);
+        is_valid = move_clock(row[0]);
         break;
     case FS_SENSE_CLEAR:
         clear();

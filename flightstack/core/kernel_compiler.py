@@ -101,10 +101,15 @@ class _Compiler(Compiler):  # type: ignore[misc]
         names = vars(errors)
         colours, names[_COLOURS] = names[_COLOURS], _NO_COLOURS
         try:
-            return super().compile_extra(func)
+            result = super().compile_extra(func)
         finally:
             names[_COLOURS] = colours
             _Compiler.active -= 1
+        if not self.state.flags.nrt and _has_arrays(result.signature.return_type):
+            raise errors.TypingError(
+                f"{func.__qualname__} returns an array: a kernel of this project must not"
+            )
+        return result
 
     def define_pipelines(self) -> Any:
         """Return Numba's passes, for functions of this project the fewer that they need."""
@@ -113,6 +118,16 @@ class _Compiler(Compiler):  # type: ignore[misc]
             for manager in passes:
                 manager.passes = [each for each in manager.passes if each[0] not in _NEEDLESS]
         return passes
+
+
+def _has_arrays(kind: Any) -> bool:
+    """Return True if a type has an array to which references are counted; views of records have none.
+
+    A caller that counts them, such as a law of a user, would free it.
+    """
+    if isinstance(kind, numba.types.BaseTuple):
+        return any(map(_has_arrays, kind))
+    return isinstance(kind, numba.types.Buffer) and not isinstance(kind, numba.types.NestedArray)
 
 
 def compiles_kernel() -> bool:

@@ -24,7 +24,7 @@ from flightstack.core.compiled import IS_DISABLED, Kernel, direct
 from flightstack.core.contract import STATE_SIZE
 from flightstack.core.kernel_cache import is_shared
 from flightstack.estimation.agenda import fuse_next
-from flightstack.estimation.delayed_filter import field_kernel, push_kernel
+from flightstack.estimation.delayed_filter import field_kernel, imu_kernel, push_kernel
 from flightstack.estimation.estimator_params import PARAMS_SIZE, EstimatorParams
 from flightstack.estimation.health import HealthMonitor
 from flightstack.estimation.imu_track import ImuTrack
@@ -67,7 +67,9 @@ def start(
     with this process. It announces its kernels on stderr if ``announced`` names all kernels of the program.
     """
     global helper, _tasks  # noqa: PLW0603  # one helper for each process
-    if helper is not None or not is_useful():
+    if helper is not None or not is_useful(
+        (goal_kernel, imu_kernel) if MEASUREMENTS in later else (goal_kernel,)
+    ):
         return
     path = os.pathsep.join(str(Path(entry).absolute()) for entry in sys.path)
     try:
@@ -107,12 +109,12 @@ def finish(*, with_streams: bool) -> None:
         threading.Thread(target=helper.wait, daemon=True).start()
 
 
-def is_useful() -> bool:
-    """Return True if a helper can run beside this process and share its results, and has something to do."""
+def is_useful(kernels: Sequence[Any] = (goal_kernel,)) -> bool:
+    """Return True if a helper can run beside this process and share its results, and one of ``kernels`` is missing."""
     if IS_DISABLED or not is_shared():
         return False
     cpus = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return cpus > 1 and has_cache(goal_kernel) and not is_cached(goal_kernel)
+    return cpus > 1 and any(has_cache(kernel) and not is_cached(kernel) for kernel in kernels)
 
 
 def has_cache(kernel: Any) -> bool:

@@ -99,6 +99,8 @@ class Engine:
         self.lockstep = Lockstep(self._endpoint, self.stack.autopilot, self._interval_us)
         """Ticks of the vehicle on the simulator's clock."""
         self._missed_us = self._next_timing_us = self._ticks = 0
+        self._is_idle = True
+        """True if the vehicle had no event since the last end of an outer period."""
         if self.stack.estimation is not None:
             self._simulator.start_sensors(self.config.home)
         self._quiet = QuietTicks(self.stack, self.lockstep, self._simulator, self.actuators)
@@ -185,6 +187,12 @@ class Engine:
         If nothing happens, run on up to the end of the period at ``until_s``. Return their number, and True after an
         outer tick. As after ``tick``, the newest answer is not applied yet: the caller sets ``step_is_pending``.
         """
+        count, ends = self._run(most, until_s)
+        if ends:
+            self._is_idle = True
+        return count, ends
+
+    def _run(self, most: int, until_s: float) -> tuple[int, bool]:
         if self._changes_bytes or self._loses_states or self._missed_us > 0:
             self.settle()
             return 1, self.tick()
@@ -193,10 +201,9 @@ class Engine:
             self.settle()
             done = self._run_from_outer(self._most(most, until_s))
         if done and not self._left:
-            return done, self._ends_period() and not (
-                self._quiet.is_idle and self.time_s < until_s - _MARGIN_S
-            )
+            return done, self._ends_period() and not (self._is_idle and self.time_s < until_s - _MARGIN_S)
         if not done:
+            self._is_idle = False
             if self.tick():
                 return 1, True
             done = 1
@@ -229,6 +236,7 @@ class Engine:
         self.step_is_pending = False
         done = self._quiet.run_on(self._simulator, self.actuators, most)
         if done:
+            self._is_idle = self._is_idle and self._quiet.is_idle
             self._count(done, done)
         else:
             self.step_is_pending = True
@@ -240,6 +248,7 @@ class Engine:
             return 0
         done = self._quiet.run_periods(self._simulator, self.actuators, most)
         if done:
+            self._is_idle = self._is_idle and self._quiet.is_idle
             self._count(done, done - 1)
         return done
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -97,6 +98,13 @@ def test_origin_of_the_clock_moves_as_in_the_filter(target: Target) -> None:
         number += 1
     assert number > 1000
     assert here.memory[0]["gaps"]["number"] == 0.0
+
+
+@pytest.mark.parametrize("by_s", [math.nan, -1.0, math.inf, 1e12])
+def test_origin_of_the_clock_moves_by_a_finite_time_only(by_s: float, target: Target) -> None:
+    number = begin(target)
+    assert sense(target, number, ORIGIN, (by_s,)).status == BAD_INPUT
+    assert sense(target, number + 1, ORIGIN, (SPAN_S,)).status == 0
 
 
 def test_repeated_event_is_answered_again_and_not_computed_again(target: Target) -> None:

@@ -128,7 +128,8 @@ def changes_modes(world: World) -> None:
 
 
 FLIGHTS = (
-    no_takeoff, lands, never_disarms, loses_link, battery, fence, blown_away, freezes, stops_rotors, changes_modes
+    no_takeoff, lands, never_disarms, loses_link, battery, fence, blown_away, freezes, stops_rotors,
+    changes_modes,
 )  # fmt: skip
 
 
@@ -138,6 +139,24 @@ def test_a_vehicle_on_the_ground_is_the_same_as_by_single_ticks_with_bytes(
     fly: Callable[[World], None], state: str
 ) -> None:
     assert_flies_equally(fly, state=state, vehicle="x_quad", seed=6)
+
+
+@pytest.mark.parametrize("state", ["truth", "estimated"])
+@pytest.mark.parametrize("ticks", [1, 2])
+def test_messages_of_an_event_are_exchanged_at_the_end_of_its_period(ticks: int, state: str) -> None:
+    """Periods of messages and of the outer loop fall apart after a number of ticks that is none of whole periods."""
+
+    def fly(world: World) -> None:
+        world.run_for(0.002 * ticks)
+        world.arm()
+        world.run_for(0.002 * ticks)
+        world.takeoff(1.0)
+        world.run_for(0.4)
+        world.run_for(3.0)
+        world.land()
+        world.run_for(6.0)
+
+    assert_flies_equally(fly, state=state, seed=3)
 
 
 @pytest.mark.parametrize("state", ["truth", "estimated"])

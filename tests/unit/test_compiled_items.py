@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -156,7 +157,37 @@ def _new_array(count: int) -> FloatArray:
 @JIT
 def test_a_kernel_of_this_project_must_not_make_an_array() -> None:
     assert compiled(_new_array)(2).tolist() == [0.0, 0.0]  # one of a user may
-    own = renamed(_new_array, "own", globals())
-    own.__module__ = "flightstack.core.arrays"
     with pytest.raises(TypingError, match="Only accept returning of array passed into the function"):
-        compiled(own)(2)
+        compiled(_own(_new_array))(2)
+
+
+def _own(function: FunctionType) -> FunctionType:
+    """Return a copy of a function that counts as one of this project."""
+    copy = renamed(function, "own", globals())
+    copy.__module__ = "flightstack.core.arrays"
+    return copy
+
+
+def _same(x: FloatArray) -> FloatArray:
+    return x
+
+
+def _with_first(x: FloatArray) -> tuple[FloatArray, float]:
+    return x, x[0]
+
+
+@JIT
+@pytest.mark.parametrize("function", [_same, _with_first])
+def test_a_kernel_of_this_project_must_not_return_its_array(function: FunctionType) -> None:
+    """A caller that counts references would free it."""
+    own = compiled(_own(function))
+    with pytest.raises(TypingError, match=r"returns an array: a kernel of this project must not"):
+        own(np.zeros(3))
+
+    @compiled
+    def law(count: int) -> float:
+        own(np.zeros(count))
+        return 0.0
+
+    with pytest.raises(TypingError, match=r"returns an array: a kernel of this project must not"):
+        law(3)
