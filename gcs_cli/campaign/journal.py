@@ -111,7 +111,7 @@ class Journal:
         """Raise CliError if ``record``, made after the flights, differs from that before: they differ too."""
         difference = _difference(self._record, record)
         if difference:
-            raise CliError(f"{difference} during the flights: --overwrite to fly all of them again")
+            raise CliError(f"{difference} during the flights: --overwrite to fly all of them again", USAGE)
 
     def close(self) -> None:
         """Release the journal."""

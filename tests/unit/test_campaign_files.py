@@ -249,6 +249,20 @@ def test_a_wrong_file_is_one_sentence(folder: Path, head: str, vary: str, senten
 
 
 @pytest.mark.parametrize(
+    ("line", "sentence"),
+    [
+        ("seed = 'x'", "seed: 'x' is not a whole number"),
+        ("seed = -5", "seed: -5 is outside the allowed range"),
+        ("repeat = 0", "repeat: 0 is outside the allowed range"),
+    ],
+)
+def test_keys_of_the_scenario_without_effect_are_checked(folder: Path, line: str, sentence: str) -> None:
+    with pytest.raises(ConfigError) as refused:
+        campaign(folder, scenario=f"{line}\n{SCENARIO}")
+    assert str(refused.value).startswith(f"{folder / 'c.toml'}: {sentence}")
+
+
+@pytest.mark.parametrize(
     ("vary", "sentence"),
     [
         ("'event[3].at_s' = {uniform = [1, 2]}", "vary.event[3].at_s: the file has no item [3] there"),

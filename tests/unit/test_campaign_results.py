@@ -25,7 +25,7 @@ from gcs_cli.campaign.rows import columns, row_of
 from gcs_cli.campaign.run import run_campaign
 from gcs_cli.campaign.statistics import pass_probability, quantiles, sensitivities, worst
 from gcs_cli.campaign.table import write_csv, write_parquet
-from gcs_cli.errors import CliError
+from gcs_cli.errors import USAGE, CliError
 from gcs_cli.scenarios.pool import Finished
 from gcs_cli.scenarios.result import Result, not_flown
 
@@ -294,8 +294,9 @@ def test_plan_that_changes_during_the_flights_is_no_result(tmp_path: Path) -> No
                 yield Finished(number, Result(()))
 
     options, console = CampaignOptions(file, out=tmp_path / "out"), Console(file=io.StringIO())
-    with pytest.raises(CliError, match=r"^own.plan has changed during the flights: --overwrite"):
+    with pytest.raises(CliError, match=r"^own.plan has changed during the flights: --overwrite") as refused:
         run_campaign(Pool(), options, console)
+    assert refused.value.exit_code == USAGE
     assert not (options.folder / "flights.parquet").exists()
     assert run_campaign(Pool(), replace(options, overwrite=True), console) == 0
     assert (options.folder / "flights.parquet").exists()
