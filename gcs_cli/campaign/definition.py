@@ -148,7 +148,7 @@ def load_campaign(path: Path) -> Campaign:
         raise ConfigError(
             scenario_path, "expect", "is missing: each flight of a campaign is checked against it"
         )
-    without_effect = {name: values.pop(name) for name in ("seed", "repeat") if name in values}
+    without_effect: dict[str, Any] = {name: values.pop(name) for name in ("seed", "repeat") if name in values}
     read_record(Scenario, scenario_path, without_effect, "")
     campaign = Campaign(path, plan, _distributions(path, vary), scenario_path, values)
     _check(campaign)
