@@ -156,7 +156,7 @@ def test_firmware_of_another_protocol_is_refused_in_one_sentence(device) -> None
     line = LossyLine(Older())
     with pytest.raises(
         WrongFirmwareError,
-        match=r"line: its firmware speaks version 0 of the target protocol, not 3: flash it",
+        match=r"line: its firmware speaks version 0 of the target protocol, not 4: flash it",
     ):
         TargetLoops(line, setup().numbers(), clock_s=line.clock, expected_hash=HASH)
 
@@ -370,7 +370,7 @@ def test_what_is_left_of_a_flight_beside_its_log(device, tmp_path) -> None:
         "clock_hz": 200_000_000,
         "real_octets": 4,
         "char_bits": 8,
-        "protocol": 3,
+        "protocol": 4,
         "window": 8,
         "baud": 115_200,
         "clock_overhead": 0,
