@@ -141,5 +141,7 @@ def _numbers(name: str, of: Any, count: int) -> Sequence[float]:
         isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
         for value in of
     ):
-        raise ValueError(f"{name} must be {'a list of 2 numbers' if count == 2 else 'a number'}")
+        raise ValueError(
+            f"{name} must be {'a list of 2 finite numbers' if count == 2 else 'a finite number'}"
+        )
     return [float(value) for value in of]

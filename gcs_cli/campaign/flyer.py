@@ -7,6 +7,7 @@ import json
 from collections.abc import Generator, Sequence
 from typing import Protocol
 
+from flightstack.core.errors import ConfigError
 from flightstack.testing.scenario import check_scenario
 from gcs_cli.campaign.definition import Campaign
 from gcs_cli.campaign.display import Display
@@ -140,6 +141,13 @@ def check_flights(campaign: Campaign, flights: Sequence[PlannedFlight]) -> None:
             each = {flight.inputs[name]: flight for flight in flights}.values()
             read |= {flight.number: flight for flight in each}
     for number, flight in sorted((read | checked).items()):
-        scenario = campaign.scenario(flight.inputs)
-        if number in checked:
-            check_scenario(scenario)
+        try:
+            scenario = campaign.scenario(flight.inputs)
+            if number in checked:
+                check_scenario(scenario)
+        except ConfigError as error:
+            inputs = ", ".join(
+                f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}"
+                for name, value in flight.inputs.items()
+            )
+            raise ConfigError(campaign.path, f"vary, flight {number} ({inputs})", str(error)) from None

@@ -214,6 +214,7 @@ def test_normal_distribution_has_its_mean_and_deviation() -> None:
             "vary.weak: choice must be numbers only, texts only or flags only",
         ),
         ("", "[vary]\nweak = 3", "vary.weak: needs one distribution of"),
+        ("", "[vary]\nweak = {uniform = [0, nan]}", "vary.weak: uniform must be a list of 2 finite numbers"),
         (
             "",
             "[vary]\nstrong = {uniform = [0, 1]}",
@@ -280,7 +281,8 @@ def test_inputs_out_of_range_are_refused_before_a_flight(folder: Path, vary: str
     flights = plan_flights(found)
     with pytest.raises(ConfigError) as refused:
         check_flights(found, flights)
-    print(refused.value)
+    assert str(refused.value).startswith(f"{folder / 'c.toml'}: vary, flight ")
+    assert f"({next(iter(found.vary))} " in str(refused.value)
     assert sentence.replace("{folder}", str(folder)) in str(refused.value)
 
 
