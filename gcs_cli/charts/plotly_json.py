@@ -21,6 +21,8 @@ _GAP_PX, _TITLE_PX = 16, 30
 """Between rows of panels: without, and with tick labels and a title."""
 _BAND_LABEL_PX, _PAGE_PX = 7.0, 900.0
 """Width of a character, and of a chart on a wide page: a band that is too short for its label has none."""
+_TEXT_PLACES = ("bottom left", "top right")
+"""Places of successive texts beside their points: two points that lie close together have theirs apart."""
 
 
 def chart_json(figure: AnyFigure) -> str:
@@ -177,7 +179,8 @@ def _trace(series: Series, read_out: str, log: bool) -> Json:
         found.pop("hovertemplate")
         found["fillcolor"] = colour("even")
     if series.texts:
-        found |= {"text": [plain(text) for text in series.texts], "textposition": "top right"}
+        places = [_TEXT_PLACES[number % len(_TEXT_PLACES)] for number in range(len(series.texts))]
+        found |= {"text": [plain(text) for text in series.texts], "textposition": places}
         found["textfont"] = {"color": colour("ink"), "size": 13}
     if series.hints:
         found["customdata"] = [plain(hint) for hint in series.hints]

@@ -6,6 +6,7 @@ import json
 import math
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -118,6 +119,12 @@ def test_levels_bands_and_axes_are_labelled() -> None:
     assert layout["annotations"][0]["text"] == "hold"
     assert {shape.get("label", {}).get("text") for shape in layout["shapes"]} == {None, "highest"}
     assert layout["yaxis"]["range"][1] > 3.0
+
+
+def test_texts_of_two_points_that_lie_close_together_are_apart() -> None:
+    places = replace(curve([0.0, 0.1, 5.0], [0.0, 0.0, 5.0]), texts=["home", "1", "2"])
+    (trace,) = drawn(figure(Panel(Axis("north", "m"), [places])))["data"]
+    assert trace["textposition"] == ["bottom left", "top right", "bottom left"]
 
 
 def test_bars_lie_between_their_edges() -> None:
