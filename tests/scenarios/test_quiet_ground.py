@@ -10,6 +10,7 @@ import pytest
 from flightstack.testing import RefusedError, World
 from flightstack.vehicle.autopilot import Autopilot
 from tests.support.equal_flights import assert_flies_equally
+from tests.support.tools import NIGHTLY
 
 
 def no_takeoff(world: World) -> None:
@@ -133,8 +134,13 @@ FLIGHTS = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("state", ["truth", "estimated"])
-@pytest.mark.parametrize("fly", FLIGHTS)
+ON_SENSORS = FLIGHTS if NIGHTLY else (lands, loses_link, blown_away)
+"""Those that are flown on sensors too."""
+
+
+@pytest.mark.parametrize(
+    ("state", "fly"), [*(("truth", fly) for fly in FLIGHTS), *(("estimated", fly) for fly in ON_SENSORS)]
+)
 def test_a_vehicle_on_the_ground_is_the_same_as_by_single_ticks_with_bytes(
     fly: Callable[[World], None], state: str
 ) -> None:
