@@ -47,6 +47,7 @@ $(READY): pyproject.toml | $(if $(filter fly,$(MAKECMDGOALS)),$(FLY_READY))
 	@{ $(BIN)/sim-bridge open-loop --rotors 214,214,214,214 --seconds 0.01 --json >/dev/null && \
 		{ $(BIN)/python -m pytest --collect-only -qq >/dev/null || true; }; } & \
 		$(BIN)/flightstack --check && wait $$!  # bytecode of tests, and of most of what they import
+	@$(BIN)/python -m tests.support.warm_world  # else the first tests compile its kernels side by side, each anew
 	@touch $@
 
 fly: $(FLY_READY) ## Fly missions/square.plan: simulator, flight stack and ground station as three processes
