@@ -227,10 +227,22 @@ def fuse_field_axis(f: Filter, axis: int, measured: Vector3, params: EstimatorPa
 
 
 @compiled
+def axis_by_yaw(measured: Vector3, at: int) -> int:
+    """Return the axis of a field to fuse as number ``at``: of x and y, that which changes most with the yaw comes first.
+
+    A turn by δ changes x by δ y, and y by −δ x. While the yaw is unknown, an update by the other one would turn it far
+    beyond where its Jacobian holds, for a field that is only stronger or weaker than expected.
+    """
+    if at == 2 or abs(measured.y) > abs(measured.x):
+        return at
+    return 1 - at
+
+
+@compiled
 def fuse_field(f: Filter, measured: Vector3, params: EstimatorParams) -> None:
-    """Fuse the magnetic field in the body frame, axis by axis."""
-    for axis in range(3):
-        fuse_field_axis(f, axis, measured, params)
+    """Fuse the magnetic field in the body frame, axis by axis, with an unknown yaw."""
+    for at in range(3):
+        fuse_field_axis(f, axis_by_yaw(measured, at), measured, params)
 
 
 @compiled

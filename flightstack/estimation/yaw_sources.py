@@ -16,7 +16,7 @@ from flightstack.estimation.error_state import (
     turned,
 )
 from flightstack.estimation.estimator_params import EstimatorParams
-from flightstack.estimation.fusion import fuse_field_axis, speed_accuracy
+from flightstack.estimation.fusion import axis_by_yaw, fuse_field_axis, speed_accuracy
 from flightstack.estimation.imu_input import mean_rate
 from flightstack.estimation.kalman import (
     DECLINATION,
@@ -111,7 +111,8 @@ def take_earth_field(m: MemoryRecord, f: Filter, stage: int, params: EstimatorPa
             return NOTHING
         return _begin_earth_field(m, f, params)
     if stage >= _FIELD_STAGE:
-        fuse_field_axis(f, stage - _FIELD_STAGE, read_vector(m["field"], 0), params)
+        field = read_vector(m["field"], 0)
+        fuse_field_axis(f, axis_by_yaw(field, stage - _FIELD_STAGE), field, params)
     else:
         _fuse_known_field(m, f, stage - 1, params)
     if stage == _FIELD_STAGE - 1 or stage == _FIELD_STAGE + 2:

@@ -84,14 +84,23 @@ void fs_fuse_field_axis(fs_filter *f, int32_t axis, const fs_vector3 *measured, 
 }
 
 /* fusion.py:230 */
+int32_t fs_axis_by_yaw(const fs_vector3 *measured, int32_t at)
+{
+    if (at == 2 || fs_abs(measured->y) > fs_abs(measured->x)) {
+        return at;
+    }
+    return 1 - at;
+}
+
+/* fusion.py:242 */
 void fs_fuse_field(fs_filter *f, const fs_vector3 *measured, const fs_estimator_params *params)
 {
-    for (int32_t axis = 0; axis < 3; axis++) {
-        fs_fuse_field_axis(f, axis, measured, params);
+    for (int32_t at = 0; at < 3; at++) {
+        fs_fuse_field_axis(f, fs_axis_by_yaw(measured, at), measured, params);
     }
 }
 
-/* fusion.py:262 */
+/* fusion.py:274 */
 void fs_fuse_rest_velocity(fs_filter *f, int32_t axis, const fs_estimator_params *params)
 {
     const fs_real velocity = params->rest_velocity_noise_m_s;
@@ -101,7 +110,7 @@ void fs_fuse_rest_velocity(fs_filter *f, int32_t axis, const fs_estimator_params
     (void)fs_fuse(f, FS_REST_VELOCITY + axis, -f->nominal[4 + axis], &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:272 */
+/* fusion.py:284 */
 void fs_fuse_rest_rate(fs_filter *f, int32_t axis, const fs_vector3 *rate_rad_s, fs_real variance,
                        const fs_estimator_params *params)
 {
@@ -114,7 +123,7 @@ void fs_fuse_rest_rate(fs_filter *f, int32_t axis, const fs_vector3 *rate_rad_s,
     (void)fs_fuse(f, FS_REST_RATE + axis, value - f->nominal[10 + axis], &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:289 */
+/* fusion.py:301 */
 void fs_fuse_hold(fs_filter *f, int32_t axis, fs_real held_m, const fs_estimator_params *params)
 {
     const fs_noise noise = {
@@ -129,7 +138,7 @@ void fs_fuse_hold(fs_filter *f, int32_t axis, fs_real held_m, const fs_estimator
     (void)fs_fuse(f, FS_HOLD_POSITION + axis, held_m - f->nominal[7 + axis], &noise, FS_LIT(0.0));
 }
 
-/* fusion.py:237 */
+/* fusion.py:249 */
 void fs_fuse_drag(fs_filter *f, int32_t axis, const fs_vector3 *force, const fs_estimator_params *params)
 {
     const fs_real deviation = fs_sqrt(params->drag_variance);

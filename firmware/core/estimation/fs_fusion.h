@@ -17,10 +17,20 @@
  */
 void fs_fuse_field_axis(fs_filter *f, int32_t axis, const fs_vector3 *measured, const fs_estimator_params *params);
 
-/* Fuse the magnetic field in the body frame, axis by axis. fusion.py:230 */
+/*
+ * Return the axis of a field to fuse as number at: of x and y, that which changes most with the yaw comes first.
+ *
+ * A turn by delta changes x by delta y, and y by -delta x. While the yaw is unknown, an update by the other one would
+ * turn it far beyond where its Jacobian holds, for a field that is only stronger or weaker than expected.
+ *
+ * fusion.py:230
+ */
+int32_t fs_axis_by_yaw(const fs_vector3 *measured, int32_t at);
+
+/* Fuse the magnetic field in the body frame, axis by axis, with an unknown yaw. fusion.py:242 */
 void fs_fuse_field(fs_filter *f, const fs_vector3 *measured, const fs_estimator_params *params);
 
-/* Fuse zero velocity along an axis of a vehicle that stands. fusion.py:262 */
+/* Fuse zero velocity along an axis of a vehicle that stands. fusion.py:274 */
 void fs_fuse_rest_velocity(fs_filter *f, int32_t axis, const fs_estimator_params *params);
 
 /*
@@ -28,13 +38,13 @@ void fs_fuse_rest_velocity(fs_filter *f, int32_t axis, const fs_estimator_params
  *
  * rate_rad_s, with this variance of noise, is the bias of the gyro, and the motion of a vehicle that sways.
  *
- * fusion.py:272
+ * fusion.py:284
  */
 void fs_fuse_rest_rate(fs_filter *f, int32_t axis, const fs_vector3 *rate_rad_s, fs_real variance,
                        const fs_estimator_params *params);
 
 /*
- * Fuse a horizontal position that is held without a measurement of it, which bounds velocity and tilt. fusion.py:289
+ * Fuse a horizontal position that is held without a measurement of it, which bounds velocity and tilt. fusion.py:301
  */
 void fs_fuse_hold(fs_filter *f, int32_t axis, fs_real held_m, const fs_estimator_params *params);
 
@@ -44,7 +54,7 @@ void fs_fuse_hold(fs_filter *f, int32_t axis, fs_real held_m, const fs_estimator
  * Drag is -(momentum_drag_1_s + 12 rho |u| / ballistic coefficient) u for the velocity u relative to the air: that of
  * the rotors' momentum and that of the body. Its change with |u| is left out of the Jacobian.
  *
- * fusion.py:237
+ * fusion.py:249
  */
 void fs_fuse_drag(fs_filter *f, int32_t axis, const fs_vector3 *force, const fs_estimator_params *params);
 

@@ -16,6 +16,7 @@
 
 /* What the estimator's memory says of EstimateHealth. */
 typedef struct {
+    fs_real mean_ratios[10];
     fs_real unaided_s;
     fs_real refused_s;
     fs_real lag_s;
@@ -30,7 +31,7 @@ typedef struct {
     fs_real heading_ratio;
 } fs_health_summary;
 
-/* Write the summary of an estimator's memory. health.py:143 */
+/* Write the summary of an estimator's memory. health.py:149 */
 void fs_health_kernel(const fs_estimator_memory *memory, fs_health_summary *summary);
 
 #endif

@@ -34,7 +34,7 @@
 #define FS_CERTAIN_SQUARE FS_LIT(16.0)
 #define FS_REFUSED_S FS_LIT(1.0)
 
-/* yaw_sources.py:181 */
+/* yaw_sources.py:182 */
 void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_sample *step)
 {
     if (m->yaw_fix.updates > FS_LIT(0.0)) {
@@ -48,7 +48,7 @@ void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_s
 
 /*
  * Turn the Earth's field by a change of the declination; the yaw follows as far as it depends on it.
- * yaw_sources.py:163
+ * yaw_sources.py:164
  */
 static void fuse_declination(fs_filter *f, fs_real was_rad, fs_real change_rad)
 {
@@ -76,7 +76,7 @@ static void fuse_declination(fs_filter *f, fs_real was_rad, fs_real change_rad)
     f->nominal[17] = along * sine + across * cosine;
 }
 
-/* Align the yaw again, or fuse the declination; return the next stage. yaw_sources.py:135 */
+/* Align the yaw again, or fuse the declination; return the next stage. yaw_sources.py:136 */
 static int32_t begin_earth_field(fs_estimator_memory *m, fs_filter *f, const fs_estimator_params *params)
 {
     const fs_vector3 known = fs_read_vector(m->earth, 0);
@@ -98,7 +98,7 @@ static int32_t begin_earth_field(fs_estimator_memory *m, fs_filter *f, const fs_
     return 1;
 }
 
-/* Fuse a component of the Earth's field. yaw_sources.py:124 */
+/* Fuse a component of the Earth's field. yaw_sources.py:125 */
 static void fuse_known_field(const fs_estimator_memory *m, fs_filter *f, int32_t axis,
                              const fs_estimator_params *params)
 {
@@ -112,7 +112,7 @@ static void fuse_known_field(const fs_estimator_memory *m, fs_filter *f, int32_t
 
 /*
  * Count the turn since the attitude in pending as a reset of the yaw; the field is not new any more.
- * yaw_sources.py:151
+ * yaw_sources.py:152
  */
 static void count_turn(fs_estimator_memory *m, const fs_filter *f)
 {
@@ -145,8 +145,8 @@ int32_t fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, int32_t stage,
         return begin_earth_field(m, f, params);
     }
     if (stage >= FS_FIELD_STAGE) {
-        const fs_vector3 read_vector = fs_read_vector(m->field, 0);
-        fs_fuse_field_axis(f, stage - FS_FIELD_STAGE, &read_vector, params);
+        const fs_vector3 field = fs_read_vector(m->field, 0);
+        fs_fuse_field_axis(f, fs_axis_by_yaw(&field, stage - FS_FIELD_STAGE), &field, params);
     } else {
         fuse_known_field(m, f, stage - 1, params);
     }
@@ -200,7 +200,7 @@ int32_t fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[],
     return axis < 2 ? axis + 1 : 0;
 }
 
-/* Take tilt and yaw from the models, velocity and position from GNSS. yaw_sources.py:228 */
+/* Take tilt and yaw from the models, velocity and position from GNSS. yaw_sources.py:229 */
 static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 {
     m->yaw_fix.wrong_s = FS_LIT(0.0);
@@ -231,7 +231,7 @@ static void reset_to_models(fs_estimator_memory *m, fs_filter *f, const fs_real 
 
 /*
  * Return True if the models have contradicted the yaw for a second, or do while GNSS velocities are refused.
- * yaw_sources.py:214
+ * yaw_sources.py:215
  */
 static bool is_wrong(fs_estimator_memory *m, fs_real time_s)
 {
@@ -249,7 +249,7 @@ static bool is_wrong(fs_estimator_memory *m, fs_real time_s)
     return lasts || (differs && is_refused);
 }
 
-/* yaw_sources.py:190 */
+/* yaw_sources.py:191 */
 void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[])
 {
     fs_yaw_bank *bank = &m->yaw_bank;

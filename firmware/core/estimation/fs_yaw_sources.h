@@ -18,7 +18,7 @@
 #include "fs_types.h"
 #include "fs_yaw_estimator.h"
 
-/* Move the models over a step of the flight. yaw_sources.py:181 */
+/* Move the models over a step of the flight. yaw_sources.py:182 */
 void fs_predict_yaw(fs_estimator_memory *m, const fs_filter *f, const fs_delta_sample *step);
 
 /*
@@ -41,7 +41,7 @@ int32_t fs_take_earth_field(fs_estimator_memory *m, fs_filter *f, int32_t stage,
 int32_t fs_take_field(fs_estimator_memory *m, fs_filter *f, const fs_real row[], int32_t axis,
                       const fs_estimator_params *params);
 
-/* Weigh the models with a GNSS velocity; reset the yaw if it is unknown, or wrong. yaw_sources.py:190 */
+/* Weigh the models with a GNSS velocity; reset the yaw if it is unknown, or wrong. yaw_sources.py:191 */
 void fs_take_velocity(fs_estimator_memory *m, fs_filter *f, const fs_real row[]);
 
 #endif
