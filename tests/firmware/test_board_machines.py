@@ -89,7 +89,7 @@ def test_a_pico2_exchanges_bytes_bursts_and_cut_frames() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "board"), [("pico2", "Pico 2, Cortex-M33"), ("pico2-riscv", "Pico 2, Hazard3")]
+    ("name", "board"), [("pico2", "Pico 2, Cortex-M33")] + NIGHTLY * [("pico2-riscv", "Pico 2, Hazard3")]
 )
 def test_a_pico2_built_by_zig_has_the_bits_of_the_host(name: str, board: str) -> None:
     """The floating-point arithmetic of Hazard3 is zig's run-time library, but for division."""

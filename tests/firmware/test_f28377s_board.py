@@ -28,6 +28,7 @@ from tests.firmware.f28377s_support import (
     Board,
     pil_step,
 )
+from tests.support.tools import NIGHTLY
 
 OUTER_DUE, RESET = 1, 4
 READY, STEPPING, SAFE, RESTARTED = range(4)
@@ -48,7 +49,7 @@ def exchange(board: Board, number: int, flags: int, spoil: dict[int, int] | None
     return of(board.messages(), "FS_PIL_REPORT")
 
 
-@pytest.mark.parametrize("flags", [LEVEL, EDGE], ids=["level", "edge"])
+@pytest.mark.parametrize("flags", [EDGE] + NIGHTLY * [LEVEL], ids=["edge", "level"][: 1 + NIGHTLY])
 def test_steps_are_answered_with_what_they_cost(flags: int, tmp_path: Path) -> None:
     board = Board(tmp_path, flags=flags)
     for number in range(20):

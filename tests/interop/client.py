@@ -10,6 +10,7 @@ import pytest
 from tests.interop.client_process import CONNECTED, FAILED, PASSED
 from tests.interop.stack import HOST, RealVehicle
 from tests.support.process import Process
+from tests.support.tools import NIGHTLY
 
 API, GROUND, TCP = "api", "ground", "tcp"
 """Links: UDP to the API port and to the ground station's port, and TCP to the vehicle's."""
@@ -71,8 +72,10 @@ class Client:
 Story = Callable[..., Awaitable[None]]
 
 
-def story(*, speeds: Sequence[float] = (10.0,), links: Sequence[str] = (API,)) -> Callable[[Story], Story]:
-    """Make a test of ``async def test_…(drone, …)``, run at each speed over each link.
+def story(
+    *, speeds: Sequence[float] = (10.0,), links: Sequence[str] = (API,), by_night: Sequence[str] = ()
+) -> Callable[[Story], Story]:
+    """Make a test of ``async def test_…(drone, …)``, run at each speed over each link, with NIGHTLY=1 over more links.
 
     Arguments after ``drone`` are those of a test that is not made here, and runs the story by :meth:`Client.run`.
     """
@@ -87,7 +90,8 @@ def story(*, speeds: Sequence[float] = (10.0,), links: Sequence[str] = (API,)) -
             function.__module__,
         )
         test.story = function  # type: ignore[attr-defined]
-        flights = [pytest.param((speed, link), id=f"{speed:g}x-{link}") for speed in speeds for link in links]
+        used = (*links, *by_night) if NIGHTLY else links
+        flights = [pytest.param((speed, link), id=f"{speed:g}x-{link}") for speed in speeds for link in used]
         return pytest.mark.parametrize("client", flights, indirect=True)(test)  # type: ignore[return-value]
 
     return made

@@ -11,7 +11,7 @@ from mavsdk.plugins.geofence import Circle, FenceType, GeofenceData, Point, Poly
 from mavsdk.plugins.mission import MissionError, MissionItem, MissionPlan
 from mavsdk.plugins.mission_raw import MissionItem as RawItem
 
-from tests.interop.client import API, GROUND, TCP, story
+from tests.interop.client import GROUND, TCP, story
 from tests.interop.drone import Drone
 
 METRES_A_DEGREE = 111_195.0
@@ -43,7 +43,7 @@ async def until_reached(drone: Drone, count: int) -> None:
     )
 
 
-@story(links=(API, GROUND, TCP))
+@story(by_night=(GROUND, TCP))
 async def test_a_mission_comes_back_as_it_went(drone: Drone) -> None:
     plan = await square(drone)
     await drone.mission.upload_mission(plan)
@@ -140,7 +140,7 @@ async def test_a_mission_that_cannot_be_flown_is_refused_and_the_old_one_stays(d
     await drone.mission.clear_mission()
 
 
-@story(links=(API, TCP))
+@story(by_night=(TCP,))
 async def test_places_beyond_the_geofence_are_denied(drone: Drone) -> None:
     home = await drone.until("home", drone.telemetry.subscribe_home())
     north, east = home.latitude_deg, home.longitude_deg

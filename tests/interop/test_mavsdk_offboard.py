@@ -20,7 +20,7 @@ from mavsdk.plugins.offboard import (
 )
 from mavsdk.plugins.telemetry import PositionVelocityNed
 
-from tests.interop.client import API, TCP, story
+from tests.interop.client import TCP, story
 from tests.interop.drone import Drone
 
 
@@ -43,7 +43,7 @@ async def test_offboard_needs_a_setpoint(drone: Drone) -> None:
     assert not await drone.offboard.is_active()
 
 
-@story(links=(API, TCP))
+@story(by_night=(TCP,))
 async def test_positions_are_flown_to(drone: Drone) -> None:
     await drone.take_off()
     await drone.offboard.set_position_ned(PositionNedYaw(0.0, 0.0, -3.0, 0.0))
@@ -133,7 +133,7 @@ async def sticks_held(drone: Drone, x: float, y: float, z: float, r: float) -> A
         await sending
 
 
-@story(links=(API, TCP))
+@story(by_night=(TCP,))
 async def test_sticks_fly_in_position_and_altitude_mode(drone: Drone) -> None:
     telemetry = drone.telemetry
     await drone.take_off()

@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 from mavsdk.plugins.param import ParamError
 
-from tests.interop.client import API, TCP, story
+from tests.interop.client import TCP, story
 from tests.interop.drone import Drone
 
 GAIN, WHOLE = "MIS_TAKEOFF_ALT", "COM_DL_LOSS_T"
 
 
-@story(speeds=(1,), links=(API, TCP))
+@story(speeds=(1,), by_night=(TCP,))
 async def test_numbers_are_set_and_read_back(drone: Drone) -> None:
     before = await drone.param.get_param_float(GAIN)
     await drone.param.set_param_float(GAIN, 3.25)
@@ -20,7 +20,7 @@ async def test_numbers_are_set_and_read_back(drone: Drone) -> None:
     assert await drone.param.get_param_float(GAIN) == before
 
 
-@story(speeds=(1,), links=(API, TCP))
+@story(speeds=(1,), by_night=(TCP,))
 async def test_integers_keep_their_type(drone: Drone) -> None:
     before = await drone.param.get_param_int(WHOLE)
     await drone.param.set_param_int(WHOLE, 299)
@@ -47,7 +47,7 @@ async def test_what_is_refused_is_named(drone: Drone) -> None:
     assert mistyped.value.result.name in ("WRONG_TYPE", "TYPE_MISMATCH")
 
 
-@story(speeds=(1,), links=(API, TCP))
+@story(speeds=(1,), by_night=(TCP,))
 async def test_all_parameters_are_listed(drone: Drone) -> None:
     everything = await drone.param.get_all_params()
     numbers = {each.name: each.value for each in everything.float_params}

@@ -8,7 +8,7 @@ import time
 import pytest
 from mavsdk.plugins.telemetry import Odometry, TelemetryError
 
-from tests.interop.client import API, TCP, story
+from tests.interop.client import TCP, story
 from tests.interop.drone import Drone
 
 COUNTED = 40
@@ -27,7 +27,7 @@ async def seconds_between(drone: Drone, count: int) -> float:
     return (stamps[-1] - stamps[0]) * 1e-6
 
 
-@story(speeds=(1,), links=(API, TCP))
+@story(speeds=(1,), by_night=(TCP,))
 async def test_messages_come_at_the_rate_asked_for(drone: Drone) -> None:
     for rate_hz in (50.0, 10.0):
         await drone.telemetry.set_rate_odometry(rate_hz)
@@ -68,7 +68,7 @@ async def test_a_rate_of_what_the_vehicle_has_not_is_refused(drone: Drone) -> No
     assert refused.value.result.name in ("UNSUPPORTED", "COMMAND_DENIED")
 
 
-@story(speeds=(1,), links=(API, TCP))
+@story(speeds=(1,), by_night=(TCP,))
 async def test_the_vehicle_tells_its_state(drone: Drone) -> None:
     telemetry = drone.telemetry
     battery = await drone.until("battery", telemetry.subscribe_battery())

@@ -33,6 +33,7 @@ from tests.interop.qgc_plans import (
     MISSION as MISSION_PLAN,
 )
 from tests.interop.stack import RealVehicle
+from tests.support.tools import NIGHTLY
 
 HOME = (47.397742, 8.545594)
 NORTH_DEG, EAST_DEG = 6.0 / 111_195.0, 6.0 / 75_265.0
@@ -85,7 +86,7 @@ class Ground:
             self.station.until("EXTENDED_SYS_STATE", holds=lambda state: not self.station.flying)
 
 
-@pytest.fixture(scope="module", params=["udp", "tcp"])
+@pytest.fixture(scope="module", params=["udp", "tcp"] if NIGHTLY else ["udp"])
 def ground(request: pytest.FixtureRequest, station_vehicle: RealVehicle) -> Iterator[Ground]:
     port = UdpPort(station_vehicle.gcs_port) if request.param == "udp" else TcpPort(station_vehicle.tcp_port)
     ground = Ground(port, station_vehicle)

@@ -13,6 +13,7 @@ from flightstack.firmware.pil.target_filter import HostFilter
 from flightstack.process import assembly
 from flightstack.testing import World
 from flightstack.testing.engine import Engine
+from tests.support.tools import NIGHTLY
 
 MOVES_S = 2.0 * SPAN_S - 4.0
 """Time in whose flight the origin of the filter's clock moves."""
@@ -63,8 +64,10 @@ def test_flight_on_the_filter_in_c_in_double_has_the_bits_of_python(monkeypatch:
     assert here[-1, 2] < -1.5
 
 
-@pytest.mark.parametrize("start_s", [0.0, MOVES_S, DAY_S])
-@pytest.mark.parametrize("loops", ["host", "emulated"])
+TARGETS = [("host", 0.0), ("host", MOVES_S), ("host", DAY_S), ("emulated", MOVES_S)]
+
+
+@pytest.mark.parametrize(("loops", "start_s"), TARGETS + NIGHTLY * [("emulated", 0.0), ("emulated", DAY_S)])
 def test_flight_on_a_target_has_the_bits_of_c_in_this_process(loops: str, start_s: float) -> None:
     here, there = flight_in_c(start_s), flight(start_s, loops=loops)
     assert np.array_equal(here, there)

@@ -20,6 +20,7 @@ from flightstack.testing.instances import free_instance
 from tests.support.commands import flightstack_command, gcs
 from tests.support.inertial_sensors import x_quad_with_imus
 from tests.support.process import BOUND_S, Process
+from tests.support.tools import NIGHTLY
 from tests.support.vehicle_processes import INNER_HZ, wait_until_healthy
 from tests.support.warm_children import warm_children
 
@@ -76,19 +77,22 @@ def test_flight_on_sensors_gives_the_same_log_in_three_processes_and_in_one(tmp_
         assert world.fly("hop").log.content == log
 
 
+FAULTS = [
+    ("--state", "truth", "--fault", "clock:jump=1.5@8.3"),
+    ("--vehicle", "two imus", "--fault", "sensor:imu:off@8.301-9"),
+    ("--outer-hz", "62.5", "--fault", "sensor:baro:freeze@4.1-7"),
+    ("--param", "COM_VEL_FS_EVH=0.2", "--fault", "sensor:gnss:off@4-20"),
+]
+MORE_FAULTS = [
+    ("--state", "estimated", "--fault", "clock:jump=0.5@8.5"),
+    ("--seed", "1", "--fault", "sensor:imu:freeze@5-5.3"),
+    ("--seed", "1", "--fault", "sensor:mag:turn=170@3.3-9"),
+    ("--outer-hz", "62.5", "--fault", "sensor:baro:off@3.5"),
+]
+
+
 @pytest.mark.parametrize(
-    "options",
-    [
-        ("--state", "truth", "--fault", "clock:jump=1.5@8.3"),
-        ("--state", "estimated", "--fault", "clock:jump=0.5@8.5"),
-        ("--vehicle", "two imus", "--fault", "sensor:imu:off@8.301-9"),
-        ("--seed", "1", "--fault", "sensor:imu:freeze@5-5.3"),
-        ("--seed", "1", "--fault", "sensor:mag:turn=170@3.3-9"),
-        ("--outer-hz", "62.5", "--fault", "sensor:baro:off@3.5"),
-        ("--outer-hz", "62.5", "--fault", "sensor:baro:freeze@4.1-7"),
-        ("--param", "COM_VEL_FS_EVH=0.2", "--fault", "sensor:gnss:off@4-20"),
-    ],
-    ids=lambda options: options[3].partition("@")[0],
+    "options", FAULTS + NIGHTLY * MORE_FAULTS, ids=lambda options: options[3].partition("@")[0]
 )
 def test_what_the_simulator_does_to_a_flight_has_the_same_log_at_any_speed(
     options: tuple[str, ...], tmp_path: Path
