@@ -8,7 +8,7 @@ import numpy as np
 
 from flightstack.core.compiled import IS_DISABLED
 from flightstack.core.contract import ByteArray, FloatArray, RecordArray, SingleArray
-from flightstack.core.kernel_calls import address_of, as_bytes
+from flightstack.core.kernels.calls import address_of, as_bytes
 from flightstack.core.periods import NEVER_US
 from flightstack.simulator_link.frame_kernels import SENSOR_NEWS
 from flightstack.simulator_link.gps_kernels import GPS_SIZE

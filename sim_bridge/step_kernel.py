@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from flightstack.core.arrays import copy_all
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
-from flightstack.core.kernel_calls import call_kernel, call_kernel_float, call_kernel_int
+from flightstack.core.kernels.calls import call_kernel, call_kernel_float, call_kernel_int
 from flightstack.core.periods import take_due
 from flightstack.core.record_types import dtype_of
 from flightstack.simulator_link.gps_kernels import write_gps

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, NamedTuple
 
-from flightstack.core.kernel_cache import is_own
+from flightstack.core.kernels.cache import is_own
 
 _COMPILERS = frozenset(("numba", "llvmlite", "numpy", "scipy"))
 """Packages that are not followed."""

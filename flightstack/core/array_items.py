@@ -1,4 +1,4 @@
-"""Copies between arrays and tuples. In compiled functions they are LLVM code: see ``compiled_builtins``."""
+"""Copies between arrays and tuples. In compiled functions they are LLVM code: see ``kernels.intrinsics``."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from functools import cached_property
 from types import FunctionType
 from typing import Any, TypeVar
 
-from flightstack.core.kernel_cache import is_own
+from flightstack.core.kernels.cache import is_own
 
 IS_DISABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 """True if compiled functions are plain Python, for debugging."""
@@ -41,7 +41,7 @@ class Kernel:
     @cached_property
     def dispatcher(self) -> Any:
         """Numba's dispatcher of the function."""
-        from flightstack.core.dispatcher import KernelDispatcher
+        from flightstack.core.kernels.dispatcher import KernelDispatcher
 
         return KernelDispatcher(self.py_func, self._modules)
 

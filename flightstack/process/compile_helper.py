@@ -22,7 +22,7 @@ from flightstack.commander.estimate_checks import LIMITS, watch_estimate
 from flightstack.commander.failsafe_monitor import FailsafeMonitor
 from flightstack.core.compiled import IS_DISABLED, Kernel, direct
 from flightstack.core.contract import STATE_SIZE
-from flightstack.core.kernel_cache import is_shared
+from flightstack.core.kernels.cache import is_shared
 from flightstack.estimation.agenda import fuse_next
 from flightstack.estimation.delayed_filter import field_kernel, imu_kernel, push_kernel
 from flightstack.estimation.estimator_params import PARAMS_SIZE, EstimatorParams

@@ -16,7 +16,7 @@ from flightstack.commander.fault_detector import follow_rotors
 from flightstack.control.loops import PythonLoops
 from flightstack.core.compiled import IS_DISABLED, direct
 from flightstack.core.contract import ByteArray, FloatArray, LoopRow, RecordArray, SingleArray
-from flightstack.core.kernel_calls import address_of, as_bytes
+from flightstack.core.kernels.calls import address_of, as_bytes
 from flightstack.estimation.delayed_filter import imu_kernel
 from flightstack.estimation.filter_core import PythonCore
 from flightstack.estimation.imu_track import RECORD_SIZE, take_wire

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from flightstack.core.contract import ByteArray, FloatArray, RecordArray, SingleArray
-from flightstack.core.kernel_calls import address_of, as_bytes
+from flightstack.core.kernels.calls import address_of, as_bytes
 from flightstack.params.config import TRUTH, StackConfig
 from flightstack.process.assembly import Stack, build
 from flightstack.process.exchange_kernel import EXCHANGE, Exchange, exchange

@@ -12,7 +12,7 @@ from flightstack.control.loops import PythonLoops
 from flightstack.core.arrays import store_outer_row
 from flightstack.core.contract import LoopFlags, RecordArray
 from flightstack.core.enums import Mode
-from flightstack.core.kernel_calls import address_of
+from flightstack.core.kernels.calls import address_of
 from flightstack.flight_log.flight_log import DEFAULT_CAPACITY, FlightLog, Trace
 from flightstack.flight_log.topics import OUTER
 from flightstack.guidance.fence import fence_step

@@ -9,7 +9,7 @@ import numpy as np
 
 from flightstack.commander.estimate_checks import LIMITS, watch_estimate
 from flightstack.core.contract import STATE_SIZE, ByteArray, RecordArray, SingleArray, Vector3
-from flightstack.core.kernel_calls import address_of, as_bytes
+from flightstack.core.kernels.calls import address_of, as_bytes
 from flightstack.core.periods import NEVER_US
 from flightstack.estimation.delayed_filter import push_kernel
 from flightstack.estimation.estimator import Estimator

@@ -16,7 +16,7 @@ import numpy as np
 
 from flightstack.core.compiled import IS_DISABLED, compiled
 from flightstack.core.contract import RecordArray
-from flightstack.core.kernel_calls import call_c
+from flightstack.core.kernels.calls import call_c
 from flightstack.core.record_types import dtype_of
 from flightstack.transports.tcp import BUFFER_SIZE
 

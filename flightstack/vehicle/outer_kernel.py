@@ -16,7 +16,7 @@ from flightstack.commander.ground_monitor import FALL_M_S, STANDING_M_S
 from flightstack.core.arrays import copy_all
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
-from flightstack.core.kernel_calls import call_kernel, call_kernel_int
+from flightstack.core.kernels.calls import call_kernel, call_kernel_int
 from flightstack.core.record_types import dtype_of
 from flightstack.guidance.land_detector import CONTACT_M_S
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from flightstack.core.arrays import copy_all
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, LoopRow
-from flightstack.core.kernel_calls import call_kernel, call_kernel_int
+from flightstack.core.kernels.calls import call_kernel, call_kernel_int
 from flightstack.core.record_types import dtype_of
 from flightstack.vehicle.outer_kernel import guide, note_outer
 from flightstack.vehicle.slow_kernel import log_truth, take_fix, take_slow, watch_health

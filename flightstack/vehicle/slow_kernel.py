@@ -13,7 +13,7 @@ from flightstack.core.arrays import copy_all
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
 from flightstack.core.geodesy import GeoPoint, relative
-from flightstack.core.kernel_calls import call_kernel, call_kernel_int
+from flightstack.core.kernels.calls import call_kernel, call_kernel_int
 from flightstack.core.record_types import dtype_of
 from flightstack.estimation.rings import BARO_RING, GNSS_RING, MAG_RING
 from flightstack.estimation.sensor_samples import GnssFix

@@ -8,7 +8,7 @@ import numpy as np
 
 from flightstack.core.compiled import direct
 from flightstack.core.geodesy import GeoPoint
-from flightstack.core.kernel_calls import as_bytes
+from flightstack.core.kernels.calls import as_bytes
 from flightstack.params.vehicle import Vehicle
 from flightstack.simulator_link.frame_kernels import SHAPE
 from flightstack.simulator_link.hot_frames import GROUND_CONTACT_FLAG, LOCKSTEP_FLAG, VALID_FLAG

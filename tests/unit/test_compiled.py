@@ -15,10 +15,11 @@ import pytest
 
 from flightstack.control.mixer import mix
 from flightstack.core import compiled as module
-from flightstack.core import geometry, kernel_cache
+from flightstack.core import geometry
 from flightstack.core.compiled import compiled, direct, specialise
 from flightstack.core.geometry import quaternion_product
-from flightstack.core.kernel_cache import is_own
+from flightstack.core.kernels import cache as kernel_cache
+from flightstack.core.kernels.cache import is_own
 from sim_bridge.plant.integrator import advance_kernel
 
 inner = None  # bound by ``specialise``
@@ -205,7 +206,7 @@ def test_kernels_in_numba_cache_dir_are_keyed_by_their_sources(tmp_path: Path) -
     top = Path(module.__file__).parents[2]
     key = kernel_cache.digest(top, ["flightstack.control.mixer"], numba.__version__)
     assert cache_directory(NUMBA_CACHE_DIR=str(tmp_path)) == tmp_path / "flightstack" / "kernels" / key
-    compiler = top / "flightstack" / "core" / "kernel_compiler.py"
+    compiler = top / "flightstack" / "core" / "kernels" / "compiler.py"
     assert compiler in kernel_cache.sources(top, ["flightstack.control.mixer"])
 
 

@@ -21,11 +21,11 @@ from flightstack.control.controller_loading import (
     load_controller,
 )
 from flightstack.control.mixer import mix
-from flightstack.core import kernel_cache
 from flightstack.core.compiled import specialised
 from flightstack.core.contract import LoopRow
 from flightstack.core.errors import ConfigError
-from flightstack.core.kernel_cache import is_own
+from flightstack.core.kernels import cache as kernel_cache
+from flightstack.core.kernels.cache import is_own
 from flightstack.firmware.c_loops import INPUT_SIZE, OUTPUT_SIZE, LoopsSetup
 from flightstack.firmware.stages import StageModel
 from flightstack.params.config import StackConfig
@@ -212,7 +212,7 @@ def test_a_controller_that_is_gone_leaves_the_others_compilable(installed: Path)
     vehicle, gains = load_vehicle("paper_quad"), open_gains("tuned")
     model = StageModel(LoopsSetup(vehicle, load_controller("lqr"), gains, 0.6, 500.0, 100.0, 5))
     model.expected(np.zeros((1, INPUT_SIZE)), np.zeros(1, np.int64), np.zeros((1, OUTPUT_SIZE)))
-    top, base = Path(kernel_cache.__file__).parents[2], Path(mix.stats.cache_path).parents[1]
+    top, base = Path(kernel_cache.__file__).parents[3], Path(mix.stats.cache_path).parents[1]
     digests = {kernel_cache.digest(top, [name], numba.__version__) for name in sys.modules if is_own(name)}
     folders = {base / digest for digest in digests} | {
         Path(path).parent for kernel in specialised.values() if (path := kernel.stats.cache_path)

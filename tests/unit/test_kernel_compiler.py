@@ -14,10 +14,11 @@ import pytest
 from numba.core import event
 
 from flightstack.core import compiled as module
-from flightstack.core import geometry, kernel_compiler
+from flightstack.core import geometry
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import Quaternion
 from flightstack.core.geometry import quaternion_product
+from flightstack.core.kernels import compiler as kernel_compiler
 from flightstack.core.portable_math import tan
 
 JIT = pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
@@ -138,7 +139,7 @@ def half(x):
 @compiled
 def quarter(x):
     return half(half(x))
-print(quarter(6.0), "flightstack.core.kernel_compiler" in sys.modules)
+print(quarter(6.0), "flightstack.core.kernels.compiler" in sys.modules)
 """
 
 

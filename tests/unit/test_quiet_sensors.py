@@ -10,7 +10,7 @@ import pytest
 from flightstack.core.compiled import IS_DISABLED, plain
 from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import GeoPoint, LocalFrame
-from flightstack.core.kernel_calls import as_bytes
+from flightstack.core.kernels.calls import as_bytes
 from flightstack.estimation.sensor_feed import SlowSamples
 from flightstack.flight_log.sensor_rows import store_global
 from flightstack.params.config import StackConfig

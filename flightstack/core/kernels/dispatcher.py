@@ -15,10 +15,10 @@ from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
 
 from flightstack.core.compiled import renamed
-from flightstack.core.kernel_cache import directory, is_own
+from flightstack.core.kernels.cache import directory, is_own
 
 _TESTED_NUMBA = {(0, minor) for minor in range(60, 69)}
-"""Versions whose compiler ``kernel_compiler`` extends; another compiles the same in a longer time."""
+"""Versions of Numba that the module ``compiler`` extends; another compiles the same in a longer time."""
 
 KernelCompiler: type[Compiler] = Compiler
 PartDispatcher: type[CPUDispatcher] = CPUDispatcher
@@ -26,7 +26,7 @@ PartCompiler: type[Compiler] = Compiler
 KernelCache: type[FunctionCache] = FunctionCache
 PartCache: type[FunctionCache] = FunctionCache
 if numba.version_info.short in _TESTED_NUMBA:
-    from flightstack.core.kernel_compiler import (
+    from flightstack.core.kernels.compiler import (
         KernelCache,
         KernelCompiler,
         PartCache,
@@ -34,7 +34,7 @@ if numba.version_info.short in _TESTED_NUMBA:
         PartDispatcher,
     )
 else:
-    from flightstack.core.compiled_builtins import register
+    from flightstack.core.kernels.intrinsics import register
 
     register(PartCompiler)  # type: ignore[arg-type]  # of no type
 

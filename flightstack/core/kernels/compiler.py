@@ -35,7 +35,7 @@ from numba.core.untyped_passes import (
     WithLifting,
 )
 
-from flightstack.core.kernel_cache import is_own
+from flightstack.core.kernels.cache import is_own
 
 _DEFAULTS = {name: option.default for name, option in Flags.options.items()}
 _DAMAGED = (
@@ -89,10 +89,10 @@ class _Compiler(Compiler):  # type: ignore[misc]
         flags: Flags,
         locals: Any,
     ) -> None:
-        from flightstack.core.compiled_builtins import register
+        from flightstack.core.kernels.intrinsics import register
 
         register(PartCompiler)
-        importlib.import_module("flightstack.core.compiled_items")
+        importlib.import_module("flightstack.core.kernels.items")
         super().__init__(typingctx, targetctx, library, args, return_type, _Flags(flags), locals)
 
     def compile_extra(self, func: Any) -> CompileResult:
@@ -236,7 +236,7 @@ class _KernelCacheImpl(_CacheImpl):
     def reduce(self, result: CompileResult) -> Any:
         """Return the result to store, with the names of the functions that are called in place of all LLVM code.
 
-        Python calls the one, ``kernel_calls`` the other. Numba keeps the LLVM code for callers: they include the part.
+        Python calls the one, ``calls`` the other. Numba keeps the LLVM code for callers: they include the part.
         """
         (name, kind, (machine_code, _)), *rest = super().reduce(result)
         called = result.fndesc.llvm_cpython_wrapper_name, result.fndesc.llvm_func_name

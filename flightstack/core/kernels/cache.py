@@ -118,7 +118,7 @@ def directory(module_names: frozenset[str], version: str) -> Path | None:
     It is None if a source was replaced since this process started, which may run the version before. The time of the
     change in the file system tells, since a file may be replaced by one with an older time of its own.
     """
-    top = Path(__file__).resolve().parents[2]
+    top = Path(__file__).resolve().parents[3]
     if any(path.stat().st_ctime > STARTED_S for path in sources(top, module_names)):
         return None
     path = base_directory() / digest(top, module_names, version)

@@ -18,7 +18,7 @@ from numba.core import cgutils, types
 from numba.core.imputils import impl_ret_borrowed, lower_builtin, lower_cast, lower_getattr_generic
 from numba.np import arrayobj
 
-from flightstack.core.kernel_compiler import compiles_kernel
+from flightstack.core.kernels.compiler import compiles_kernel
 
 _Lowering: TypeAlias = Callable[..., Any]
 
