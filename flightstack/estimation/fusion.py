@@ -228,7 +228,7 @@ def fuse_field_axis(f: Filter, axis: int, measured: Vector3, params: EstimatorPa
 
 @compiled
 def axis_by_yaw(measured: Vector3, at: int) -> int:
-    """Return the axis of a field to fuse as number ``at``: of x and y, that which changes most with the yaw comes first.
+    """Return the axis of a field to fuse as number ``at``: of x and y, the one that tells more of the yaw comes first.
 
     A turn by δ changes x by δ y, and y by −δ x. While the yaw is unknown, an update by the other one would turn it far
     beyond where its Jacobian holds, for a field that is only stronger or weaker than expected.

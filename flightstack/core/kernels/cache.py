@@ -25,7 +25,8 @@ _KEPT_S = 14 * 86_400.0
 """Lifetime of a directory after its last use."""
 _IMPORT = re.compile(
     rf"^[ \t]*(?:from[ \t]+((?:{'|'.join(OWN_PACKAGES)})[\w.]*)[ \t]+import[ \t]+(\([^)]*\)|[^\n]+)"
-    rf"|import[ \t]+((?:{'|'.join(OWN_PACKAGES)})[^\n]*))",
+    rf"|import[ \t]+((?:{'|'.join(OWN_PACKAGES)})[^\n]*)"
+    rf"|importlib\.import_module\(\"((?:{'|'.join(OWN_PACKAGES)})[\w.]*)\"\))",
     re.MULTILINE,
 )
 
@@ -47,7 +48,10 @@ def _path(top: Path, module_name: str) -> Path | None:
 def _imports(text: str) -> set[str]:
     """Return all module names that a source may import; an imported name may itself be a module."""
     found: set[str] = set()
-    for package, names, plain in _IMPORT.findall(text):
+    for package, names, plain, late in _IMPORT.findall(text):
+        if late:
+            found.add(late)
+            continue
         if plain:
             found.update(name.split()[0] for name in plain.split(",") if name.strip())
             continue
