@@ -107,6 +107,10 @@ class Journal:
             os.fsync(self._descriptor)
         self.rows[int(row["flight"])] = row
 
+    def count(self) -> int:
+        """Return the number of rows on disk: Ctrl-C may come between the write of a row and its entry in ``rows``."""
+        return len(self._read())
+
     def check_unchanged(self, record: Mapping[str, Any]) -> None:
         """Raise CliError if ``record``, made after the flights, differs from that before: they differ too."""
         difference = _difference(self._record, record)

@@ -69,7 +69,7 @@ def run_campaign(pool: FlightPool, options: CampaignOptions, console: Console) -
         try:
             Flyer(pool, campaign, journal, display, options).fly(flights)
         except KeyboardInterrupt:
-            over = f"{len(journal.rows)} of {len(flights)} flights are over"
+            over = f"{journal.count()} of {len(flights)} flights are over"
             raise CliError(f"interrupted: {over}; {continuing(options)} continues", INTERRUPTED) from None
         finally:
             display.close()

@@ -48,7 +48,7 @@ def run_search(pool: FlightPool, campaign: Campaign, options: CampaignOptions, c
         try:
             found = search(evaluation.fly, nominal, flights, campaign.plan.seed)
         except KeyboardInterrupt:
-            over = f"{len(journal.rows)} flights are over"
+            over = f"{journal.count()} flights are over"
             raise CliError(f"interrupted: {over}; {continuing(options)} continues", INTERRUPTED) from None
         finally:
             display.close()

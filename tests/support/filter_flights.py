@@ -171,14 +171,15 @@ def _other_cutoffs(events: Events) -> list[Event]:
     return made
 
 
-def _turned_field(events: Events, turn_rad: float) -> list[Event]:
-    """Turn the measured magnetic field."""
+def _turned_field(events: Events, turn_rad: float, strength: float = 1.0) -> list[Event]:
+    """Turn the measured magnetic field; multiply it once it may have been aligned with."""
     sine, cosine = np.sin(turn_rad), np.cos(turn_rad)
     made = []
     for kind, row in events:
         changed = row.copy()
         if kind == MAG_RING:
             changed[1:3] = cosine * row[1] - sine * row[2], sine * row[1] + cosine * row[2]
+            changed[1:4] *= strength if row[0] > _CLIMB_S else 1.0
         made.append(Event(kind, changed))
     return made
 
@@ -330,6 +331,7 @@ STREAMS: dict[str, Callable[[], Events]] = {
         _turned_track(_without(_LONG(), MAG_RING)), 0.1
     ),
     "magnetometer turned": lambda: _new_earth_field(_turned_field(_LONG(), np.pi / 2), 0.2),
+    "magnet near": lambda: _checked(_turned_field(flown(), 0.0, strength=50.0)),
     "magnetometer turned less": lambda: _turned_field(_LONG(), 1.0),
     "magnetometer turned, velocity refused": lambda: _with_params(
         _turned_field(_LONG(), 1.0), gnss_velocity_gate=0.3

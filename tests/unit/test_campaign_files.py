@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Generator, Mapping
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -384,3 +386,13 @@ def test_a_flight_has_the_same_seed_in_a_longer_campaign() -> None:
 )
 def test_nominal_value_of_an_input(folder: Path, name: str, value: float) -> None:
     assert campaign(folder).nominal(name) == value
+
+
+def test_a_row_counts_if_ctrl_c_comes_after_its_write(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with open_journal(tmp_path, record_of("plan", {}, ())) as journal:
+        monkeypatch.setattr(os, "fsync", Mock(side_effect=KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            journal.add({"flight": 1})
+        assert (len(journal.rows), journal.count()) == (0, 1)
