@@ -7,6 +7,7 @@ import math
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -47,6 +48,14 @@ def plain(value: Any) -> Any:
         listed = value.tolist() if hasattr(value, "tolist") else value
         return [plain(entry) for entry in listed] if isinstance(listed, Sequence) else plain(listed)
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def show_page(page: Path) -> None:
+    """Show a page in the user's browser; without one, say on stderr where the page is."""
+    import webbrowser
+
+    if not webbrowser.open(page.resolve().as_uri()):
+        complain(f"gcs: --open: there is no browser; the page is {page}")
 
 
 def can_draw() -> bool:

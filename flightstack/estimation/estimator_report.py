@@ -23,7 +23,6 @@ from flightstack.estimation.kalman import (
     MAG,
     RANGE,
     REST_VELOCITY,
-    Observed,
 )
 from flightstack.estimation.memory import Flags
 from flightstack.mavlink.dialect import mavlink
@@ -36,6 +35,7 @@ _TILT_RAD, _YAW_RAD = math.radians(10.0), math.radians(15.0)
 """Deviations above which tilt and yaw are not aligned."""
 _WIND_VARIANCE = 0.5
 """Variance of the wind [m²/s²] below which it is observed; without fusion of drag it stays above that at the start."""
+_DELAY = EstimatorParams._fields.index("delay_s")
 
 
 class SolutionFlags:
@@ -118,8 +118,8 @@ class EstimatorReport(NamedTuple):
     solution: int
     control: int
     rejected: int
-    nominal: Nominal
-    """State at the horizon."""
+    state: tuple[float, ...]
+    """State at the horizon, 28 numbers in the order of ``Nominal``."""
     variances: tuple[float, ...]
     """Variance of each error state, 27."""
     velocity: tuple[Observation, ...]
@@ -151,6 +151,11 @@ class EstimatorReport(NamedTuple):
         return self.height.ratio if self.control & ControlFlags.BARO_HEIGHT else self.position[2].ratio
 
     @property
+    def nominal(self) -> Nominal:
+        """The state at the horizon."""
+        return _nominal(self.state)
+
+    @property
     def field_ratio(self) -> float:
         """Largest ratio of the magnetic field to its gate."""
         return max(o.ratio for o in self.field)
@@ -171,14 +176,15 @@ def estimator_report(memory: Record, time_s: float, imu_has_failed: bool) -> Est
 
     The flags compare with the time at which the horizon is if no sample is late: without samples the horizon stays.
     """
-    rows = [_observation(Observed(*row)) for row in memory["observations"].tolist()]
+    observed = memory["observations"].tolist()
+    rows, fused_s = [_observation(*row[:4]) for row in observed[: RANGE + 1]], [row[3] for row in observed]
     variances = tuple(np.diagonal(memory["covariance"]).tolist())
-    params, flags = EstimatorParams(*memory["params"].tolist()), Flags(*memory["flags"].tolist())
-    now_s = time_s - params.delay_s
+    flags = Flags(*memory["flags"].tolist())
+    now_s = time_s - float(memory["params"][_DELAY])
     velocity, position = rows[GNSS_VELOCITY : GNSS_VELOCITY + 3], rows[GNSS_POSITION : GNSS_POSITION + 3]
     field, height = rows[MAG : MAG + 3], rows[BARO]
     range_finder = rows[RANGE] if flags.has_range else None
-    control = _control(now_s, flags, rows, variances)
+    control = _control(now_s, flags, fused_s, variances)
     rejected = _rejected(velocity, position, height, field, range_finder)
     solution = _solution(now_s, flags, rows, control, rejected)
     return EstimatorReport(
@@ -187,7 +193,7 @@ def estimator_report(memory: Record, time_s: float, imu_has_failed: bool) -> Est
         solution=solution & ~SolutionFlags.ATTITUDE if imu_has_failed else solution,
         control=control,
         rejected=rejected,
-        nominal=nominal_of(memory),
+        state=tuple(memory["nominal"].tolist()),
         variances=variances,
         velocity=tuple(velocity),
         position=tuple(position),
@@ -200,8 +206,9 @@ def estimator_report(memory: Record, time_s: float, imu_has_failed: bool) -> Est
     )
 
 
-def _observation(row: Observed) -> Observation:
-    return Observation(row.innovation, row.variance, _root(row.test_ratio), row.fused_s)
+def _observation(innovation: float, variance: float, test_ratio: float, fused_s: float) -> Observation:
+    """Return an observation of the first four numbers of ``Observed``."""
+    return Observation(innovation, variance, _root(test_ratio), fused_s)
 
 
 def _root(square: float) -> float:
@@ -210,7 +217,10 @@ def _root(square: float) -> float:
 
 def nominal_of(memory: Record) -> Nominal:
     """Return the state at the horizon of a record of the estimator's ``MEMORY``."""
-    x = memory["nominal"].tolist()
+    return _nominal(memory["nominal"].tolist())
+
+
+def _nominal(x: Sequence[float]) -> Nominal:
     return Nominal(
         Quaternion(*x[0:4]), Vector3(*x[4:7]), Vector3(*x[7:10]), Vector3(*x[10:13]), Vector3(*x[13:16]),
         Vector3(*x[16:19]), Vector3(*x[19:22]), x[22], x[23], x[24], Vector3(*x[25:28]),
@@ -226,17 +236,17 @@ def _resets(found: Record) -> Resets:
     )  # fmt: skip
 
 
-def _is_recent(rows: Sequence[Observation], now_s: float, limit_s: float) -> bool:
-    latest_s = max(row.fused_s for row in rows)
+def _is_recent(fused_s: Sequence[float], now_s: float, limit_s: float) -> bool:
+    latest_s = max(fused_s)
     return latest_s > 0.0 and now_s - latest_s < limit_s
 
 
-def _control(now_s: float, flags: Flags, rows: Sequence[Observation], variances: Sequence[float]) -> int:
+def _control(now_s: float, flags: Flags, fused_s: Sequence[float], variances: Sequence[float]) -> int:
     if not flags.aligned:
         return 0
 
     def fused(at: int, count: int = 1) -> bool:
-        return _is_recent(rows[at : at + count], now_s, AIDED_S)
+        return _is_recent(fused_s[at : at + count], now_s, AIDED_S)
 
     has_gnss = bool(flags.has_gnss)
     at_rest = bool(flags.landed) and fused(REST_VELOCITY, 3)
@@ -299,11 +309,13 @@ def _solution(
     if not flags.aligned:
         return 0
     has_gnss = bool(flags.has_gnss)
-    gnss = [*rows[GNSS_VELOCITY : GNSS_VELOCITY + 2], *rows[GNSS_POSITION : GNSS_POSITION + 2]]
+    gnss = (GNSS_VELOCITY, GNSS_VELOCITY + 1, GNSS_POSITION, GNSS_POSITION + 1)
     at_rest = bool(control & ControlFlags.VEHICLE_AT_REST)
-    horizontal = has_gnss and (at_rest or _is_recent(gnss, now_s, DEAD_RECKONING_S))
-    heights = [rows[BARO], rows[GNSS_POSITION + 2], rows[GNSS_VELOCITY + 2]]
-    vertical = _is_recent(heights, now_s, DEAD_RECKONING_S)
+    horizontal = has_gnss and (
+        at_rest or _is_recent([rows[at].fused_s for at in gnss], now_s, DEAD_RECKONING_S)
+    )
+    heights = (BARO, GNSS_POSITION + 2, GNSS_VELOCITY + 2)
+    vertical = _is_recent([rows[at].fused_s for at in heights], now_s, DEAD_RECKONING_S)
     fall = rows[GNSS_VELOCITY + 2].innovation * -rows[BARO].innovation  # of one sign if the IMU is wrong
     is_true = (
         (SolutionFlags.ATTITUDE, bool(control & ControlFlags.TILT_ALIGN)),

@@ -21,11 +21,11 @@ _SETTLES = 10_000
 """Most rounds of messages at one instant; a mission upload takes two for each item."""
 
 SLOW_RATES_HZ: dict[int, float] = {
-    mavlink.MAVLINK_MSG_ID_ATTITUDE: 4.0,
-    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 4.0,
-    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 4.0,
-    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 2.0,
-    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: 2.0,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: 1.0,
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 1.0,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 1.0,
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 1.0,
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: 1.0,
     mavlink.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
     mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
     mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: 0.5,

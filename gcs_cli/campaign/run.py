@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import time
-import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -33,6 +32,7 @@ from gcs_cli.campaign.seek import run_search
 from gcs_cli.campaign.statistics import pass_probability
 from gcs_cli.campaign.table import write_tables
 from gcs_cli.errors import DONE, FAILED, INTERRUPTED, USAGE, CliError, library
+from gcs_cli.output import show_page
 from gcs_cli.run_directory import LOG_NAME, REPORT_NAME, results_directory
 from gcs_cli.scenarios.pool import Finished, Notice
 from gcs_cli.scenarios.result import Wanted
@@ -83,7 +83,7 @@ def run_campaign(pool: FlightPool, options: CampaignOptions, console: Console) -
 
 def open_report(folder: Path) -> None:
     """Show the report of a campaign in the browser."""
-    webbrowser.open((folder / REPORT).resolve().as_uri())
+    show_page(folder / REPORT)
 
 
 def ordered(journal: Journal) -> list[Row]:

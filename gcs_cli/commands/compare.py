@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,6 +16,7 @@ from flightstack.process.command_line import make_app
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly.fly_display import FlyConsole
 from gcs_cli.logs.reader import warn_if_damaged
+from gcs_cli.output import show_page
 from gcs_cli.report.compare import (
     ComparedRun,
     Row,
@@ -73,7 +73,7 @@ def compare(
     if not as_json:
         print(f"page written to {page}", flush=True)
     if open_page:
-        webbrowser.open(page.resolve().as_uri())
+        show_page(page)
 
 
 def comparison_table(runs: Sequence[ComparedRun]) -> Table:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -18,6 +17,7 @@ from gcs_cli.errors import USAGE, CliError
 from gcs_cli.estimate.log_samples import DECLINATION
 from gcs_cli.estimate.result import Result, estimate_log, quantities, render, rows_of
 from gcs_cli.logs.reader import log_file, read_log, warn_if_damaged
+from gcs_cli.output import show_page
 from gcs_cli.run_directory import write_page
 from gcs_cli.settings import JsonOption, OpenOption, OverwriteOption, check_page, output_of
 
@@ -74,7 +74,7 @@ def estimate(
     if not output.as_json:
         print(f"report written to {page}", flush=True)
     if open_page:
-        webbrowser.open(page.resolve().as_uri())
+        show_page(page)
 
 
 def _given(assignments: Sequence[str]) -> dict[str, float]:

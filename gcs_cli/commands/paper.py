@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import os
-import webbrowser
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +14,7 @@ import typer
 
 from flightstack.process.command_line import make_app
 from gcs_cli.errors import USAGE, CliError
+from gcs_cli.output import show_page
 from gcs_cli.settings import JsonOption, OpenOption, settings_of
 
 app = make_app(add_completion=False)
@@ -79,4 +79,4 @@ def paper(
     else:
         print_results(console, results, out)
     if open_report:
-        webbrowser.open((out / HTML_NAME).resolve().as_uri())
+        show_page(out / HTML_NAME)

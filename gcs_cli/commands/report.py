@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import webbrowser
 from pathlib import Path
 from typing import Annotated
 
@@ -12,6 +11,7 @@ from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.process.command_line import make_app
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.logs.reader import warn_if_damaged
+from gcs_cli.output import show_page
 from gcs_cli.report.compare import read_runs
 from gcs_cli.report.page import render_report
 from gcs_cli.report.poses import find_run
@@ -56,7 +56,7 @@ def report(
     write_text_atomically(page, render_report(flight, read.plan, summary, timing, read.name))
     output_of(context, as_json).say("report", f"report written to {page}", file=str(page), summary=summary)
     if open_page:
-        webbrowser.open(page.resolve().as_uri())
+        show_page(page)
 
 
 def _default(log: Path) -> Path:

@@ -6,7 +6,6 @@ import importlib
 import json
 import threading
 import time
-import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -31,6 +30,7 @@ from gcs_cli.fly.processes import Child, Children, Interruption
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.endpoint import LOOPBACK, UDP_IN, VehicleEndpoint
 from gcs_cli.link.tlog import TlogFile
+from gcs_cli.output import show_page
 from gcs_cli.report.flight_outcome import Code, Outcome
 from gcs_cli.run_directory import (
     REPORT_NAME,
@@ -170,7 +170,7 @@ def run_fly(options: FlyOptions, run: RunOptions, out: Path | None) -> None:
         results.print_summary(console, summary, flown.folder)
     report = flown.folder / REPORT_NAME
     if run.open_report and report.exists():
-        webbrowser.open(report.resolve().as_uri())
+        show_page(report)
     if not outcome.completed:
         if failure is not None:
             complain(f"gcs: {failure}")

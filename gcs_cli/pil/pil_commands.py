@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import time
-import webbrowser
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.fly.fly_display import FlyConsole
 from gcs_cli.fly.fly_flags import FlyOptions
 from gcs_cli.fly.fly_options import checked_plan
-from gcs_cli.output import Output
+from gcs_cli.output import Output, show_page
 from gcs_cli.pil import doctor, replay_run
 from gcs_cli.pil.excitation import excitation
 from gcs_cli.pil.junit import pil_junit
@@ -158,7 +157,7 @@ def _finish(
         except OSError as error:
             raise CliError(f"--junit {verdict.junit}: cannot be written: {error.strerror}") from None
     if verdict.open_report:
-        webbrowser.open((folder / HTML_NAME).resolve().as_uri())
+        show_page(folder / HTML_NAME)
 
 
 def _check_verdict(outcome: Outcome, fail_over: bool) -> None:

@@ -7,13 +7,16 @@ import importlib
 import io
 import os
 import sys
+import webbrowser
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
 from flightstack.process import console
 from flightstack.process.console import report_os_error
 from gcs_cli.fly.fly_display import FlyConsole
+from gcs_cli.output import show_page
 from sim_bridge import command as sim_bridge
 from tests.support.commands import flightstack_command, sim_bridge_command
 
@@ -160,3 +163,15 @@ class Interrupting:
 
     def __getattr__(self, name: str) -> object:
         raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("found", [True, False])
+def test_page_is_named_without_a_browser(
+    found: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page, shown = tmp_path / "report.html", Mock(return_value=found)
+    monkeypatch.setattr(webbrowser, "open", shown)
+    show_page(page)
+    shown.assert_called_once_with(page.as_uri())
+    said = "" if found else f"gcs: --open: there is no browser; the page is {page}\n"
+    assert capsys.readouterr() == ("", said)
