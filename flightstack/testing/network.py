@@ -155,12 +155,18 @@ class EngineRunner:
             left -= count
             if is_outer:
                 engine.pass_requests()
-                self._network.exchange(engine.stack.ground, engine.time_s)
+                if self._may_exchange(until_s):
+                    self._network.exchange(engine.stack.ground, engine.time_s)
                 self._call_due()
             engine.step_is_pending = True
             if is_outer:
                 break
         return most - left
+
+    def _may_exchange(self, until_s: float) -> bool:
+        """Return True if messages may be due: an event ended the period, or ``until_s`` has come."""
+        hub, now_s = self._engine.stack.ground, self._engine.time_s
+        return now_s >= until_s or self._network.idle_s(hub, now_s) <= 0.0
 
     def _idle_until_s(self) -> float:
         """Return the time from which messages are due, or a watch or a timer; −inf if it may be now."""
