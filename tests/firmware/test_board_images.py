@@ -21,8 +21,11 @@ from flightstack.firmware.toolchain.elf import Elf
 from gcs_cli.errors import DONE, USAGE
 from tests.firmware.board_builds import image
 from tests.support.commands import gcs
+from tests.support.tools import NIGHTLY
 
-BUILDS = [(name, compiler) for name in BOARDS for compiler in board_compilers(name)]
+BUILDS = [
+    (name, each) for name in BOARDS for each in board_compilers(name) if NIGHTLY or name != "pico2-riscv"
+]
 
 
 @pytest.mark.parametrize(("name", "compiler"), BUILDS)

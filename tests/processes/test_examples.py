@@ -24,6 +24,7 @@ import yaml
 
 from tests.interop.needs import needs
 from tests.support.plugin_run import KERNELS
+from tests.support.tools import NIGHTLY
 
 needs("mavsdk", "mavsdk")
 
@@ -79,6 +80,7 @@ def test_wheel_is_imported_and_not_this_source_tree(environment: dict[str, str],
     assert [Path(file).is_relative_to(environment["VIRTUAL_ENV"]) for file in files] == [True] * 3
 
 
+@pytest.mark.skipif(not NIGHTLY, reason="installed as by a user, a minute: set NIGHTLY=1")
 def test_example_passes_by_the_command_of_its_workflow(environment: dict[str, str], installed: Path) -> None:
     program, *arguments = shlex.split(commands(GITHUB)[-1])
     assert program == "pytest"

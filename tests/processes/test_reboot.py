@@ -8,13 +8,16 @@ import pytest
 from pyulog import ULog
 
 from tests.support.commands import gcs
+from tests.support.tools import NIGHTLY
 from tests.support.vehicle_processes import vehicle
 
 MISSION = Path(__file__).parents[2] / "missions" / "square.plan"
 
 
 @pytest.mark.parametrize(
-    "options", [(), ("--clock", "realtime"), ("--wait-for-start",), ("--loops", "host")], ids=" ".join
+    "options",
+    [("--clock", "realtime"), ("--loops", "host")] + NIGHTLY * [(), ("--wait-for-start",)],
+    ids=" ".join,
 )
 def test_a_reboot_keeps_plan_and_parameters(tmp_path: Path, options: tuple[str, ...]) -> None:
     with vehicle(tmp_path, "--log", "flight.ulg", "--params", "none", *options) as there:

@@ -28,7 +28,7 @@ from tests.support.commands import gcs, sim_bridge_command
 from tests.support.process import Process
 from tests.support.sample_poses import sample_poses
 from tests.support.synthetic_flight import synthetic_flight_bytes
-from tests.support.tools import missing
+from tests.support.tools import NIGHTLY, missing
 
 SMALL = ("--size", "96x54")
 
@@ -297,6 +297,7 @@ def test_the_window_waits_for_its_drawing_thread_however_slow(monkeypatch: pytes
     assert waits == [None]
 
 
+@pytest.mark.skipif(not NIGHTLY, reason="a renderer in software: set NIGHTLY=1")
 def test_a_window_shows_a_flight_on_a_virtual_display(poses: Path) -> None:
     """The window opens on Xvfb, reads snapshots and closes in order."""
     if shutil.which("Xvfb") is None:

@@ -14,6 +14,7 @@ from sim_bridge.sensors.gnss import GnssReceiver
 from sim_bridge.sensors.magnetometer import Magnetometer
 from tests.support.bytes_engine import BytesEngine
 from tests.support.equal_flights import assert_flies_equally
+from tests.support.tools import NIGHTLY
 
 
 def mission(world: World) -> None:
@@ -145,7 +146,7 @@ FLIGHTS = (
 
 @pytest.mark.parametrize(
     ("state", "fly"),
-    [(state, fly) for state in ("truth", "estimated") for fly in FLIGHTS],
+    [("estimated", fly) for fly in FLIGHTS] + NIGHTLY * [("truth", fly) for fly in FLIGHTS],
 )
 def test_a_flight_is_the_same_as_by_single_ticks_with_bytes(fly: Callable[[World], None], state: str) -> None:
     assert_flies_equally(fly, state=state, vehicle="x_quad", seed=5)
