@@ -47,9 +47,7 @@ SENSOR_GROUPS = (
     TRUTH_GROUP, TRUTH_GLOBAL_GROUP,
 )  # fmt: skip
 TRUTH_INTERVAL_US, GLOBAL_INTERVAL_US, ESTIMATOR_INTERVAL_US = 10_000, 100_000, 500_000
-"""Intervals of PX4's logger."""
-LOCAL_INTERVAL_US = 200_000
-"""Interval of the validity and accuracy of the local position: a report of the estimator takes 0.1 ms."""
+"""Intervals of PX4's logger; the last one is also that of the validity and accuracy of the local position."""
 _FILLS: dict[type, tuple[Group, Callable[[FloatArray, Any], None]]] = {
     MagSample: (MAG_GROUP, fill_mag),
     BaroSample: (BARO_GROUP, fill_baro),
@@ -162,8 +160,8 @@ class SensorRecorder:
             fill_selector(self._log.sampled[SELECTOR_GROUP.name].append(time_us), sensed.lanes)
 
     def local_position(self, time_us: int, sensed: Sensed) -> None:
-        """Update what the next rows of the outer loop record of the estimate; also call after a reset."""
-        self._local_us = next_due(time_us, LOCAL_INTERVAL_US)
+        """Update what the next rows of the outer loop record of the estimate; also call after a reset or a fault."""
+        self._local_us = next_due(time_us, ESTIMATOR_INTERVAL_US)
         fill_local_position(self._recorder.estimate, sensed)
 
     def _record_truth(self, log: FlightLog, time_us: int, truth: FloatArray) -> None:

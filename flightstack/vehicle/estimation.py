@@ -337,7 +337,9 @@ class Estimation:
     def _use_health(self, conditions: int) -> None:
         """Act on the newest health, with its conditions."""
         now, users = self._now, self._users
-        self._conditions = conditions
+        if conditions != self._conditions:
+            self._conditions = conditions
+            self.recorder.local_position(self._time_us, self.sensed())
         users.failsafes.take_health(self.health, self._conditions)
         self._report_sensors()
         failsafes = users.failsafes
