@@ -230,8 +230,8 @@ def fuse_field_axis(f: Filter, axis: int, measured: Vector3, params: EstimatorPa
 def axis_by_yaw(measured: Vector3, at: int) -> int:
     """Return the axis of a field to fuse as number ``at``: of x and y, the one that tells more of the yaw comes first.
 
-    A turn by δ changes x by δ y, and y by −δ x. While the yaw is unknown, an update by the other one would turn it far
-    beyond where its Jacobian holds, for a field that is only stronger or weaker than expected.
+    A turn of a level body by δ changes x by δ y, and y by −δ x. While the yaw is unknown, an update by the other one
+    would turn it far beyond where its Jacobian holds, for a field that is only stronger or weaker than expected.
     """
     if at == 2 or abs(measured.y) > abs(measured.x):
         return at

@@ -17,7 +17,10 @@ from flightstack.estimation.sensor_feed import NewestSamples
 from flightstack.estimation.sensor_samples import GnssFix
 
 SMOOTHING, MOST_MEAN = 0.1, 2.0
-"""Share of the newest ratio in a mean, and the largest mean: PX4's limit of a filtered innovation."""
+"""Share of the newest ratio in a mean, and the largest mean, also of squares by their root: PX4's limit of a filtered
+innovation."""
+SCATTERED = 0.5
+"""Mean square of ratios from which they scatter: noise at a gate of three deviations has 0.11 (at most 0.31)."""
 STUCK_SAMPLES = 100
 """Equal successive samples of the inertial sensor after which it is stuck; PX4's limit. Noise changes the last bits."""
 MISSING_FIX_S, STUCK_S = 1.0, 1.0
@@ -80,6 +83,7 @@ class HealthSummary(NamedTuple):
 
     mean_ratios: Annotated[FloatArray, RANGE]
     """Of GNSS, barometer and magnetometer; see ``_follow_ratio``."""
+    mean_squares: Annotated[FloatArray, RANGE]
     unaided_s: float
     refused_s: float
     lag_s: float
@@ -109,18 +113,29 @@ def _largest(values: FloatArray, first: int, count: int) -> float:
 
 
 @compiled
-def _follow_ratio(mean: float, o: ObservedRecord) -> float:
-    """Return the mean of the ratios of innovations to their gates after the newest one.
+def _follow_ratio(s: SummaryRecord, row: int, o: ObservedRecord) -> None:
+    """Update the mean ratio of innovations to their gate, with their signs, and that of the squares.
 
-    Ratios have the sign of the innovation: the mean of noise is zero, ± 0.08 at a gate of three deviations, that of an
-    error of the estimate is not. The mean of the magnitudes is 0.4 at this gate without any error, hardly below the
-    limit.
+    The mean of noise is zero, that of an error of the estimate is not: ± 0.08 at a gate of three deviations and a
+    measurement an interval. The largest magnitude of three axes is 0.44 in the mean without any error, hardly below
+    the limit. Errors that alternate cancel in the mean, and are found by the mean square.
     """
     sign = -1.0 if o["innovation"] < 0.0 else 1.0
+    mean, square = s["mean_ratios"][row], s["mean_squares"][row]
     mean += SMOOTHING * (sign * math.sqrt(o["test_ratio"]) - mean)
-    if not abs(mean) <= MOST_MEAN:  # also if the ratio is NaN
-        return sign * MOST_MEAN
-    return mean
+    square += SMOOTHING * (o["test_ratio"] - square)
+    if not square <= MOST_MEAN * MOST_MEAN:  # also if the ratio is NaN
+        square = MOST_MEAN * MOST_MEAN
+    if not abs(mean) <= MOST_MEAN:
+        mean = sign * MOST_MEAN
+    s["mean_ratios"][row], s["mean_squares"][row] = mean, square
+
+
+@compiled
+def _ratio(s: SummaryRecord, first: int, count: int) -> float:
+    """Return the largest mean ratio of ``count`` rows, or the root of the mean square if they scatter."""
+    square = _largest(s["mean_squares"], first, count)
+    return math.sqrt(square) if square > SCATTERED else _largest(s["mean_ratios"], first, count)
 
 
 @compiled
@@ -136,13 +151,10 @@ def _summarise(m: MemoryRecord, s: SummaryRecord) -> None:
     s["velocity_m_s"] = math.sqrt(p[VELOCITY, VELOCITY] + p[VELOCITY + 1, VELOCITY + 1])
     s["tilt_rad"] = math.sqrt(max(p[ATTITUDE, ATTITUDE], p[ATTITUDE + 1, ATTITUDE + 1]))
     s["gyro_bias_rad_s"], s["accel_bias_m_s2"] = _largest(x, GYRO_BIAS + 1, 3), _largest(x, ACCEL_BIAS + 1, 3)
-    means = s["mean_ratios"]
     for row in range(RANGE):
-        means[row] = _follow_ratio(means[row], o[row])
-    s["velocity_ratio"] = _largest(means, GNSS_VELOCITY, 3)
-    s["position_ratio"] = _largest(means, GNSS_POSITION, 2)
-    s["height_ratio"] = _largest(means, BARO, 1)
-    s["heading_ratio"] = _largest(means, MAG, 3)
+        _follow_ratio(s, row, o[row])
+    s["velocity_ratio"], s["position_ratio"] = _ratio(s, GNSS_VELOCITY, 3), _ratio(s, GNSS_POSITION, 2)
+    s["height_ratio"], s["heading_ratio"] = _ratio(s, BARO, 1), _ratio(s, MAG, 3)
 
 
 @compiled

@@ -26,7 +26,7 @@ from sim_bridge.simulator import SIMULATOR_COMPONENT, Simulator
 _PLANT = "flightstack.testing.setup:compile_plant"
 _TIMING_US = 1_000_000
 """Interval of ``loop_timing`` in the log."""
-_MARGIN_S = 1e-6
+MARGIN_S = 1e-6
 """Above the rounding of times in seconds, below their resolution."""
 
 
@@ -201,7 +201,7 @@ class Engine:
             self.settle()
             done = self._run_from_outer(self._most(most, until_s))
         if done and not self._left:
-            return done, self._ends_period() and not (self._is_idle and self.time_s < until_s - _MARGIN_S)
+            return done, self._ends_period() and not (self._is_idle and self.time_s < until_s - MARGIN_S)
         if not done:
             self._is_idle = False
             if self.tick():
@@ -226,7 +226,7 @@ class Engine:
         period_s = self._divisor * self._interval_us * 1e-6
         until_timing_s = (self._next_timing_us - self._now.time_us) * 1e-6
         idle_s = min(until_s - self.time_s, until_timing_s)
-        periods = 1 + math.floor((idle_s - _MARGIN_S) / period_s) if idle_s > period_s else 1
+        periods = 1 + math.floor((idle_s - MARGIN_S) / period_s) if idle_s > period_s else 1
         return min(most, periods * self._divisor)
 
     def _run_quiet(self, most: int) -> int:

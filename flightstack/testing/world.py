@@ -85,7 +85,7 @@ class World:
     ) -> None:
         """Build the world of ``setup``, or of ``conditions`` with the names of ``Setup``; raise ConfigError.
 
-        ``telemetry``: stream at PX4's default rates to ``gcs.received``, instead of each message once a second.
+        ``telemetry``: stream at PX4's default rates to ``gcs.received``, instead of each message once a second at most.
         """
         if setup is not None and conditions:
             raise TypeError(f"give a setup or conditions, not both: {', '.join(conditions)}")

@@ -169,8 +169,8 @@ class LiveDisplay:
 
     def _table(self) -> Table:
         table = new_table()
-        for title in ("flight", "margin", "closest expectation", "inputs"):
-            table.add_column(title, no_wrap=True, overflow="ellipsis")
+        for title, least in (("flight", 6), ("margin", 7), ("closest expectation", 19), ("inputs", None)):
+            table.add_column(title, no_wrap=True, overflow="ellipsis", min_width=least)
         for row in self._worst:
             style = "" if row["passed"] else "red"
             margin = f"{100.0 * row['robustness']:.1f} %"

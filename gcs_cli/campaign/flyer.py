@@ -146,8 +146,19 @@ def check_flights(campaign: Campaign, flights: Sequence[PlannedFlight]) -> None:
             if number in checked:
                 check_scenario(scenario)
         except ConfigError as error:
+            if _refused(campaign) == str(error):
+                raise  # without inputs too
             inputs = ", ".join(
                 f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}"
                 for name, value in flight.inputs.items()
             )
             raise ConfigError(campaign.path, f"vary, flight {number} ({inputs})", str(error)) from None
+
+
+def _refused(campaign: Campaign) -> str:
+    """Return the reason why the scenario cannot be flown without inputs, or nothing."""
+    try:
+        check_scenario(campaign.scenario({}))
+    except ConfigError as error:
+        return str(error)
+    return ""

@@ -111,12 +111,12 @@ SQUARE_LIMITS = Errors(1.0, 2.0, 0.15, 0.7, 0.4, 1.5)
 FAULTS = [
     ("imu1:off", "missing"),
     ("gyro1:bias=3,0,0", "disagrees with inertial sensor 2"),
+    ("gyro1:noise=100", "disagrees with inertial sensor 2"),
     ("accel1:bias=0.5,0,0", "disagrees with inertial sensor 2"),
 ]
 MORE_FAULTS = [
     ("imu1:freeze", "stuck"),
     ("gyro1:bias=10,10,10", "disagrees with inertial sensor 2"),
-    ("gyro1:noise=100", "disagrees with inertial sensor 2"),
 ]
 
 

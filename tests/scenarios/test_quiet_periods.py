@@ -9,6 +9,7 @@ import pytest
 from flightstack.params import vehicle
 from flightstack.process.quiet_block import QuietBlock
 from flightstack.testing import ConditionTimeoutError, World
+from flightstack.testing.network import Network
 from flightstack.testing.state import State
 from sim_bridge.sensors.gnss import GnssReceiver
 from sim_bridge.sensors.magnetometer import Magnetometer
@@ -290,3 +291,27 @@ def test_a_condition_times_out_after_whole_periods(engine: dict, condition: obje
         with pytest.raises(ConditionTimeoutError):
             world.run_until(condition, 0.344)
         assert world.time_s - began_s == pytest.approx(0.35, abs=1e-9)  # one more: the limit itself counts
+
+
+@pytest.mark.parametrize("telemetry", [False, True])
+@pytest.mark.parametrize("start_s", [0.07, 0.08, 0.29])
+def test_messages_come_as_with_an_exchange_in_each_period(
+    start_s: float, telemetry: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A client that connects at any time has streams whose times are rounded in other ways."""
+
+    def received() -> list[tuple[float, str]]:
+        found: list[tuple[float, str]] = []
+        with World(telemetry=telemetry) as world:
+            world.run_for(start_s)
+            world.power_cycle(0.37)
+            tablet = world.add_client("tablet")
+            tablet.session.observe = lambda message: found.append((world.time_s, str(message)))
+            world.takeoff(2.0)
+            world.run_for(8.0)
+        return found
+
+    quiet = received()
+    monkeypatch.setattr(Network, "idle_s", lambda *_: 0.0)
+    assert quiet == received()
+    assert len(quiet) > 50

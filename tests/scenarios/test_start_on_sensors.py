@@ -99,3 +99,14 @@ def test_vehicle_that_is_ready_stays_ready(seed: int) -> None:
         for _ in range(200):
             world.run_for(0.1)
             assert world.engine.stack.is_ready, world.time_s
+
+
+@pytest.mark.parametrize("fault", ["sensor:mag:noise=0.3", "sensor:baro:noise=8"])
+def test_errors_that_alternate_prevent_arming(fault: str) -> None:
+    with World(state="estimated", seed=3) as world:
+        world.wait_until_ready()
+        world.fault(fault)
+        world.run_for(2.0)
+        for _ in range(150):
+            world.run_for(0.1)
+            assert not world.engine.stack.is_ready, world.time_s

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import io
-import os
 from collections.abc import Generator, Mapping
 from pathlib import Path
-from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -288,6 +286,13 @@ def test_inputs_out_of_range_are_refused_before_a_flight(folder: Path, vary: str
     assert sentence.replace("{folder}", str(folder)) in str(refused.value)
 
 
+def test_an_error_of_all_flights_names_no_flight(folder: Path) -> None:
+    scenario = SCENARIO.replace("{weak}", "0.9").replace('"hop"', '"hopp"')
+    found = campaign(folder, vary="[vary]\nwind.gust_m_s = { uniform = [0, 2] }\n", scenario=scenario)
+    with pytest.raises(ConfigError, match=r"^[^ ]*c.toml: [^ ]*hopp: cannot be read"):
+        check_flights(found, plan_flights(found))
+
+
 def test_whole_numbers_of_a_grid_are_checked_between_its_ends(folder: Path) -> None:
     scenario = SCENARIO.replace("{weak}", "0.9").replace("[wind]", "[[client]]\nname = 'a'\n[wind]")
     vary = "[vary]\n'client[0].system_id' = { uniform = [1, 4], steps = 3 }"
@@ -386,13 +391,3 @@ def test_a_flight_has_the_same_seed_in_a_longer_campaign() -> None:
 )
 def test_nominal_value_of_an_input(folder: Path, name: str, value: float) -> None:
     assert campaign(folder).nominal(name) == value
-
-
-def test_a_row_counts_if_ctrl_c_comes_after_its_write(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with open_journal(tmp_path, record_of("plan", {}, ())) as journal:
-        monkeypatch.setattr(os, "fsync", Mock(side_effect=KeyboardInterrupt))
-        with pytest.raises(KeyboardInterrupt):
-            journal.add({"flight": 1})
-        assert (len(journal.rows), journal.count()) == (0, 1)

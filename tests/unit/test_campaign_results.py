@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 from rich.console import Console
@@ -300,3 +301,13 @@ def test_plan_that_changes_during_the_flights_is_no_result(tmp_path: Path) -> No
     assert not (options.folder / "flights.parquet").exists()
     assert run_campaign(Pool(), replace(options, overwrite=True), console) == 0
     assert (options.folder / "flights.parquet").exists()
+
+
+def test_a_row_counts_if_ctrl_c_comes_after_its_write(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with open_journal(tmp_path, record_of("plan", {}, ())) as journal:
+        monkeypatch.setattr(os, "fsync", Mock(side_effect=KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            journal.add({"flight": 1})
+        assert (len(journal.rows), journal.count()) == (0, 1)

@@ -20,8 +20,9 @@ void fs_fuse_field_axis(fs_filter *f, int32_t axis, const fs_vector3 *measured, 
 /*
  * Return the axis of a field to fuse as number at: of x and y, the one that tells more of the yaw comes first.
  *
- * A turn by delta changes x by delta y, and y by -delta x. While the yaw is unknown, an update by the other one would
- * turn it far beyond where its Jacobian holds, for a field that is only stronger or weaker than expected.
+ * A turn of a level body by delta changes x by delta y, and y by -delta x. While the yaw is unknown, an update by the
+ * other one would turn it far beyond where its Jacobian holds, for a field that is only stronger or weaker than
+ * expected.
  *
  * fusion.py:230
  */

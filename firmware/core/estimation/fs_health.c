@@ -13,10 +13,11 @@
 #define FS_ACCEL_BIAS 12
 #define FS_SMOOTHING FS_LIT(0.1)
 #define FS_MOST_MEAN FS_LIT(2.0)
+#define FS_SCATTERED FS_LIT(0.5)
 #define FS_BARO 6
 #define FS_MAG 7
 
-/* health.py:104 */
+/* health.py:108 */
 static fs_real largest(const fs_real values[], int32_t first, int32_t count)
 {
     fs_real largest_ = FS_LIT(0.0);
@@ -27,25 +28,39 @@ static fs_real largest(const fs_real values[], int32_t first, int32_t count)
 }
 
 /*
- * Return the mean of the ratios of innovations to their gates after the newest one.
+ * Update the mean ratio of innovations to their gate, with their signs, and that of the squares.
  *
- * Ratios have the sign of the innovation: the mean of noise is zero, +- 0.08 at a gate of three deviations, that of
- * an error of the estimate is not. The mean of the magnitudes is 0.4 at this gate without any error, hardly below the
- * limit.
+ * The mean of noise is zero, that of an error of the estimate is not: +- 0.08 at a gate of three deviations and a
+ * measurement an interval. The largest magnitude of three axes is 0.44 in the mean without any error, hardly below
+ * the limit. Errors that alternate cancel in the mean, and are found by the mean square.
  *
- * health.py:112
+ * health.py:116
  */
-static fs_real follow_ratio(fs_real mean, const fs_observed *o)
+static void follow_ratio(fs_health_summary *s, int32_t row, const fs_observed *o)
 {
     const fs_real sign = o->innovation < FS_LIT(0.0) ? FS_LIT(-1.0) : FS_LIT(1.0);
-    const fs_real new_mean = mean + FS_SMOOTHING * (sign * fs_sqrt(o->test_ratio) - mean);
-    if (!(fs_abs(new_mean) <= FS_MOST_MEAN)) { /* also if the ratio is NaN */
-        return sign * FS_MOST_MEAN;
+    fs_real mean = s->mean_ratios[row];
+    fs_real square = s->mean_squares[row];
+    mean += FS_SMOOTHING * (sign * fs_sqrt(o->test_ratio) - mean);
+    square += FS_SMOOTHING * (o->test_ratio - square);
+    if (!(square <= FS_MOST_MEAN * FS_MOST_MEAN)) { /* also if the ratio is NaN */
+        square = FS_MOST_MEAN * FS_MOST_MEAN;
     }
-    return new_mean;
+    if (!(fs_abs(mean) <= FS_MOST_MEAN)) {
+        mean = sign * FS_MOST_MEAN;
+    }
+    s->mean_ratios[row] = mean;
+    s->mean_squares[row] = square;
 }
 
-/* Write the summary of an estimator's record; it holds the mean ratios of the last call. health.py:127 */
+/* Return the largest mean ratio of count rows, or the root of the mean square if they scatter. health.py:135 */
+static fs_real ratio(const fs_health_summary *s, int32_t first, int32_t count)
+{
+    const fs_real square = largest(s->mean_squares, first, count);
+    return square > FS_SCATTERED ? fs_sqrt(square) : largest(s->mean_ratios, first, count);
+}
+
+/* Write the summary of an estimator's record; it holds the mean ratios of the last call. health.py:142 */
 static void summarise(const fs_estimator_memory *m, fs_health_summary *s)
 {
     const fs_real position_s = fs_min(m->filter.observations[FS_GNSS_POSITION].fused_s,
@@ -64,15 +79,15 @@ static void summarise(const fs_estimator_memory *m, fs_health_summary *s)
     s->gyro_bias_rad_s = largest(m->filter.nominal, FS_GYRO_BIAS + 1, 3);
     s->accel_bias_m_s2 = largest(m->filter.nominal, FS_ACCEL_BIAS + 1, 3);
     for (int32_t row = 0; row < 10; row++) {
-        s->mean_ratios[row] = follow_ratio(s->mean_ratios[row], &m->filter.observations[row]);
+        follow_ratio(s, row, &m->filter.observations[row]);
     }
-    s->velocity_ratio = largest(s->mean_ratios, FS_GNSS_VELOCITY, 3);
-    s->position_ratio = largest(s->mean_ratios, FS_GNSS_POSITION, 2);
-    s->height_ratio = largest(s->mean_ratios, FS_BARO, 1);
-    s->heading_ratio = largest(s->mean_ratios, FS_MAG, 3);
+    s->velocity_ratio = ratio(s, FS_GNSS_VELOCITY, 3);
+    s->position_ratio = ratio(s, FS_GNSS_POSITION, 2);
+    s->height_ratio = ratio(s, FS_BARO, 1);
+    s->heading_ratio = ratio(s, FS_MAG, 3);
 }
 
-/* health.py:149 */
+/* health.py:161 */
 void fs_health_kernel(const fs_estimator_memory *memory, fs_health_summary *summary)
 {
     summarise(memory, summary);

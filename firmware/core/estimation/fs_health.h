@@ -17,6 +17,7 @@
 /* What the estimator's memory says of EstimateHealth. */
 typedef struct {
     fs_real mean_ratios[10];
+    fs_real mean_squares[10];
     fs_real unaided_s;
     fs_real refused_s;
     fs_real lag_s;
@@ -31,7 +32,7 @@ typedef struct {
     fs_real heading_ratio;
 } fs_health_summary;
 
-/* Write the summary of an estimator's memory. health.py:149 */
+/* Write the summary of an estimator's memory. health.py:161 */
 void fs_health_kernel(const fs_estimator_memory *memory, fs_health_summary *summary);
 
 #endif
