@@ -169,8 +169,11 @@ class LiveDisplay:
 
     def _table(self) -> Table:
         table = new_table()
-        for title, least in (("flight", 6), ("margin", 7), ("closest expectation", 19), ("inputs", None)):
-            table.add_column(title, no_wrap=True, overflow="ellipsis", min_width=least)
+        table.expand = True
+        table.add_column("flight", no_wrap=True)
+        table.add_column("margin", no_wrap=True)
+        table.add_column("closest expectation", no_wrap=True, overflow="ellipsis", max_width=32)
+        table.add_column("inputs", no_wrap=True, overflow="ellipsis", ratio=1)  # the others stay whole
         for row in self._worst:
             style = "" if row["passed"] else "red"
             margin = f"{100.0 * row['robustness']:.1f} %"

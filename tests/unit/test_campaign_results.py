@@ -7,6 +7,7 @@ import errno
 import io
 import json
 import os
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -259,6 +260,14 @@ def test_lost_flight_is_named_and_no_longer_under_way() -> None:
     shown = console.file.getvalue()
     assert "LOST  flight 2: was killed by signal 9" in shown
     assert shown.index("in flight: 2, 3") < shown.index("in flight: 3") < shown.rindex("in flight: none")
+
+
+def test_long_inputs_leave_room_for_flight_and_margin() -> None:
+    console = Console(file=io.StringIO(), force_terminal=True, width=80, color_system=None)
+    long = {f"wind.mean_m_s[{number}]": 0.25 for number in range(9)}
+    LiveDisplay(console, 5, [{**each, "inputs": long, "closest": "x" * 50} for each in ROWS]).close()
+    shown = console.file.getvalue()
+    assert re.search(r"\b5 +-\d+\.\d %  x{31}…  wind\.mean", shown), shown
 
 
 def test_lines_show_failures_and_each_tenth() -> None:
