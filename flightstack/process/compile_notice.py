@@ -9,7 +9,7 @@ from typing import Any
 
 _COMPILATION = "numba:compile"
 """Numba's event of the compilation of one function."""
-_LOOPS_S, _ESTIMATOR_S = 5, 20
+_LOOPS_S, _ESTIMATOR_S = 7, 20
 """Time of a vehicle on the true state, and of one on its sensors."""
 
 

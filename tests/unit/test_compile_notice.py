@@ -118,7 +118,7 @@ def test_compile_notice_counts_kernels_not_their_parts() -> None:
         assert whole(1.5) == 5.0
         assert whole(2.5) == 7.0
     assert said == [
-        "compiling kernels, once; this takes about 5 s on two idle cores",
+        "compiling kernels, once; this takes about 7 s on two idle cores",
         "compiling kernel 2 of 2: whole",
     ]
 
