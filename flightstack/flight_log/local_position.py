@@ -68,8 +68,8 @@ LOCAL_POSITION = Topic(
 SENSED_OUTER = Group("outer", AT.size, (LOCAL_POSITION, *OUTER_TOPICS[1:]))
 
 
-def fill_local_position(row: FloatArray, sensed: Sensed) -> None:
-    """Fill the columns of the estimate, shape (23,)."""
+def fill_local_position(row: FloatArray, sensed: Sensed) -> bool:
+    """Fill the columns of the estimate, shape (23,); return True if the horizontal position is valid."""
     report, resets, variances = sensed.report, sensed.report.resets, sensed.report.variances
     solution, has_origin = report.solution, sensed.has_origin
     horizontal = has_origin and bool(solution & SolutionFlags.POSITION_RELATIVE)
@@ -85,3 +85,4 @@ def fill_local_position(row: FloatArray, sensed: Sensed) -> None:
         has_origin and bool(solution & SolutionFlags.POSITION_ABSOLUTE), has_origin and vertical,
         bool(report.control & ControlFlags.INERTIAL_DEAD_RECKONING),
     )  # fmt: skip
+    return horizontal

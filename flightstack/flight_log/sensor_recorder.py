@@ -48,6 +48,8 @@ SENSOR_GROUPS = (
 )  # fmt: skip
 TRUTH_INTERVAL_US, GLOBAL_INTERVAL_US, ESTIMATOR_INTERVAL_US = 10_000, 100_000, 500_000
 """Intervals of PX4's logger; the last one is also that of the validity and accuracy of the local position."""
+INVALID_INTERVAL_US = 100_000
+"""That interval while the position is not valid."""
 _FILLS: dict[type, tuple[Group, Callable[[FloatArray, Any], None]]] = {
     MagSample: (MAG_GROUP, fill_mag),
     BaroSample: (BARO_GROUP, fill_baro),
@@ -85,7 +87,7 @@ class SensorRecorder:
             self._imu_row = self._no_row if log is None else log.sampled[IMU_GROUP.name].append
             if log is not None:
                 self.offset_m[:2] = self._frame.to_ned(self._true_frame.origin)[:2]
-                self._truth_us = self._global_us = self._estimator_us = 0
+                self._truth_us = self._global_us = self._estimator_us = self._local_us = 0
                 log.binary_information(ESTIMATOR_START, estimator())
 
     def imu_row(self, time_us: int) -> FloatArray:
@@ -161,8 +163,8 @@ class SensorRecorder:
 
     def local_position(self, time_us: int, sensed: Sensed) -> None:
         """Update what the next rows of the outer loop record of the estimate; also call after a reset or a fault."""
-        self._local_us = next_due(time_us, ESTIMATOR_INTERVAL_US)
-        fill_local_position(self._recorder.estimate, sensed)
+        is_valid = fill_local_position(self._recorder.estimate, sensed)
+        self._local_us = next_due(time_us, ESTIMATOR_INTERVAL_US if is_valid else INVALID_INTERVAL_US)
 
     def _record_truth(self, log: FlightLog, time_us: int, truth: FloatArray) -> None:
         plain(store_truth)(log.sampled[TRUTH_GROUP.name].append(time_us), truth, self.offset_m)

@@ -162,7 +162,7 @@ def test_source_of_the_state_is_checked(conditions: dict, text: str) -> None:
 
 
 KNOWN_ROW = 30
-"""Row of the log, of 100 Hz, after the first update of the validity, which has 5 Hz."""
+"""Row of the log, of 100 Hz, after the first fix at the horizon: until it is valid, the validity has 10 Hz."""
 
 
 @pytest.mark.parametrize("bias", ["15,-10,0", "15,-10,10"])
