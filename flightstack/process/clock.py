@@ -21,6 +21,11 @@ from flightstack.params.config import DEFAULT_OUTER_HZ
 
 MIN_INNER_HZ, MAX_INNER_HZ = 10.0, 20_000.0
 WINDOW = 4096
+WATCHED_NS, WATCHED_SHARE = 100_000, 0.05
+"""Time before a deadline in which the scheduler reads the clock instead of sleeping, and its largest share of a period.
+
+A machine wakes a sleeping process late: here 60 µs in the median and 100 µs at the 99th percentile, in C too.
+"""
 
 
 def minimise_timer_slack() -> None:
@@ -149,15 +154,19 @@ class DeadlineScheduler:
         self._now_ns = now_ns
         self._sleep_s = sleep_s
         self._deadline_ns = now_ns()
+        self._watched_ns = min(WATCHED_NS, round(WATCHED_SHARE * timing.period_ns))
 
     def wait(self) -> int:
-        """Sleep until the next deadline; return how many periods have passed since the last one (1: on time)."""
+        """Wait for the next deadline; return how many periods have passed since the last one (1: on time)."""
         period = self._timing.period_ns
         self._deadline_ns += period
         periods = 1
+        wake_ns = self._deadline_ns - self._watched_ns
         now = self._now_ns()
+        while now < wake_ns:
+            self._sleep_s((wake_ns - now) * 1e-9)
+            now = self._now_ns()
         while now < self._deadline_ns:
-            self._sleep_s((self._deadline_ns - now) * 1e-9)
             now = self._now_ns()
         late = now - self._deadline_ns
         self._timing.lateness.add(late)
