@@ -86,7 +86,7 @@ class FlightRecorder:
 
     @property
     def battery_due_us(self) -> int:
-        """Time from which the next outer tick records the battery."""
+        """Time from which ``battery`` records it."""
         return self._battery_due_us
 
     @property
@@ -114,7 +114,11 @@ class FlightRecorder:
         self._store_outer(row, state, setpoint, attitude_target, loop_flags)
         if len(self.estimate):
             row[OUTER.size :] = self.estimate
-        if time_us >= self._battery_due_us:
+        self.battery(time_us)
+
+    def battery(self, time_us: int) -> None:
+        """Record the battery if it is due; after the row of the outer tick at ``time_us``."""
+        if self._log is not None and time_us >= self._battery_due_us:
             self._battery_due_us = next_due(time_us, _BATTERY_INTERVAL_US)
             self._write_battery(time_us)
 

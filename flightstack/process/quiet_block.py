@@ -225,6 +225,8 @@ class QuietBlock:
         if ticks:
             self._autopilot.pass_by(ticks, began_us + ticks * interval_us, rows[ticks - 1])
         self._sensors.count_rows()
+        if ticks and last_outer == ticks - 1:
+            stack.recorder.battery(began_us + ticks * interval_us)
         if flown:
             self._simulator.pass_by(flown, result)
         if sensed:

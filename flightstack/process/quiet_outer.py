@@ -78,13 +78,19 @@ class QuietOuter:
         return np.array([calls], OUTER_CALLS)
 
     def room(self, time_us: int) -> int:
-        """Return for how many ticks from the outer tick at ``time_us`` the open log takes rows without other work."""
-        log, until_us = self._recorder.log, self._autopilot.nominal_until_us
-        outers = self._no_log.capacity
-        if log is not None:
-            until_us = min(until_us, self._recorder.battery_due_us)
-            outers = log.outer.capacity - log.outer.n
-        return self._divisor * max(0, min(-((time_us - until_us) // self._period_us), outers))
+        """Return for how many ticks from the outer tick at ``time_us`` the open log takes rows without other work.
+
+        The last one may be an outer tick after which the battery is due.
+        """
+        log, most = self._recorder.log, self._ticks_before(self._autopilot.nominal_until_us, time_us)
+        if log is None:
+            return min(most, self._divisor * self._no_log.capacity)
+        until_battery = 1 + self._ticks_before(self._recorder.battery_due_us, time_us)
+        return min(most, until_battery, self._divisor * (log.outer.capacity - log.outer.n))
+
+    def _ticks_before(self, until_us: int, time_us: int) -> int:
+        """Return how many ticks precede the first outer tick from ``until_us`` on, from that at ``time_us``."""
+        return self._divisor * max(0, -((time_us - until_us) // self._period_us))
 
     def arguments(self) -> tuple[Any, ...]:
         """Return the kernel's argument ``outer``."""

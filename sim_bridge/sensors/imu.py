@@ -172,7 +172,7 @@ class ImuSet:
             write_numbers(record, numbers)
             _set_errors(record, stream)
         self._set_motion(vehicle, state)
-        self.noise: FloatArray = np.zeros((_ROWS, count, IMU_NOISE))
+        self.noise: FloatArray = np.zeros((2 * _ROWS, count, IMU_NOISE))
         """Deviates of the next measurements, for ``measure_imu``."""
         self._left = 0  # rows of noise
         self._call = measure_imu
@@ -213,8 +213,8 @@ class ImuSet:
         self._call(self.motion, self.records, state, rotor_speed, self.noise, wires)
 
     def rows_left(self) -> int:
-        """Return for how many of the next measurements there is noise, at least for one; draw new noise if for none."""
-        if self._left == 0:
+        """Return for how many of the next measurements there is noise, at least 256; draw more if for fewer."""
+        if self._left < _ROWS:
             self._draw()
         return self._left
 
@@ -223,9 +223,12 @@ class ImuSet:
         self._left -= count
 
     def _draw(self) -> None:
+        """Move the rows that are left to the front, and draw more after them."""
+        row, left = int(self.motion[0]["row"]), self._left
+        self.noise[:left] = self.noise[row : row + left]
         for index, stream in enumerate(self._streams):
-            self.noise[:, index] = stream.rows(_ROWS)
-        self._left, self.motion[0]["row"] = _ROWS, 0
+            self.noise[left : left + _ROWS, index] = stream.rows(_ROWS)
+        self._left, self.motion[0]["row"] = left + _ROWS, 0
 
     def _refill(self, *arrays: Any) -> None:
         self._draw()
