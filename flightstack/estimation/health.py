@@ -346,6 +346,19 @@ class HealthMonitor:
         self._update(self._memory, self.watch, has_origin, limit_m, time_s)
         return self.health()
 
+    def magnitudes(self) -> tuple[float, float, float, float]:
+        """Return the ratios of velocity, position, height and heading as root mean squares, as of the last update.
+
+        The noise of a measurement is in those of all filters that take it, so that their difference is of the filters.
+        The means with their signs have a noise of their own.
+        """
+        squares = self.watch["summary"]["mean_squares"][0].tolist()
+        kinds = (GNSS_VELOCITY, 3), (GNSS_POSITION, 2), (BARO, 1), (MAG, 3)
+        velocity, position, height, heading = (
+            math.sqrt(max(squares[row : row + count])) for row, count in kinds
+        )
+        return velocity, position, height, heading
+
     def health(self) -> EstimateHealth:
         """Return the health of the last update."""
         return EstimateHealth(*self._health.item())

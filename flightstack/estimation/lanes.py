@@ -135,8 +135,10 @@ class Lanes:
             return healths[0], False
         since_s = self._compared_us * 1e-6
         self.facts = tuple(
-            _facts_of(view, lane, health, since_s)
-            for view, lane, health in zip(self._views, self._feed.lanes, healths, strict=True)
+            _facts_of(view, lane, health, combined_ratio(*monitor.magnitudes()), since_s)
+            for view, lane, health, monitor in zip(
+                self._views, self._feed.lanes, healths, self._monitors, strict=True
+            )
         )
         dt_s = (time_us - self._compared_us) * 1e-6 if self._compared_us else 0.0
         self._compared_us = time_us
@@ -184,11 +186,8 @@ def _repeats(lane: Lane) -> int:
     return lane.newest.imu_track.repeats
 
 
-def _facts_of(view: _View, lane: Lane, health: EstimateHealth, since_s: float) -> LaneFacts:
-    """Return the facts of a lane; ``since_s`` is the time of the last ones."""
-    ratio = combined_ratio(
-        health.velocity_ratio, health.position_ratio, health.height_ratio, health.heading_ratio
-    )
+def _facts_of(view: _View, lane: Lane, health: EstimateHealth, ratio: float, since_s: float) -> LaneFacts:
+    """Return the facts of a lane; ``ratio`` is the combined one, ``since_s`` the time of the last facts."""
     means = lane.newest.imu_track.mean_since(since_s)
     measures = health.imu_age_s <= IMU_MISSING_S and not health.imu_is_stuck
     if means is None or not (health.aligned and measures and math.isfinite(ratio + health.tilt_rad)):

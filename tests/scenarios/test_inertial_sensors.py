@@ -62,6 +62,13 @@ def go(world: World) -> None:
     world.run_for(1.5)
 
 
+def fly_squares(world: World) -> None:
+    hover(world)
+    for corner in ((6.0, 0.0), (6.0, 6.0), (0.0, 6.0), (0.0, 0.0)) * 2:
+        world.goto(*corner)
+        world.run_for(7.5)
+
+
 def land(world: World) -> None:
     hover(world)
     world.land()
@@ -224,3 +231,13 @@ def test_estimator_in_c_refuses_several_inertial_sensors(vehicle: str) -> None:
     with World(vehicle=vehicle, loops="c", params={"EKF2_MULTI_IMU": 1}) as world:
         hover(world)
         assert world.state.altitude_m > 3.0
+
+
+@pytest.mark.parametrize("seed", [6, 9])
+def test_healthy_sensors_are_not_exchanged(vehicle: str, seed: int) -> None:
+    """Means of ratios with their signs, with a noise of their own in each filter, differed enough here."""
+    with World(vehicle=vehicle, state="estimated", seed=seed) as world:
+        world.wait_until_ready()
+        fly_squares(world)
+        assert selected(world) == 1
+        assert not any("nertial sensor" in text for text in world.texts)
