@@ -258,22 +258,18 @@ class Flight:
 
         ``text`` may end in ``after EVENT`` or ``within 20 s of EVENT``, as in ``"altitude_m < 12 after takeoff"``.
         """
-        __tracebackhide__ = True
         return _checked(properties.always(self.signals, *parse_window(text)))
 
     def eventually(self, text: str) -> Margin:
         """Check that an expression holds once, such as ``"mode == 'RETURN' within 20 s of link_cut"``."""
-        __tracebackhide__ = True
         return _checked(properties.eventually(self.signals, *parse_window(text)))
 
     def until(self, text: str, end: str) -> Margin:
         """Check that ``text`` holds at every sample until ``end`` holds, and that ``end`` holds once."""
-        __tracebackhide__ = True
         return _checked(properties.until(self.signals, text, end))
 
     def within(self, trigger: str, reaction: str, limit_s: float) -> Margin:
         """Check that whenever ``trigger`` holds, ``reaction`` holds at most ``limit_s`` later."""
-        __tracebackhide__ = True
         return _checked(properties.within(self.signals, trigger, reaction, limit_s))
 
     def __str__(self) -> str:
@@ -284,7 +280,6 @@ class Flight:
 
 
 def _checked(margin: Margin) -> Margin:
-    __tracebackhide__ = True
     if not margin.holds:
         raise PropertyViolationError(margin)
     return margin

@@ -5,6 +5,7 @@ Every run of pytest in the environment loads this module: it imports nothing hea
 
 from __future__ import annotations
 
+import sys
 import tempfile
 from collections.abc import Generator, Iterator, Sequence
 from pathlib import Path
@@ -25,6 +26,10 @@ _SITL = pytest.StashKey["Sitl"]()
 _SERVERS = pytest.StashKey["SitlServer"]()
 _SECTION = "flightstack"
 """Title of the section in the report of a failed test."""
+_TESTING = "flightstack.testing."
+_OURS = frozenset({"flightstack", "sim_bridge", "gcs_cli"})
+_BELOW_TESTS = _OURS | sys.stdlib_module_names
+"""Packages whose frames are below those of a test."""
 
 
 # ---------------------------------------------------------------------- fixtures
@@ -123,6 +128,8 @@ def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """Add state, setup, files and the command that repeats the test to the report of a failed test."""
+    if call.excinfo is not None and isinstance(item, pytest.Function):
+        _hide_frames_below_test(call.excinfo)
     report = yield
     if report.failed and call.when != "teardown":
         reason = str(call.excinfo.value) if call.excinfo is not None else ""
@@ -131,6 +138,23 @@ def pytest_runtest_makereport(
         except Exception as error:  # the test's own failure must be reported in any case
             report.sections.append((_SECTION, f"no report of the flight: {error!r}"))
     return report
+
+
+def _hide_frames_below_test(error: pytest.ExceptionInfo[BaseException]) -> None:
+    """Hide the frames below the test in the traceback of a refusal, such as that of a bad argument of a World.
+
+    A ``raise`` statement in this project raises a refusal; other errors in its code are defects and show all frames.
+    """
+    frames = error.traceback
+    modules = [str(entry.frame.f_globals.get("__name__")) for entry in frames]
+    packages = [module.partition(".")[0] for module in modules]
+    if error.type is AssertionError or packages[-1] not in _OURS:
+        return
+    is_refusal = str(frames[-1].statement).lstrip().startswith("raise ")
+    if is_refusal and any(name.startswith(_TESTING) for name in modules):
+        for entry, package in zip(frames, packages, strict=True):
+            if package in _BELOW_TESTS:
+                entry.frame.f_locals["__tracebackhide__"] = True
 
 
 def _report_failure(item: pytest.Item, report: pytest.TestReport, reason: str) -> None:

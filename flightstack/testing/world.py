@@ -172,7 +172,6 @@ class World:
         ``condition`` is a function, or an expression such as ``"altitude_m > 2.5"``. Raise ConditionTimeoutError with
         the state after ``timeout_s`` of simulated time.
         """
-        __tracebackhide__ = True
         is_true, is_of_events = condition_of(
             condition, lambda: self.state, lambda: reported_by(self.engine.stack)
         )
@@ -221,7 +220,6 @@ class World:
 
     def wait_for(self, request: Request, what: str) -> None:
         """Wait for the answer of a request; raise RefusedError."""
-        __tracebackhide__ = True
         self.engine.settle()
         hub, end_s = self.engine.stack.ground, self.time_s + _REQUEST_LIMIT_S
         while True:
