@@ -145,7 +145,7 @@ class Vehicle:
             raise ConfigError("--drag", "", "the paper's model has no drag; use --plant rigid or multibody")
         if self.optional_drag_n_s_m is None:
             needs = f"the file of the vehicle {self.name} has no optional_drag_n_s_m"
-            flies = "; its linear_drag_n_s_m acts without --drag" if any(self.linear_drag_n_s_m) else ""
+            flies = "; its linear_drag_n_s_m acts anyway" if any(self.linear_drag_n_s_m) else ""
             raise ConfigError("--drag", "", needs + flies)
         return replace(self, linear_drag_n_s_m=self.optional_drag_n_s_m)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from flightstack.core.errors import ConfigError
 from flightstack.testing.link import Channel
+from flightstack.testing.setup import with_keys
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.plant.faults.checks import Flight, check_faults
 from sim_bridge.plant.faults.schedule import parse_fault
@@ -89,8 +90,7 @@ class FaultCheck:
 
 def _reason(error: UsageProblemError) -> str:
     """Return why a fault cannot act, with the keys of a scenario for the options of a remedy."""
-    reason = str(error).partition(": ")[2]
-    return reason.replace("add --drag", "set drag").replace("--plant", "plant")
+    return with_keys(str(error).partition(": ")[2])
 
 
 def _parsed(text: str, rotors: int) -> Fault:

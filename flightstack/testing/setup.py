@@ -192,10 +192,10 @@ class Setup:
             )
             boat = check_boat(_vector("boat", (*self.boat, 0.0)), "boat")
             slope_rad = check_slope(self.slope_deg, self.plant, boat, "slope_deg")
-        except UsageProblemError as error:
+        except (UsageProblemError, ConfigError) as error:
             name, _, problem = str(error).partition(": ")
             name = name.removeprefix("--").replace("-", "_")
-            raise ConfigError(name, "", problem.replace("add --drag", "set drag")) from None
+            raise ConfigError(name, "", with_keys(problem)) from None
         options = PlantOptions(
             disturbance, self.seed, battery=battery, slope_rad=slope_rad, boat_ned_m_s=boat
         )
@@ -217,6 +217,15 @@ class Setup:
             _vector("torque", self.torque),
             check_range("torque_gust", self.torque_gust, 0.0, _MOST_TORQUE_GUST_N_M),
         )
+
+
+def with_keys(problem: str) -> str:
+    """Return a problem with the keys of a setup for the options of a remedy."""
+    return (
+        problem.replace("add --drag", "set drag to true")
+        .replace("--plant", "plant")
+        .replace("--drag", "drag")
+    )
 
 
 def _vector(name: str, values: Sequence[float]) -> Vector3:

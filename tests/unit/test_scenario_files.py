@@ -33,7 +33,7 @@ ERRORS = {
     "drag = 1": "drag: 1 is neither true nor false",
     "wind = 3": "wind: must be a table",
     "wind = {mean_m_s = [1]}": "wind.mean_m_s: must be a list of 2 or 3 values, not of 1",
-    "wind = {mean_m_s = [1, 2]}": "wind: wind cannot act: the vehicle paper_quad has no drag; set drag",
+    "wind = {mean_m_s = [1, 2]}": "wind: wind cannot act: the vehicle paper_quad has no drag; set drag to true",
     "wind = {gust_m_s = 60}": "wind.gust_m_s: 60 is outside the allowed range 0 to 50",
     "vehicle = 'none'": "none: is neither a file nor a built-in vehicle (paper_quad, x_quad)",
     "gains = 'none'": "none: is neither a file nor built-in gains (",
@@ -50,7 +50,7 @@ ERRORS = {
     "event = [{at_s = 1, when = 'armed', link = 'cut'}]": "has at_s and when",
     "event = [{at_s = 1, fault = 'rotor:9:off'}]": "event[0].fault: ",
     "event = [{at_s = 1, fault = 'wind:step=1,2,0'}]": (
-        "event[0].fault: wind:step=1,2,0: wind cannot act: the vehicle paper_quad has no drag; set drag"
+        "event[0].fault: wind:step=1,2,0: wind cannot act: the vehicle paper_quad has no drag; set drag to true"
     ),
     "state = 'truth'\nevent = [{at_s = 1, fault = 'sensor:gnss:off'}]": "event[0].fault: sensor:gnss:off: cannot act",
     "event = [{at_s = 1, link = 'slow'}]": "event[0].link: slow is no change of a link",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -73,6 +74,31 @@ def test_setup_and_conditions_are_not_mixed() -> None:
 def test_unknown_condition_names_the_nearest_one() -> None:
     with pytest.raises(TypeError, match=r"wnd is no condition of a flight: did you mean wind\?"):
         World(wnd=(5.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("conditions", "problem"),
+    [
+        ({"wind": (5.0, 0.0)}, "wind: wind cannot act: the vehicle paper_quad has no drag; set drag to true"),
+        ({"gust": 1.0}, "gust: wind cannot act: the vehicle paper_quad has no drag; set drag to true"),
+        (
+            {"wind": (5.0, 0.0), "plant": "paper"},
+            "wind: wind cannot act: the paper's model has no drag; use plant rigid or multibody",
+        ),
+        (
+            {"drag": True, "plant": "paper"},
+            "drag: the paper's model has no drag; use plant rigid or multibody",
+        ),
+        (
+            {"drag": True, "vehicle": "x_quad"},
+            "drag: the file of the vehicle x_quad has no optional_drag_n_s_m; its linear_drag_n_s_m acts anyway",
+        ),
+    ],
+)
+def test_wind_without_drag_names_the_keyword_to_set(conditions: dict[str, Any], problem: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        World(**conditions)
+    assert str(caught.value) == problem
 
 
 def test_unknown_parameter_names_the_keyword_of_the_world() -> None:
