@@ -190,7 +190,7 @@ class Setup:
             battery = check_battery(
                 vehicle, self.battery_percent, self.battery_capacity_mah, self.battery_drain
             )
-            boat = check_boat(_vector("boat", (*self.boat, 0.0)), "boat")
+            boat = check_boat(_vector("boat", self.boat, 2, 2), "boat")
             slope_rad = check_slope(self.slope_deg, self.plant, boat, "slope_deg")
         except (UsageProblemError, ConfigError) as error:
             name, _, problem = str(error).partition(": ")
@@ -207,7 +207,7 @@ class Setup:
         return Simulator(flown, self.plant, options)
 
     def _disturbance(self) -> Disturbance:
-        wind = _vector("wind", (*self.wind, 0.0)[:3] if len(self.wind) == 2 else self.wind)
+        wind = _vector("wind", self.wind, fewest=2)
         for speed_m_s in wind:
             check_range("wind", speed_m_s, -_MOST_WIND_M_S, _MOST_WIND_M_S)
         return Disturbance(
@@ -228,10 +228,16 @@ def with_keys(problem: str) -> str:
     )
 
 
-def _vector(name: str, values: Sequence[float]) -> Vector3:
-    if len(values) != 3:
-        raise UsageProblemError(f"{name}: {values!r} has {len(values)} numbers instead of 3")
-    return Vector3(*(float(value) for value in values))
+def _vector(name: str, values: Sequence[float], fewest: int = 3, most: int = 3) -> Vector3:
+    """Return ``fewest`` to ``most`` numbers as a vector, the others 0."""
+    try:
+        numbers = [] if isinstance(values, str) else [float(value) for value in values]
+    except (TypeError, ValueError):
+        numbers = []
+    if not fewest <= len(numbers) <= most:
+        counts = f"{most}" if fewest == most else f"{fewest} or {most}"
+        raise UsageProblemError(f"{name}: {values!r} must be {counts} numbers")
+    return Vector3(*numbers, *[0.0] * (3 - len(numbers)))
 
 
 def compile_plant() -> None:

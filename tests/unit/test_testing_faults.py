@@ -101,6 +101,24 @@ def test_wind_without_drag_names_the_keyword_to_set(conditions: dict[str, Any], 
     assert str(caught.value) == problem
 
 
+@pytest.mark.parametrize(
+    ("conditions", "problem"),
+    [
+        ({"wind": 5.0}, "wind: 5.0 must be 2 or 3 numbers"),
+        ({"wind": "north"}, "wind: 'north' must be 2 or 3 numbers"),
+        ({"wind": "12"}, "wind: '12' must be 2 or 3 numbers"),
+        ({"wind": (1, 2, 3, 4)}, "wind: (1, 2, 3, 4) must be 2 or 3 numbers"),
+        ({"boat": (1.0, 2.0, 0.0)}, "boat: (1.0, 2.0, 0.0) must be 2 numbers"),
+        ({"force": (1.0, 2.0)}, "force: (1.0, 2.0) must be 3 numbers"),
+        ({"torque": ("a", "b", "c")}, "torque: ('a', 'b', 'c') must be 3 numbers"),
+    ],
+)
+def test_vector_of_other_values_is_refused(conditions: dict[str, Any], problem: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        World(vehicle="x_quad", **conditions)
+    assert str(caught.value) == problem
+
+
 def test_unknown_parameter_names_the_keyword_of_the_world() -> None:
     with pytest.raises(ConfigError, match=r"^params: MPC_XY_CRUSE: the vehicle has no such parameter"):
         World(params={"MPC_XY_CRUSE": 1.0})
