@@ -17,6 +17,7 @@ from gcs_cli.link.calls import Answer, Call
 from gcs_cli.link.session import Session
 from gcs_cli.link.wire import SYSTEM_ID
 from gcs_cli.transfers.plan_parts import Uploads
+from gcs_cli.vehicle.param_search import suggestion
 
 STREAM_STEP_S = 0.05
 """Interval of the messages of ``Client.streams``: 20 Hz."""
@@ -163,15 +164,16 @@ class Client:
         custom = CUSTOM_MODE[mode]
         return calls.mode_command(custom >> 16 & 0xFF, custom >> 24)
 
-    def parameter(self, name: str, value: float | None) -> ParamRequest:
-        """Begin to read a parameter, or to set it to ``value``."""
-        return ParamRequest(self.session, name, value)
+    def parameter(self, name: str, value: float | None, known: Sequence[str] = ()) -> ParamRequest:
+        """Begin to read a parameter, or to set it to ``value``; the refusal of a name suggests those of ``known``."""
+        return ParamRequest(self.session, name, value, known)
 
 
 class ParamRequest:
     """A pending read or change of one parameter."""
 
-    def __init__(self, session: Session, name: str, value: float | None) -> None:
+    def __init__(self, session: Session, name: str, value: float | None, known: Sequence[str]) -> None:
+        self._hint = "" if name in known else suggestion(name, known)
         self._client = ParamClient(calls.vehicle_address(session), session.own)
         if value is None:
             self._client.start_get(name)
@@ -188,5 +190,5 @@ class ParamRequest:
             self.value = float(result.parameters[0].value)
             return Answer(True)
         if isinstance(result, ParamFailed):
-            return Answer(False, result.reason, silent=result.silent)
+            return Answer(False, result.reason + self._hint, silent=result.silent)
         return None

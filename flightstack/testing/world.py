@@ -13,7 +13,7 @@ from flightstack.core.contract import Vector3
 from flightstack.core.enums import Mode
 from flightstack.core.geodesy import LocalFrame
 from flightstack.plan import MissionItem, MissionType, Plan
-from flightstack.testing.client import Client, ConditionTimeoutError, RefusedError
+from flightstack.testing.client import Client, ConditionTimeoutError, ParamRequest, RefusedError
 from flightstack.testing.engine import Engine
 from flightstack.testing.faults import apply_fault
 from flightstack.testing.flight import Event, Flight
@@ -337,13 +337,15 @@ class World:
 
     def param_set(self, name: str, value: float) -> None:
         """Set a parameter; raise RefusedError."""
-        self.wait_for(self._connected().parameter(name, value), f"{name} = {value:g}")
+        self.wait_for(self._parameter(name, value), f"{name} = {value:g}")
 
     def param_get(self, name: str) -> float:
         """Return a parameter; raise RefusedError."""
-        request = self._connected().parameter(name, None)
-        self.wait_for(request, name)
+        self.wait_for(request := self._parameter(name, None), name)
         return request.value
+
+    def _parameter(self, name: str, value: float | None) -> ParamRequest:
+        return self._connected().parameter(name, value, tuple(self.engine.stack.params.specs))
 
     # ------------------------------------------------------------------ faults
 

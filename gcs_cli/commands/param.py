@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -24,7 +25,7 @@ from gcs_cli.settings import LinkOptions, OverwriteOption, output_of
 from gcs_cli.tables import table_console
 from gcs_cli.transfers import param_calls
 from gcs_cli.vehicle.param_info import UNKNOWN, ParamInfo, load_parameters, render_parameters
-from gcs_cli.vehicle.param_search import near_names, search_parameters
+from gcs_cli.vehicle.param_search import search_parameters, suggestion
 from gcs_cli.vehicle.param_table import (
     change_line,
     description,
@@ -38,7 +39,6 @@ from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
 
-_MOST_NEAR = 3
 NameArgument = Annotated[
     str, typer.Argument(metavar="NAME", show_default=False, autocompletion=parameter_names)
 ]
@@ -134,10 +134,7 @@ def _fetch(connection: Connection, name: str) -> Parameter:
     except CliError as error:
         if error.exit_code != FAILED:
             raise
-        near = [each for each in near_names(name, NAMES)[:_MOST_NEAR] if _is_present(connection, each)]
-        if not near:
-            raise
-        raise CliError(f"{error}; did you mean {' or '.join(near)}?") from None
+        raise CliError(f"{error}{suggestion(name, NAMES, partial(_is_present, connection))}") from None
 
 
 def _is_present(connection: Connection, name: str) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from difflib import SequenceMatcher, get_close_matches
 
 from flightstack.mavlink.param_values import Parameter
@@ -11,6 +11,7 @@ from gcs_cli.vehicle.param_info import UNKNOWN, ParamInfo
 
 _SIMILAR = 0.75
 """Ratio of equal letters at which a misspelt word still matches."""
+_MOST_NEAR = 3
 _SHORTEST_WORD = 3
 """Letters of a word that a suggestion must have."""
 _WORD = re.compile(r"[a-z0-9]+")
@@ -41,6 +42,12 @@ def near_names(name: str, names: Sequence[str]) -> list[str]:
     wanted = [word for word in name.lower().split("_") if len(word) >= _SHORTEST_WORD]
     scored = [(_score(each, UNKNOWN, wanted), each) for each in names if _has_words(each, wanted)]
     return [each for _, each in sorted(scored, key=lambda entry: -entry[0])]
+
+
+def suggestion(name: str, names: Sequence[str], is_present: Callable[[str], bool] = lambda _: True) -> str:
+    """Return the end of a sentence about an unknown name, with those of ``names`` near to it; empty without any."""
+    near = [each for each in near_names(name, names)[:_MOST_NEAR] if is_present(each)]
+    return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
 def _has_words(name: str, wanted: Sequence[str]) -> bool:

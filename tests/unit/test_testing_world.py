@@ -76,6 +76,18 @@ def test_parameters_are_read_and_set(world: World) -> None:
         world.param_get("NO_SUCH")
 
 
+def test_unknown_parameter_suggests_one_of_the_vehicle() -> None:
+    with World() as world:
+        for ask in (
+            lambda: world.param_get("mis_takeoff_al"),
+            lambda: world.param_set("MIS_TAKEOFF_AL", 4.0),
+        ):
+            with pytest.raises(RefusedError, match=r"no such parameter; did you mean MIS_TAKEOFF_ALT\?$"):
+                ask()
+        with pytest.raises(RefusedError, match=r"no such parameter$"):
+            world.param_get("ZZZ")
+
+
 def test_plan_comes_back_as_it_was_uploaded(world: World) -> None:
     world.upload("fenced_square")
     assert [item.command for item in world.download()] == [item.command for item in world.plan.items]
