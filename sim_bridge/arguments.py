@@ -6,7 +6,7 @@ import math
 from importlib.util import find_spec
 
 from flightstack.core.contract import Vector3
-from flightstack.core.errors import INSTALL_MULTIBODY
+from flightstack.core.errors import INSTALL_MULTIBODY, plain
 from flightstack.core.geodesy import GeoPoint
 from flightstack.params.config import CLOCKS, ESTIMATED, STATES
 from flightstack.params.vehicle import Vehicle
@@ -74,7 +74,9 @@ def parse_wind(flag: str, text: str) -> Vector3:
 def check_range(flag: str, value: float, low: float, high: float) -> float:
     """Return ``value`` if it is in [low, high]."""
     if not math.isfinite(value) or not low <= value <= high:
-        raise UsageProblemError(f"{flag}: {value:g} is outside the allowed range {low:g} to {high:g}")
+        raise UsageProblemError(
+            f"{flag}: {plain(value)} is outside the allowed range {plain(low)} to {plain(high)}"
+        )
     return value
 
 

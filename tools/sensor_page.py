@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from flightstack.core.errors import plain
 from flightstack.params.sensors import TABLES, Number, Value
 
 _HEAD = """\
@@ -93,12 +94,14 @@ def sensor_page(note: str) -> str:
 
 
 def _row(item: Number) -> str:
-    span = f"{item.low:g} to {item.high:g}"
+    span = f"{plain(item.low)} to {plain(item.high)}"
     shown = f"{_text(item.consumer)} | {_text(item.ideal)}"
     return f"| `{item.key}` | {item.unit} | {item.meaning} | {span} | {shown} | {item.source} |\n"
 
 
 def _text(value: Value) -> str:
     return (
-        "[" + ", ".join(f"{part:g}" for part in value) + "]" if isinstance(value, tuple) else f"{value:.4g}"
+        "[" + ", ".join(f"{part:g}" for part in value) + "]"
+        if isinstance(value, tuple)
+        else plain(float(f"{value:.4g}"))
     )

@@ -9,6 +9,8 @@ INSTALL_MULTIBODY = "pip install mujoco pillow imageio-ffmpeg"
 INSTALL_FIRMWARE = "pip install ziglang unicorn pyelftools"
 
 
+_LARGEST_WHOLE = 1e15
+"""Whole numbers from here on have an exponent in texts."""
 _PREDICATES = frozenset({"is", "has", "does", "must", "needs", "cannot"})
 
 
@@ -17,6 +19,16 @@ def clause(subject: str, problem: str) -> str:
     if not subject:
         return problem
     return f"{subject} {problem}" if problem.partition(" ")[0] in _PREDICATES else f"{subject}: {problem}"
+
+
+def plain(number: float) -> str:
+    """Return a number with six digits, a whole one without an exponent.
+
+    >>> plain(1e6), plain(0.1), plain(1e-6)
+    ('1000000', '0.1', '1e-06')
+    """
+    is_whole = abs(number) < _LARGEST_WHOLE and number == int(number)
+    return f"{number:.0f}" if is_whole else f"{number:g}"
 
 
 class ConfigError(Exception):

@@ -36,7 +36,7 @@ from flightstack.control.loop_parameters import (
 )
 from flightstack.control.mixer import mixer_for
 from flightstack.core.contract import MAX_ROTORS, FloatArray
-from flightstack.core.errors import ConfigError
+from flightstack.core.errors import ConfigError, plain
 from flightstack.firmware.generator.text import identifier, snake_case
 from flightstack.params.behaviour import SPECS
 from flightstack.params.config import DEFAULT_INNER_HZ, DEFAULT_OUTER_HZ
@@ -206,7 +206,7 @@ def _check_ranges(values: Mapping[str, float], numbers: Sequence[TargetNumber]) 
     for number in numbers:
         value = values.get(number.name, number.low)
         if not number.low <= value <= number.high:
-            limits = f"{number.low:g} to {number.high:g}"
+            limits = f"{plain(number.low)} to {plain(number.high)}"
             raise ConfigError(
                 "--loops", f"{number.name}={value:g}", f"is outside the target's range {limits}"
             )

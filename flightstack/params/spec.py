@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from flightstack.core.errors import plain
 from flightstack.core.float32 import LARGEST_FLOAT32, shortest
 
 LARGEST_NAME = 16
@@ -75,11 +76,11 @@ class ParamSpec(NamedTuple):
             self.low <= value <= self.high or shortest(value) in (shortest(self.low), shortest(self.high))
         )
         if not inside:
-            return f"{value:g} is outside {self.low:g} to {self.high:g} {self.unit}".rstrip()
+            return f"{plain(value)} is outside {plain(self.low)} to {plain(self.high)} {self.unit}".rstrip()
         if self.is_integer and value != int(value):
             return f"{value:g} is not a whole number"
         if self.choices and int(value) not in dict(self.choices):
-            return f"{value:g} is not one of {', '.join(str(choice) for choice, _ in self.choices)}"
+            return f"{plain(value)} is not one of {', '.join(str(choice) for choice, _ in self.choices)}"
         return None
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import TypeVar
 
-from flightstack.core.errors import ConfigError
+from flightstack.core.errors import ConfigError, plain
 from flightstack.params.spec import ParamSpec
 
 Listener = Callable[[str, float], None]
@@ -62,9 +62,9 @@ class ParamStore:
         """Return why a value does not fit the other parameter of a pair, or None."""
         for least, largest in self._pairs:
             if name == least and value > self._values[largest]:
-                return f"{value:g} is above {largest}, which is {self._values[largest]:g}"
+                return f"{plain(value)} is above {largest}, which is {plain(self._values[largest])}"
             if name == largest and value < self._values[least]:
-                return f"{value:g} is below {least}, which is {self._values[least]:g}"
+                return f"{plain(value)} is below {least}, which is {plain(self._values[least])}"
         return None
 
     def _adopt(self, name: str, value: float, override: bool) -> None:

@@ -12,7 +12,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from flightstack.core.errors import ConfigError
+from flightstack.core.errors import ConfigError, plain
 
 _LIKE = 0.85
 """Similarity of a misspelt key; that of the coefficients of thrust and torque is 0.83."""
@@ -62,8 +62,8 @@ class Table:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.error(key, f"{value!r} is not a number")
         if not low <= value <= high:  # also rejects NaN
-            shown = f"{value:g}" if isinstance(value, float) or abs(value) < 10**15 else "a number that large"
-            raise self.error(key, f"{shown} is outside the allowed range {low:g} to {high:g}")
+            shown = plain(value) if isinstance(value, float) or abs(value) < 10**15 else "a number that large"
+            raise self.error(key, f"{shown} is outside the allowed range {plain(low)} to {plain(high)}")
         return float(value)
 
     def numbers(

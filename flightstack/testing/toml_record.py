@@ -11,7 +11,7 @@ from functools import cache
 from types import UnionType
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
-from flightstack.core.errors import ConfigError
+from flightstack.core.errors import ConfigError, plain
 
 T = TypeVar("T")
 _DEEP = 1e6
@@ -108,7 +108,7 @@ def _scalar(kind: Any, limits: Key, file: object, value: Any, path: str) -> Any:
         raise ConfigError(file, path, f"{value!r} is not {what}")
     if not limits.low <= value <= limits.high:
         raise ConfigError(
-            file, path, f"{value!r} is outside the allowed range {limits.low:g} to {limits.high:g}"
+            file, path, f"{value!r} is outside the allowed range {plain(limits.low)} to {plain(limits.high)}"
         )
     return kind(value)
 
@@ -213,5 +213,7 @@ def _range_text(kind: Any, limits: Key) -> str:
     if kind not in (int, float) or (limits.low, limits.high) == (-_DEEP, _DEEP):
         return ""
     return (
-        f", at least {limits.low:g}" if limits.high == _DEEP else f", {limits.low:.10g} to {limits.high:.10g}"
+        f", at least {plain(limits.low)}"
+        if limits.high == _DEEP
+        else f", {plain(limits.low)} to {plain(limits.high)}"
     )

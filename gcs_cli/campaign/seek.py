@@ -10,7 +10,7 @@ from rich.console import Console
 
 from flightstack.core.atomic_file import write_text_atomically
 from flightstack.core.contract import FloatArray
-from flightstack.core.errors import ConfigError
+from flightstack.core.errors import ConfigError, plain
 from flightstack.testing.scenario import check_scenario
 from gcs_cli.campaign.definition import Campaign
 from gcs_cli.campaign.display import inputs_text, make_display
@@ -76,7 +76,8 @@ def nominal_point(campaign: Campaign) -> FloatArray:
             )
         low, high = distribution.ends
         if not low <= value <= high:
-            problem = f"{value:g}, from which --seek worst searches, is outside the range {low:g} to {high:g}"
+            span = f"{plain(low)} to {plain(high)}"
+            problem = f"{plain(value)}, from which --seek worst searches, is outside the range {span}"
             raise ConfigError(campaign.path, f"vary.{name}", f"{problem}: give another range, or nominal")
         shares.append(distribution.share_of(value))
     return np.array(shares)

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from flightstack.core.errors import plain
 from flightstack.process.command_line import IN_OUTPUT, expand_options, make_app
 from gcs_cli.actions import in_flight, on_vehicle
 from gcs_cli.actions.action import Action
@@ -59,7 +60,8 @@ def _check_range(name: str, value: float, low: float, high: float, otherwise: st
     """Raise CliError (usage) for a number outside its range, also for one that is not finite."""
     if not low <= value <= high:
         raise CliError(
-            f"{name}: {value:g} is outside the allowed range {low:g} to {high:g}{otherwise}", USAGE
+            f"{name}: {plain(value)} is outside the allowed range {plain(low)} to {plain(high)}{otherwise}",
+            USAGE,
         )
 
 

@@ -225,7 +225,7 @@ def test_a_refused_parameter_is_explained_in_a_text(vehicle: SignedVehicle) -> N
     answers = Station(vehicle, KEY).ask(common.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 1e9, 9))
     assert [error.error for error in of_type(answers, "PARAM_ERROR")] == [2]
     said = "".join(text.text for text in of_type(answers, "STATUSTEXT"))
-    assert said == "Parameter MIS_TAKEOFF_ALT refused: 1e+09 is outside 0.2 to 100 m"
+    assert said == "Parameter MIS_TAKEOFF_ALT refused: 1000000000 is outside 0.2 to 100 m"
 
 
 def test_all_parameters_are_reset_by_command_but_not_while_armed(vehicle: SignedVehicle) -> None:

@@ -28,7 +28,7 @@ def written(folder: Path, text: str) -> Path:
 ERRORS = {
     "spid = 3": "spid: is not a known key; known are description, plan",
     "seed = 'a'": "seed: 'a' is not a whole number",
-    "repeat = 0": "repeat: 0 is outside the allowed range 1 to 1e+06",
+    "repeat = 0": "repeat: 0 is outside the allowed range 1 to 1000000",
     "plant = 'soft'": "plant: 'soft' is not one of rigid, multibody, paper",
     "drag = 1": "drag: 1 is neither true nor false",
     "wind = 3": "wind: must be a table",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+from flightstack.core.errors import plain
 from gcs_cli.actions import in_flight, on_vehicle
 from gcs_cli.actions.action import Action
 from gcs_cli.vehicle.view_types import VehicleView
@@ -46,7 +47,7 @@ class Field(NamedTuple):
         except ValueError:
             raise FieldError(f"{self.name}: {text} is not a number") from None
         if not self.smallest <= value <= self.largest:
-            raise FieldError(f"{self.name}: give {self.smallest:g} to {self.largest:g}")
+            raise FieldError(f"{self.name}: give {plain(self.smallest)} to {plain(self.largest)}")
         return value
 
 

@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from flightstack.core.contract import Vector3
+from flightstack.core.errors import plain
 
 
 class Kind(Enum):
@@ -91,7 +92,7 @@ class Range(NamedTuple):
     unit: str = ""
 
     def __str__(self) -> str:
-        return f"{self.low:g} to {self.high:g}" + (f" {self.unit}" if self.unit else "")
+        return f"{plain(self.low)} to {plain(self.high)}" + (f" {self.unit}" if self.unit else "")
 
 
 NO_END = "it acts at one time: give no end"
