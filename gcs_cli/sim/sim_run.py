@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from flightstack.core.atomic_file import check_creatable, check_new
-from flightstack.core.port_numbers import system_id, vehicle_ground_port
+from flightstack.core.port_numbers import vehicle_ground_port
 from flightstack.mavlink.dialect import mavlink
 from flightstack.process.config_check import DIRECTORY_HINT, check_state
 from flightstack.process.console import complain
@@ -32,6 +32,7 @@ from gcs_cli.sim.sim_vehicles import (
     NONE,
     connections,
     local_host,
+    name_of,
     ready_text,
     stack_arguments,
     start_of,
@@ -91,8 +92,8 @@ class VehicleProcesses:
     @property
     def late_text(self) -> str:
         """The sentence about a vehicle that is not ready in time."""
-        number, waited_s = system_id(self.vehicle.instance), self.vehicle.timeout_s
-        return f"vehicle {number} was not ready within {waited_s:g} s: give more with --timeout"
+        waited_s = self.vehicle.timeout_s
+        return f"{name_of(self.vehicle)} was not ready within {waited_s:g} s: give more with --timeout"
 
     def show_notices(self) -> None:
         """Print the new warnings of the processes."""
@@ -105,7 +106,7 @@ class VehicleProcesses:
             return
         child = self.children.culprit(_END_TIMEOUT_S)
         assert child is not None
-        said = f"vehicle {system_id(self.vehicle.instance)}: {child.end_reason}"
+        said = f"{name_of(self.vehicle)}: {child.end_reason}"
         raise CliError(said, child.exit_code if child.exit_code in (1, 2, 3) else FAILED)
 
     def close(self) -> None:

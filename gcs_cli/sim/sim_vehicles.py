@@ -135,12 +135,21 @@ def connections(vehicle: SimOptions) -> dict[str, Any]:
     }
 
 
+def _is_alone(vehicle: SimOptions) -> bool:
+    return vehicle.instance == 0 and vehicle.vehicles == 1
+
+
+def name_of(vehicle: SimOptions) -> str:
+    """Return how texts name the vehicle: by its system id and, unless it is instance 0 alone, its instance."""
+    name = f"vehicle {system_id(vehicle.instance)}"
+    return name if _is_alone(vehicle) else f"{name} (instance {vehicle.instance})"
+
+
 def ready_text(vehicle: SimOptions) -> str:
     """Return the lines that say how to connect to the vehicle."""
     facts = connections(vehicle)
     key = "" if vehicle.signing_key is None else f" --signing-key {shlex.quote(str(vehicle.signing_key))}"
-    is_alone = vehicle.instance == 0 and vehicle.vehicles == 1
-    number = "" if is_alone else f" --instance {vehicle.instance}"
+    number = "" if _is_alone(vehicle) else f" --instance {vehicle.instance}"
     port = station_port(vehicle)
     stations = ", ".join(vehicle.gcs or ()) if port is None else str(port)
     added = "" if port in (None, ground_station_port(0)) else ", added as a link"
@@ -150,5 +159,5 @@ def ready_text(vehicle: SimOptions) -> str:
         ("gcs", f"gcs{key}{number} status"),
         ("any program", facts["tcp"]),
     )
-    title = f"vehicle {facts['system_id']} is ready: {vehicle.vehicle}"
+    title = f"{name_of(vehicle)} is ready: {vehicle.vehicle}"
     return "\n".join([title, *(f"  {name:<15} {value}" for name, value in rows)])

@@ -48,7 +48,9 @@ def test_sim_ends_all_when_one_process_dies() -> None:
         sim.wait_for("Ctrl-C ends the simulation")
         os.kill(children_of(sim.popen.pid)["flightstack"], signal.SIGKILL)
         assert sim.end() == 1
-        assert f"gcs: vehicle {first + 1}: flightstack was killed by signal 9" in sim.output
+        assert (
+            f"gcs: vehicle {first + 1} (instance {first}): flightstack was killed by signal 9" in sim.output
+        )
     finally:
         sim.kill()
 

@@ -19,7 +19,7 @@ from gcs_cli.errors import USAGE, CliError
 from gcs_cli.output import Output
 from gcs_cli.sim import sim_run
 from gcs_cli.sim.sim_flags import TO_STACK, SimOptions
-from gcs_cli.sim.sim_vehicles import connections, ready_text, stack_arguments, start_of, vehicles_of
+from gcs_cli.sim.sim_vehicles import connections, name_of, ready_text, stack_arguments, start_of, vehicles_of
 from tests.support.commands import gcs
 
 
@@ -110,6 +110,16 @@ def test_several_vehicles_send_to_one_ground_station() -> None:
         assert sim_run.view_link(vehicle) == ["--connect", "udpin:127.0.0.1:14553"]
     assert "gcs --instance 3 status" in ready_text(first)
     assert "UDP 14553, added as a link" in ready_text(second)
+
+
+def test_text_of_a_vehicle_names_system_id_and_instance() -> None:
+    (alone,), (twentieth,) = vehicles_of(SimOptions()), vehicles_of(SimOptions(instance=20))
+    assert ready_text(alone).startswith("vehicle 1 is ready: paper_quad\n")
+    assert ready_text(twentieth).startswith("vehicle 21 (instance 20) is ready: paper_quad\n")
+    assert [name_of(vehicle) for vehicle in vehicles_of(SimOptions(vehicles=2))] == [
+        "vehicle 1 (instance 0)",
+        "vehicle 2 (instance 1)",
+    ]
 
 
 def test_view_of_vehicles_with_a_remote_ground_station_shows_the_first() -> None:
