@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from flightstack.core.atomic_file import write_text_atomically
@@ -40,12 +41,16 @@ def read_text(path: Path) -> str:
         raise ConfigError(path, "", "is not a plan file: it is not text") from error
 
 
-def plan_of_text(text: str, path: Path) -> Plan:
-    """Parse the text of a ``.plan`` or ``QGC WPL 110`` file; raise ConfigError."""
+def plan_of_text(
+    text: str, path: Path, formats: Sequence[str] = (*PLAN_SUFFIXES, *WAYPOINTS_SUFFIXES)
+) -> Plan:
+    """Parse the text of a ``.plan`` or ``QGC WPL 110`` file; raise ConfigError, which names the ``formats``."""
     if text.startswith("QGC WPL"):
         return read_waypoints(text, path)
     if path.suffix in WAYPOINTS_SUFFIXES:
         raise ConfigError(path, "line 1", f"must be {WAYPOINTS_HEADER!r}")
+    if path.suffix not in PLAN_SUFFIXES and not text.lstrip().startswith("{"):
+        raise ConfigError(path, "", f"is not a plan file: the formats are {', '.join(formats)}")
     return read_plan(text, path)
 
 

@@ -357,3 +357,10 @@ def test_qgroundcontrols_required_keys_are_there_without_a_known_home() -> None:
     written = json.loads(plan_to_json(Plan((MissionItem(16, 3, x=473977420, y=85455940, z=5.0),))))
     assert written["mission"]["plannedHomePosition"] == [47.397742, 8.545594, 0]
     assert set(written) == {"fileType", "geoFence", "groundStation", "mission", "rallyPoints", "version"}
+
+
+def test_file_of_another_kind_is_refused_with_the_formats(tmp_path: Path) -> None:
+    path = tmp_path / "scenario.toml"
+    path.write_text('plan = "square"\n')
+    with pytest.raises(ConfigError, match=r"toml: is not a plan file: the formats are \.plan, .*\.mission$"):
+        load_plan(path)

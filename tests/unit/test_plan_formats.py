@@ -134,6 +134,12 @@ DAMAGED = {
     "b.gpx": ("<gpx><rte>", "is not valid GPX"),
     "bomb.gpx": ('<!DOCTYPE x [<!ENTITY a "b">]><gpx/>', "it has a document type"),
     "c.geojson": ("{", "is not valid JSON"),
+    "scenario.toml": (
+        'plan = "square"\n[expect]\n',
+        "is not a plan file: the formats are .plan, .json, .waypoints, .txt, .mission, .kml, .gpx, .geojson",
+    ),
+    "empty.csv": ("", "is not a plan file: the formats are"),
+    "json.toml": ("{", "is not valid JSON"),
     "d.geojson": ('{"type": "Odd"}', "type: 'Odd' must be one of"),
     "e.geojson": ('{"type": "Point", "coordinates": [8]}', "must be longitude, latitude"),
     "f.geojson": ('{"type": "Point", "coordinates": [8, 95]}', "latitude: 95 must be from -90 to 90"),

@@ -37,7 +37,7 @@ def _plan(text: str, path: Path, altitude_m: float) -> Plan:
         return plan_of_features(read_gpx(text, path), altitude_m, path)
     if suffix == ".geojson" or (suffix == ".json" and is_geojson(text)):
         return plan_of_features(read_geojson(text, path), altitude_m, path)
-    return plan_of_text(text, path)
+    return plan_of_text(text, path, SUFFIXES)
 
 
 def save_any(path: Path, plan: Plan) -> str:
