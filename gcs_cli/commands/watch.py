@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import math
 import os
 import shutil
 import sys
@@ -13,11 +14,12 @@ import typer
 
 from flightstack.process import collection
 from flightstack.process.command_line import IN_OUTPUT, expand_options, make_app
+from flightstack.process.console import complain
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.subscription import ROTORS_AND_TIMING
 from gcs_cli.output import can_draw
-from gcs_cli.settings import LinkOptions, link_options, signing_key_of
+from gcs_cli.settings import DEFAULT_TIMEOUT_S, LinkOptions, link_options, signing_key_of
 from gcs_cli.tui.screens import SCREENS
 from gcs_cli.tui.watch_lines import state_line, text_line
 from gcs_cli.vehicle_link import connect_vehicle, open_link
@@ -25,6 +27,8 @@ from gcs_cli.vehicle_link import connect_vehicle, open_link
 app = make_app(add_completion=False)
 
 LINE_S = 1.0
+EXPLAIN_S = DEFAULT_TIMEOUT_S
+"""Time without a vehicle after which lines are explained on stderr."""
 GATHER_S = 2.0
 """Time that ``--once`` waits for the vehicle's messages; most arrive several times a second."""
 DEFAULT_SERVED = "127.0.0.1:8000"
@@ -160,6 +164,7 @@ def watch_lines(connection: Connection) -> None:
     """Print one line per second and one per status text, until interrupted."""
     seen = 0
     next_s = connection.now_s
+    explain_s = math.inf if connection.is_recording else next_s + EXPLAIN_S
     while not connection.ended:
         view = connection.session.view
         for entry in view.texts_since(seen):
@@ -168,4 +173,7 @@ def watch_lines(connection: Connection) -> None:
         if connection.now_s >= next_s:
             print(state_line(view, connection.now_s), flush=True)
             next_s += LINE_S
+        if view.identity is None and connection.now_s >= explain_s:
+            complain(f"gcs: watch: {connection.no_vehicle_error(EXPLAIN_S)}; still waiting")
+            explain_s = math.inf
         connection.step(next_s)

@@ -219,12 +219,7 @@ class Connection:
         system id.
         """
         if not self.wait_for(lambda: self.session.is_heard(self.now_s), timeout_s):
-            if self._signing is not None and self._signing.signing.counts.refused:
-                raise CliError(
-                    f"the vehicle at {self.endpoint} does not sign with this key: check --signing-key on both sides",
-                    NO_ANSWER,
-                )
-            raise CliError(self._no_vehicle_text(timeout_s), NO_ANSWER)
+            raise self.no_vehicle_error(timeout_s)
         if not (several or self.fleet.is_kept):
             self._check_alone()
         self.fleet.keep()
@@ -236,6 +231,15 @@ class Connection:
         if len(self.fleet.systems) > 1:
             known = ", ".join(str(number) for number in sorted(self.fleet.systems))
             raise CliError(f"several vehicles at {self.endpoint}: choose one of {known} with --system", USAGE)
+
+    def no_vehicle_error(self, timeout_s: float) -> CliError:
+        """Return the error of a wait for the vehicle that ended after ``timeout_s``."""
+        if self._signing is not None and self._signing.signing.counts.refused:
+            return CliError(
+                f"the vehicle at {self.endpoint} does not sign with this key: check --signing-key on both sides",
+                NO_ANSWER,
+            )
+        return CliError(self._no_vehicle_text(timeout_s), NO_ANSWER)
 
     def _no_vehicle_text(self, timeout_s: float) -> str:
         if self.is_recording:

@@ -287,6 +287,23 @@ def test_no_vehicle(command: list[str]) -> None:
     assert result.stderr.startswith(f"gcs: {name}no vehicle answered at UDP 127.0.0.1:")
 
 
+def test_watch_in_a_pipe_says_on_stderr_what_it_waits_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    said = list[str]()
+
+    def end(line: str) -> None:
+        said.append(line)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("gcs_cli.commands.watch.EXPLAIN_S", 0.2)
+    monkeypatch.setattr("gcs_cli.commands.watch.complain", end)
+    with UdpSocket("127.0.0.1") as silent:
+        port = silent.address[1]
+        assert gcs("--connect", f"udpout:127.0.0.1:{port}", "watch")[2] == 0
+    (line,) = said
+    assert line.startswith(f"gcs: watch: no vehicle answered at UDP 127.0.0.1:{port} within 0.2 s: ")
+    assert line.endswith("; still waiting")
+
+
 def test_a_busy_port_is_named_with_the_way_round() -> None:
     with UdpSocket("127.0.0.1") as taken:
         port = taken.address[1]
