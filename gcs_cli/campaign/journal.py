@@ -108,8 +108,14 @@ class Journal:
         self.rows[int(row["flight"])] = row
 
     def count(self) -> int:
-        """Return the number of rows on disk: Ctrl-C may come between the write of a row and its entry in ``rows``."""
-        return len(self._read())
+        """Return the number of rows on disk: Ctrl-C may come between the write of a row and its entry in ``rows``.
+
+        If the file cannot be read any more, of which the next start says the reason, count the entries.
+        """
+        try:
+            return len(self._read())
+        except (CliError, OSError):
+            return len(self.rows)
 
     def check_unchanged(self, record: Mapping[str, Any]) -> None:
         """Raise CliError if ``record``, made after the flights, differs from that before: they differ too."""
@@ -161,7 +167,7 @@ def _whole_rows(path: Path, content: bytes) -> tuple[dict[int, Row], int]:
         try:
             row = json.loads(line)
             rows[int(row["flight"])] = row
-        except (ValueError, TypeError, KeyError):
+        except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
             remedy = "mend the line, or --overwrite to fly all again"
             raise CliError(f"{path}: line {number} is damaged: {remedy}", USAGE) from None
     return rows, end

@@ -27,7 +27,7 @@ from gcs_cli.campaign.rows import columns, row_of
 from gcs_cli.campaign.run import run_campaign
 from gcs_cli.campaign.statistics import pass_probability, quantiles, sensitivities, worst
 from gcs_cli.campaign.table import write_csv, write_parquet
-from gcs_cli.errors import USAGE, CliError
+from gcs_cli.errors import INTERRUPTED, USAGE, CliError
 from gcs_cli.scenarios.pool import Finished
 from gcs_cli.scenarios.result import Result, not_flown
 
@@ -88,7 +88,7 @@ def test_journal_cut_at_any_byte_keeps_every_whole_row(tmp_path: Path) -> None:
         assert (tmp_path / JOURNAL).read_bytes() == content
 
 
-@pytest.mark.parametrize("damaged", [b"{", b"3", b"{}", b'{"flight": "x"}'])
+@pytest.mark.parametrize("damaged", [b"{", b"3", b"{}", b'{"flight": "x"}', b'{"flight": Infinity}'])
 def test_damaged_line_is_named_and_the_file_stays(tmp_path: Path, damaged: bytes) -> None:
     with open_journal(tmp_path, RECORD_1) as journal:
         for each in ROWS[:3]:
@@ -320,3 +320,20 @@ def test_a_row_counts_if_ctrl_c_comes_after_its_write(
         with pytest.raises(KeyboardInterrupt):
             journal.add({"flight": 1})
         assert (len(journal.rows), journal.count()) == (0, 1)
+
+
+def test_interrupted_campaign_with_a_damaged_journal_is_interrupted(tmp_path: Path) -> None:
+    file = tmp_path / "c.toml"
+    vary = "'force_n[0]' = {uniform = [0, 1]}"
+    file.write_text(f"plan = 'hop'\n[campaign]\nflights = 2\n[vary]\n{vary}\n[expect]\n")
+
+    class Pool:
+        def fly(self, cases: Sequence[Any], wanted: Any) -> Iterator[Finished]:
+            yield Finished(0, Result(()))
+            (tmp_path / "out" / JOURNAL).write_bytes(b"{\n")
+            raise KeyboardInterrupt
+
+    options = CampaignOptions(file, out=tmp_path / "out")
+    with pytest.raises(CliError, match=r"^interrupted: 1 of 2 flights are over; ") as ended:
+        run_campaign(Pool(), options, Console(file=io.StringIO()))
+    assert ended.value.exit_code == INTERRUPTED
