@@ -38,7 +38,10 @@ def test_limits_of_a_file_replace_the_built_in_ones(tmp_path: Path) -> None:
         ("[fligth.torque]\nulp = 1\n", "fligth: is not a known key"),
         ("[flight.torqe]\nulp = 1\n", "flight.torqe: is not a signal: use one of target_attitude"),
         ("[flight.torque]\nulps = 1\n", "flight.torque.ulps: is not a known key"),
-        ("[flight.torque]\nulp = -1\n", "flight.torque.ulp: -1 is outside the allowed range 0 to 1000000000000"),
+        (
+            "[flight.torque]\nulp = -1\n",
+            "flight.torque.ulp: -1 is outside the allowed range 0 to 1000000000000",
+        ),
         ("[flight.torque]\nulp = nan\n", "outside the allowed range"),
         ("[flight.torque]\nulp = '7'\n", "flight.torque.ulp: '7' is not a number"),
         ("flight = 3\n", "flight: must be a table"),
