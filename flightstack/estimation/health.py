@@ -355,7 +355,7 @@ class HealthMonitor:
         squares = self.watch["summary"]["mean_squares"][0].tolist()
         kinds = (GNSS_VELOCITY, 3), (GNSS_POSITION, 2), (BARO, 1), (MAG, 3)
         velocity, position, height, heading = (
-            math.sqrt(max(squares[row : row + count])) for row, count in kinds
+            math.sqrt(max(0.0, *squares[row : row + count])) for row, count in kinds
         )
         return velocity, position, height, heading
 

@@ -24,7 +24,7 @@ WINDOW = 4096
 WATCHED_NS, WATCHED_SHARE = 100_000, 0.05
 """Time before a deadline in which the scheduler reads the clock instead of sleeping, and its largest share of a period.
 
-A machine wakes a sleeping process late: here 60 µs in the median and 100 µs at the 99th percentile, in C too.
+A machine wakes a sleeping process late: here 60 µs in the median and 100 to 200 µs at the 99th percentile, in C too.
 """
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import sys
 import tempfile
 from collections.abc import Generator, Iterator, Sequence
+from opcode import opmap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +30,12 @@ _SECTION = "flightstack"
 _TESTING = "flightstack.testing."
 _OURS = frozenset({"flightstack", "sim_bridge", "gcs_cli"})
 _BELOW_TESTS = _OURS | sys.stdlib_module_names
+_REFUSALS = frozenset(
+    {"ConfigError", "RefusedError", "ConditionTimeoutError", "PropertyViolationError", "UsageProblemError"}
+)
+"""Errors of this project that say what a test asked for in vain, by name: their modules are heavy."""
+_ARGUMENTS = frozenset(_TESTING + name for name in ("link", "network", "setup", "sitl", "world"))
+"""Modules that raise TypeError and ValueError for arguments."""
 """Packages whose frames are below those of a test."""
 
 
@@ -143,18 +150,30 @@ def pytest_runtest_makereport(
 def _hide_frames_below_test(error: pytest.ExceptionInfo[BaseException]) -> None:
     """Hide the frames below the test in the traceback of a refusal, such as that of a bad argument of a World.
 
-    A ``raise`` statement in this project raises a refusal; other errors in its code are defects and show all frames.
+    Other errors are defects of this project or of the test, and show all frames.
     """
     frames = error.traceback
     modules = [str(entry.frame.f_globals.get("__name__")) for entry in frames]
     packages = [module.partition(".")[0] for module in modules]
-    if error.type is AssertionError or packages[-1] not in _OURS:
+    if not any(name.startswith(_TESTING) for name in modules):
         return
-    is_refusal = str(frames[-1].statement).lstrip().startswith("raise ")
-    if is_refusal and any(name.startswith(_TESTING) for name in modules):
-        for entry, package in zip(frames, packages, strict=True):
-            if package in _BELOW_TESTS:
-                entry.frame.f_locals["__tracebackhide__"] = True
+    if packages[-1] not in _OURS or not _is_refusal(error, modules[-1]):
+        return
+    for entry, package in zip(frames, packages, strict=True):
+        if (
+            package in _BELOW_TESTS and entry.frame.code.name != "<module>"
+        ):  # whose names are those of its module
+            entry.frame.f_locals["__tracebackhide__"] = True
+
+
+def _is_refusal(error: pytest.ExceptionInfo[BaseException], module: str) -> bool:
+    """Return True for an error of ``_REFUSALS``, and for one that a ``raise`` in ``_ARGUMENTS`` made."""
+    own = {kind.__name__ for kind in error.type.__mro__ if kind.__module__.partition(".")[0] in _OURS}
+    if own & _REFUSALS:
+        return True
+    last = error.traceback[-1]._rawentry
+    is_raised = last.tb_frame.f_code.co_code[last.tb_lasti] == opmap["RAISE_VARARGS"]
+    return module in _ARGUMENTS and is_raised and issubclass(error.type, (TypeError, ValueError))
 
 
 def _report_failure(item: pytest.Item, report: pytest.TestReport, reason: str) -> None:

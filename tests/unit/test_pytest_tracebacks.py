@@ -68,6 +68,23 @@ def test_traceback_of_a_defect_shows_all_frames(outside: pytest.Pytester) -> Non
     assert last_frames(run(outside, "--tb=short"))[0][1] == "_call_due"
 
 
+def test_defects_that_the_stack_raises_show_all_frames(outside: pytest.Pytester) -> None:
+    """A wrong row of a log is found by a raise statement, and a method that a dataclass makes has no source."""
+    outside.makepyfile("""
+        from flightstack.process.clock import TimingReport
+
+        def test_row(sitl, monkeypatch):
+            monkeypatch.setattr(TimingReport, "log_fields", lambda self, ticks: {"tikcs": 1})
+            sitl().fly("hop")
+
+        def test_frozen(sitl): sitl().setup.seed = 2
+        def test_later(): assert True
+    """)
+    result = run(outside, "--tb=short")
+    result.assert_outcomes(failed=2, passed=1)
+    assert last_frames(result)[0][0].endswith("flight_log.py")
+
+
 def last_frames(result: pytest.RunResult) -> list[tuple[str, str]]:
     """Return file and function of the last frame of each traceback, printed with ``--tb=short``."""
     texts = re.split(r"\nE   \S+: ", result.stdout.str())[:-1]
