@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from flightstack.core.port_numbers import API, GROUND
 from flightstack.mavlink.dialect import mavlink
@@ -20,7 +20,7 @@ _ROUNDING = 1e-6
 _SETTLES = 10_000
 """Most rounds of messages at one instant; a mission upload takes two for each item."""
 
-SLOW_RATES_HZ: dict[int, float] = {
+_SLOW_RATES_HZ: dict[int, float] = {
     mavlink.MAVLINK_MSG_ID_ATTITUDE: 1.0,
     mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 1.0,
     mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 1.0,
@@ -32,6 +32,8 @@ SLOW_RATES_HZ: dict[int, float] = {
     mavlink.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
 }
 """Telemetry without ``telemetry=True``: a ground station in the same process takes a third of a flight at 4 Hz."""
+RATES_HZ: dict[bool | None, dict[int, float] | None] = {True: None, False: _SLOW_RATES_HZ, None: {}}
+"""Streams by the ``telemetry`` of a world. Nobody reads those of a scenario: heartbeats, texts and answers suffice."""
 
 
 class Network:
@@ -48,7 +50,7 @@ class Network:
         self,
         name: str,
         hub: GroundHub,
-        telemetry: bool,
+        rates_hz: Mapping[int, float] | None,
         is_companion: bool = False,
         system_id: int | None = None,
     ) -> Client:
@@ -63,7 +65,7 @@ class Network:
         address = PeerAddress(API if is_companion else GROUND, "memory", number)
         client = Client(name, address, Link(self._seed * 1000 + number), is_companion, system_id)
         self.clients[name] = self._by_address[address] = client
-        self.connect(client, hub, telemetry)
+        self.connect(client, hub, rates_hz)
         return client
 
     def _free_system_id(self) -> int:
@@ -71,11 +73,11 @@ class Network:
         taken = {client.system_id for client in self.clients.values()}
         return next(number for number in range(SYSTEM_ID, 0, -1) if number not in taken)
 
-    def connect(self, client: Client, hub: GroundHub, telemetry: bool) -> None:
-        """Add a client to a hub, that of a vehicle after a power cycle too."""
+    def connect(self, client: Client, hub: GroundHub, rates_hz: Mapping[int, float] | None) -> None:
+        """Add a client to a hub, that of a vehicle after a power cycle too; ``rates_hz`` None: PX4's rates."""
         peer = hub.add_peer(client.address, permanent=True)
-        if not telemetry:
-            peer.streams = Streams(SLOW_RATES_HZ, peer.streams.available)
+        if rates_hz is not None:
+            peer.streams = Streams(dict(rates_hz), peer.streams.available)
 
     def exchange(self, hub: GroundHub, now_s: float) -> bool:
         """Exchange the messages of this instant once; return True if any arrived."""

@@ -65,7 +65,7 @@ def run_scenario(scenario: Scenario, seed: int | None = None) -> Verdict:
     True
     """
     seed = scenario.seed if seed is None else seed
-    with World(scenario.setup(seed)) as world:
+    with World(scenario.setup(seed), telemetry=None) as world:
         for client in scenario.client:
             world.add_client(client.name, is_companion=client.companion, system_id=client.system_id)
         run = _Run(world, scenario)

@@ -20,7 +20,7 @@ from flightstack.testing.flight import Event, Flight
 from flightstack.testing.link import Link
 from flightstack.testing.log import Log
 from flightstack.testing.mission_flight import await_first_state, fly_plan
-from flightstack.testing.network import EngineRunner, Network
+from flightstack.testing.network import RATES_HZ, EngineRunner, Network
 from flightstack.testing.setup import Setup, built
 from flightstack.testing.state import State, condition_of, reported_by, state_of
 from gcs_cli.link import calls
@@ -79,18 +79,18 @@ class World:
         self,
         setup: Setup | None = None,
         *,
-        telemetry: bool = False,
+        telemetry: bool | None = False,
         make_engine: Callable[[Setup], Engine] = Engine,
         **conditions: Any,
     ) -> None:
         """Build the world of ``setup``, or of ``conditions`` with the names of ``Setup``; raise ConfigError.
 
-        ``telemetry``: stream at PX4's default rates to ``gcs.received``, instead of each message once a second at most.
+        ``telemetry``: stream to ``gcs.received`` at PX4's default rates, or, if None, nothing; else once a second at most.
         """
         if setup is not None and conditions:
             raise TypeError(f"give a setup or conditions, not both: {', '.join(conditions)}")
         self.setup = setup or Setup.of(conditions)
-        self._telemetry = telemetry
+        self._rates_hz = RATES_HZ[telemetry]
         self.engine = built(self.setup, make_engine)
         """Flight stack and simulator; not part of the public interface."""
         self.events: list[Event] = []
@@ -122,7 +122,7 @@ class World:
 
         ``system_id`` is by default the largest free one: 255 for the world's ground station, then 254, 253 and so on.
         """
-        return self._network.add(name, self.engine.stack.ground, self._telemetry, is_companion, system_id)
+        return self._network.add(name, self.engine.stack.ground, self._rates_hz, is_companion, system_id)
 
     @property
     def state(self) -> State:
@@ -367,7 +367,7 @@ class World:
         """
         self.engine.power_cycle(off_s)
         for client in self.clients.values():
-            self._network.connect(client, self.engine.stack.ground, self._telemetry)
+            self._network.connect(client, self.engine.stack.ground, self._rates_hz)
         self.happened("power_cycle")
 
     # ------------------------------------------------------------------ flights

@@ -18,6 +18,8 @@ from gcs_cli.vehicle.view_builder import ViewBuilder, update
 from gcs_cli.vehicle.view_types import LOST_AFTER_S, VehicleView
 
 HEARTBEAT_PERIOD_S = 1.0
+_ROUNDING_S = 0.5e-6
+"""Above the rounding of an hour's sum of periods."""
 _BROADCAST = 0
 
 
@@ -204,7 +206,11 @@ class Session:
         frames = []
         if self.peer is not None and self.heartbeat_is_due(now_s):
             frames.append(self.encode(self._heartbeat(mavlink.MAV_STATE_ACTIVE)))
-            self.skip_heartbeat(now_s)
+            due_s = self._heartbeat_due_s
+            keeps_time = now_s - due_s < HEARTBEAT_PERIOD_S - _ROUNDING_S  # those of both sides stay together
+            self.skip_heartbeat(due_s if keeps_time else now_s)
+            if now_s + _ROUNDING_S < due_s:  # it is due in vehicle time alone
+                self._heartbeat_due_s = due_s
         for service in self._services:
             messages = service.poll(now_s)
             frames += [self.encode(message) for message in messages if self.peer is not None]
@@ -213,7 +219,7 @@ class Session:
     def heartbeat_is_due(self, now_s: float) -> bool:
         """Return True if the next ``poll`` sends a heartbeat."""
         vehicle_s = self._builder.time_s
-        return now_s >= self._heartbeat_due_s or (
+        return now_s + _ROUNDING_S >= self._heartbeat_due_s or (
             vehicle_s is not None and vehicle_s >= self._heartbeat_due_vehicle_s
         )
 

@@ -24,7 +24,7 @@ from flightstack.services.registry import make_services
 from flightstack.services.routing.peer import Peer, PeerAddress
 from flightstack.services.routing.router import Router, Schedule, Service
 from flightstack.services.routing.signing_setup import NEVER_FORWARDED, link_signing, signing_setup
-from flightstack.services.telemetry.streams import Streams, default_rates_hz
+from flightstack.services.telemetry.streams import ROUNDING_S, Streams, default_rates_hz
 from flightstack.services.telemetry.telemetry import Telemetry
 from flightstack.services.telemetry.vehicle import status_texts, system_time_at
 from flightstack.vehicle.assembly import VehicleParts
@@ -267,8 +267,10 @@ class GroundHub:
         """Return the frames to send to ``peer`` now. Keep texts for a silent peer, which may be heard again."""
         due: list[Message] = []
         telemetry, is_served = self._telemetry, peer.is_served(now_s)
-        if (changed or now_s >= peer.heartbeat_due_s) and (peer.heard or peer.permanent):
-            peer.heartbeat_due_s = now_s + HEARTBEAT_S
+        is_due = now_s + ROUNDING_S >= peer.heartbeat_due_s
+        if (changed or is_due) and (peer.heard or peer.permanent):
+            if is_due:  # one for a change comes in between: the times of the others stay
+                peer.heartbeat_due_s = now_s + HEARTBEAT_S
             due += telemetry.messages(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
         if is_served:
             due += peer.outbox
