@@ -11,7 +11,14 @@ from flightstack.core.contract import LoopFlags, LoopStatus
 from flightstack.core.enums import NAVIGATION_STATE
 from flightstack.flight_log.local_position import LOCAL_POSITION
 from flightstack.flight_log.sensor_recorder import SENSOR_GROUPS
-from flightstack.flight_log.topics import EVENT_TOPICS, OUTER_TOPICS, Field, Topic, inner_topics
+from flightstack.flight_log.topics import (
+    BATTERY_GROUP,
+    EVENT_TOPICS,
+    OUTER_TOPICS,
+    Field,
+    Topic,
+    inner_topics,
+)
 from flightstack.params.behaviour import Behaviour
 from sim_bridge.plant.faults.table import SENSORS, TABLE, Row
 from tools.generated import ROOT, write_or_check
@@ -301,6 +308,8 @@ def topics_page() -> str:
             topic_table(inner_topics(4)),
             "\n## Outer loop rate\n",
             topic_table(OUTER_TOPICS),
+            "\n## Twice a second\n",
+            topic_table(BATTERY_GROUP.topics),
             "\n## On change\n",
             topic_table(EVENT_TOPICS),
             f"\n`vehicle_status.nav_state`: {states}.\n",

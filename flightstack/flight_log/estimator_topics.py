@@ -6,15 +6,13 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-import numpy as np
-
 from flightstack.core.contract import FloatArray
 from flightstack.estimation.error_state import NOMINAL_SIZE
 from flightstack.estimation.estimator_report import ControlFlags, RejectionFlags
 from flightstack.estimation.kalman import BARO, GNSS_POSITION, GNSS_VELOCITY, MAG, OBSERVATIONS, RANGE
 from flightstack.estimation.selector import SPEED_M_S, TURN_RAD, LaneReport
 from flightstack.estimation.sensed import Sensed
-from flightstack.flight_log.topics import Derived, Field, Group, Topic
+from flightstack.flight_log.topics import Bit, Derived, Field, Group, Topic
 
 _DEVICE = 1
 """Device id of the sensors in use, as in the topics of the measurements."""
@@ -42,16 +40,6 @@ class ReportColumns(NamedTuple):
 AT = ReportColumns()
 _STATES = 24
 _KNOWN_VARIANCES = 23
-
-
-def _bit(column: int, flag: int) -> Derived:
-    """Return a function of the rows: 1 where the flag is set in a column."""
-    shift = flag.bit_length() - 1
-
-    def derive(rows: FloatArray) -> FloatArray:
-        return ((rows[:, column].astype(np.int64) >> shift) & 1).astype(np.float64)
-
-    return derive
 
 
 _CONTROL: dict[str, int | None] = {
@@ -97,7 +85,7 @@ _REJECTED: dict[str, int | None] = {
 
 
 def _flag_fields(column: int, flags: Mapping[str, int | None]) -> list[Field]:
-    return [Field("bool", name, 0, _bit(column, flag) if flag else None) for name, flag in flags.items()]
+    return [Field("bool", name, 0, Bit(column, flag or 0)) for name, flag in flags.items()]
 
 
 _SAMPLE = Field("uint64_t", "timestamp_sample", 0, AT.horizon_us)

@@ -30,7 +30,8 @@ from flightstack.flight_log.topics import (
 from flightstack.mavlink.fields import COUNTERS, STRUCT_CODES, fitted
 from flightstack.params.vehicle import Vehicle, system_type
 
-DEFAULT_CAPACITY = 256
+DEFAULT_CAPACITY = 512
+"""Rows: a second of the inner loop at 500 Hz. What is in them is lost if the process is killed."""
 
 
 class LogFile(Protocol):

@@ -26,6 +26,7 @@ from flightstack.flight_log.flight_log import FlightLog
 from flightstack.flight_log.topics import (
     ARMING_STATE_ARMED,
     ARMING_STATE_DISARMED,
+    BATTERY_GROUP,
     OUTER,
     OUTER_GROUP,
     Group,
@@ -63,7 +64,7 @@ class FlightRecorder:
         self._origin = home
         self._battery, self._battery_due_us = battery, 0
         self._home = (home, Vector3(0.0, 0.0, 0.0))
-        self._groups, self._outer = groups, outer
+        self._groups, self._outer = (BATTERY_GROUP, *groups), outer
         self.estimate = np.zeros(outer.columns - OUTER.size)
         """Further columns of each row of the outer loop, written in place; none of a vehicle on the true state."""
         self._log: FlightLog | None = None
@@ -114,22 +115,15 @@ class FlightRecorder:
         self._store_outer(row, state, setpoint, attitude_target, loop_flags)
         if len(self.estimate):
             row[OUTER.size :] = self.estimate
-        self.battery(time_us)
 
     def battery(self, time_us: int) -> None:
-        """Record the battery if it is due; after the row of the outer tick at ``time_us``."""
-        if self._log is not None and time_us >= self._battery_due_us:
-            self._battery_due_us = next_due(time_us, _BATTERY_INTERVAL_US)
-            self._write_battery(time_us)
-
-    def _write_battery(self, time_us: int) -> None:
-        battery = self._battery()
-        if self._log is None or (math.isnan(battery.voltage_v) and not battery.valid):
+        """Record the battery if it is due; at the begin of the outer tick at ``time_us``."""
+        if self._log is None or time_us < self._battery_due_us:
             return
-        voltage_v, current_a, remaining = battery[:3]
-        self._log.event(
-            "battery_status", time_us, voltage_v=voltage_v, current_a=current_a, remaining=remaining
-        )
+        self._battery_due_us = next_due(time_us, _BATTERY_INTERVAL_US)
+        battery = self._battery()
+        if battery.valid or not math.isnan(battery.voltage_v):
+            self._log.sampled[BATTERY_GROUP.name].append(time_us)[:] = battery[:3]
 
     def status(self, time_us: int, status: Status, failsafe: bool = False) -> None:
         """Record mode, arming state and active failsafe; arming starts a log and disarming ends it."""
@@ -160,6 +154,7 @@ class FlightRecorder:
         self._write_home(time_us)
         self.landed(time_us, True)
         self._write_mission(time_us)
+        self.battery(time_us)
 
     def landed(self, time_us: int, landed: bool) -> None:
         """Record a change of the land detector."""

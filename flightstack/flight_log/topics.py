@@ -36,16 +36,23 @@ OUTER = OuterColumns()
 ATTITUDE_AT = OUTER.state + 6
 
 
+class Bit(NamedTuple):
+    """A flag in a column of whole numbers; 0 is never set."""
+
+    column: int
+    flag: int
+
+
 class Field(NamedTuple):
     """A field, an array if ``length`` is not 0.
 
-    ``source`` is the first column of the trace, a function of its rows, or None for a constant.
+    ``source`` is the first column of the trace, a flag in a column, a function of the rows, or None for a constant.
     """
 
     type: str
     name: str
     length: int = 0
-    source: int | Derived | None = None
+    source: int | Bit | Derived | None = None
     default: float = 0.0
 
 
@@ -163,6 +170,22 @@ OUTER_TOPICS = (
 
 OUTER_GROUP = Group("outer", OUTER.size, OUTER_TOPICS)
 
+BATTERY_GROUP = Group(
+    "battery",
+    3,
+    (
+        Topic(
+            "battery_status",
+            (
+                Field("float", "voltage_v", 0, 0),
+                Field("float", "current_a", 0, 1),
+                Field("float", "remaining", 0, 2),
+                Field("bool", "connected", default=1),
+            ),
+        ),
+    ),
+)
+
 ARMING_STATE_DISARMED = 1
 ARMING_STATE_ARMED = 2
 
@@ -244,15 +267,6 @@ EVENT_TOPICS = (
             Field("uint8_t", "result"),
             Field("uint8_t", "target_system"),
             Field("bool", "from_external"),
-        ),
-    ),
-    Topic(
-        "battery_status",
-        (
-            Field("float", "voltage_v", default=nan),
-            Field("float", "current_a", default=nan),
-            Field("float", "remaining", default=nan),
-            Field("bool", "connected", default=1),
         ),
     ),
     # wall clock figures are NaN in lockstep, where the log must be deterministic

@@ -180,6 +180,7 @@ class QuietBlock:
         if self._estimation is not None:
             self._estimation.update(time_us)
         if self._autopilot.is_nominal():
+            self._stack.recorder.battery(time_us)
             intervals = max(0, self._quiet_intervals(time_us))
             most = min(most, 1 + intervals, self._outer.room(time_us), self._room(is_taken=True))
             done = self.run(most, is_taken=True) if most > 0 else 0
@@ -225,8 +226,6 @@ class QuietBlock:
         if ticks:
             self._autopilot.pass_by(ticks, began_us + ticks * interval_us, rows[ticks - 1])
         self._sensors.count_rows()
-        if ticks and last_outer == ticks - 1:
-            stack.recorder.battery(began_us + ticks * interval_us)
         if flown:
             self._simulator.pass_by(flown, result)
         if sensed:

@@ -78,14 +78,11 @@ class QuietOuter:
         return np.array([calls], OUTER_CALLS)
 
     def room(self, time_us: int) -> int:
-        """Return for how many ticks from the outer tick at ``time_us`` the open log takes rows without other work.
-
-        The last one may be an outer tick after which the battery is due.
-        """
+        """Return for how many ticks from the outer tick at ``time_us`` the open log takes rows without other work."""
         log, most = self._recorder.log, self._ticks_before(self._autopilot.nominal_until_us, time_us)
         if log is None:
             return min(most, self._divisor * self._no_log.capacity)
-        until_battery = 1 + self._ticks_before(self._recorder.battery_due_us, time_us)
+        until_battery = self._ticks_before(self._recorder.battery_due_us, time_us)
         return min(most, until_battery, self._divisor * (log.outer.capacity - log.outer.n))
 
     def _ticks_before(self, until_us: int, time_us: int) -> int:

@@ -90,7 +90,7 @@ class Log(Mapping[str, Topic]):
         self._boot_s = boot_s
         self.content = content
         """The bytes of the file."""
-        self._data: dict[str, dict[str, Array]] = {}
+        self._data: dict[str, Mapping[str, Array]] = {}
         self._topics: dict[str, Topic] = {}
         self.parameters: dict[str, float] = {}
         """Parameters at the start of the flight."""

@@ -119,6 +119,8 @@ class EngineRunner:
         self._engine, self._network, self._after_outer = engine, network, after_outer
         self._watches: list[tuple[Callable[[], None], Callable[[], bool]]] = []
         self._timers: list[tuple[float, Callable[[], None]]] = []
+        self._messages_wait = True
+        """True if messages may wait that were sent since the last exchange."""
 
     def watch(self, callback: Callable[[], None], each_tick: Callable[[], bool]) -> None:
         """Call ``callback`` after every outer tick, or while ``each_tick`` returns False, after those with an event."""
@@ -130,7 +132,7 @@ class EngineRunner:
 
     def run(self, ticks: int) -> None:
         """Run inner ticks, and exchange messages when some are due, at the end of an outer period."""
-        until_s = -math.inf  # messages may wait that were sent since the last exchange
+        until_s, self._messages_wait = -math.inf, True
         while ticks > 0:
             ticks -= self._run_period(ticks, until_s)
             until_s = self._idle_until_s() if ticks > 0 else until_s
@@ -157,7 +159,7 @@ class EngineRunner:
             left -= count
             if is_outer:
                 engine.pass_requests()
-                if self._may_exchange(until_s):
+                if self._may_exchange():
                     self._network.exchange(engine.stack.ground, engine.time_s)
                 self._call_due()
             engine.step_is_pending = True
@@ -165,16 +167,16 @@ class EngineRunner:
                 break
         return most - left
 
-    def _may_exchange(self, until_s: float) -> bool:
-        """Return True if messages may be due: an event ended the period, or ``until_s`` has come."""
-        hub, now_s = self._engine.stack.ground, self._engine.time_s
-        return now_s >= until_s - MARGIN_S or self._network.idle_s(hub, now_s) <= MARGIN_S
+    def _may_exchange(self) -> bool:
+        """Return True if messages may be due."""
+        waits, self._messages_wait = self._messages_wait, False
+        return waits or self._network.idle_s(self._engine.stack.ground, self._engine.time_s) <= MARGIN_S
 
     def _idle_until_s(self) -> float:
         """Return the time from which messages are due, or a watch or a timer; −inf if it may be now."""
         engine = self._engine
-        has_settled, self._network.has_settled = self._network.has_settled, False
-        if has_settled or not engine.was_ready or any(each_tick() for _, each_tick in self._watches):
+        self._messages_wait, self._network.has_settled = self._network.has_settled, False
+        if self._messages_wait or not engine.was_ready or any(each_tick() for _, each_tick in self._watches):
             return -math.inf
         now_s = engine.time_s
         until_s = now_s + self._network.idle_s(engine.stack.ground, now_s)

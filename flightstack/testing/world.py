@@ -85,7 +85,7 @@ class World:
     ) -> None:
         """Build the world of ``setup``, or of ``conditions`` with the names of ``Setup``; raise ConfigError.
 
-        ``telemetry``: stream to ``gcs.received`` at PX4's default rates, or, if None, nothing; else once a second at most.
+        ``telemetry``: stream to ``gcs.received`` at PX4's default rates, or nothing if None, else once a second.
         """
         if setup is not None and conditions:
             raise TypeError(f"give a setup or conditions, not both: {', '.join(conditions)}")

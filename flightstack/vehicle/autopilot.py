@@ -65,6 +65,7 @@ class Autopilot:
         outer_due = self._tick % self._divisor == 0
         self._tick += 1
         if outer_due:
+            self._recorder.battery(time_us)
             self._monitor.update()
             self._guide()
         row, flags = self._recorder.inner_row(time_us), 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -82,7 +83,7 @@ class _Reader:
         self._log = log
         self._start_us = log.start_timestamp
         instances = sorted(log.data_list, key=lambda item: item.multi_id, reverse=True)
-        self._data: dict[str, dict[str, Any]] = {
+        self._data: dict[str, Mapping[str, Any]] = {
             item.name: item.data for item in instances
         }  # the first one counts
 
@@ -148,7 +149,7 @@ class _Reader:
             if math.isfinite(figures[0])  # in lockstep the log has only counts
         )
 
-    def _time_s(self, data: dict[str, Any]) -> FloatArray:
+    def _time_s(self, data: Mapping[str, Any]) -> FloatArray:
         return (data["timestamp"].astype(np.int64) - self._start_us) * 1e-6  # type: ignore[no-any-return]
 
     def _rotor_count(self) -> int:
@@ -189,9 +190,9 @@ class _Reader:
         return GeoPoint(*rows[-1][1:]) if rows else None
 
     def _origin(self) -> GeoPoint | None:
-        rows = self._rows("vehicle_local_position", "ref_lat", "ref_lon", "ref_alt")
-        places = (GeoPoint(*place) for _, *place in rows)
-        return next((place for place in places if all(map(math.isfinite, place))), None)
+        places = self._series("vehicle_local_position", ["ref_lat", "ref_lon", "ref_alt"]).values
+        known = np.isfinite(places).all(axis=1)
+        return GeoPoint(*places[known.argmax()].tolist()) if known.any() else None
 
     def _overruns(self) -> int | None:
         rows = self._rows("loop_timing", "overruns", "clock")

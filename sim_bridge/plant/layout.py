@@ -9,6 +9,7 @@ from flightstack.params.battery import MAX_CURVE_POINTS
 
 MAX_POINTS = 2 * MAX_ROTORS
 NOISE_ROWS = 1024
+"""Steps for which noise is drawn at once; the next ones are kept ready too."""
 
 CONTACT = 1  # result bits of ``advance``
 DIVERGED = 2
@@ -46,8 +47,8 @@ MEMORY = np.dtype(
         ("gust", "f8", 3),  # m/s NED
         ("torque_gust", "f8", 3),  # N m FRD
         ("torque", "f8", 3),  # external, steady and gusty, N m FRD
-        ("noise", "f8", (NOISE_ROWS, 3)),  # unit normal deviates of the wind, one row for each step
-        ("torque_noise", "f8", (NOISE_ROWS, 3)),  # the same of the torque
+        ("noise", "f8", (2 * NOISE_ROWS, 3)),  # unit normal deviates of the wind, one row for each step
+        ("torque_noise", "f8", (2 * NOISE_ROWS, 3)),  # the same of the torque
         ("noise_row", "i8"),
         ("charge", "f8"),  # of the battery, share of the capacity
         ("voltage", "f8"),  # of the battery, V

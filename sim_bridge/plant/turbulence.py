@@ -10,6 +10,7 @@ bits depend on the processor, and may change between versions.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -25,22 +26,25 @@ from sim_bridge.plant.disturbance import (
 )
 from sim_bridge.plant.layout import NOISE_ROWS
 
+_UNUSED_BITS = np.uint64(11)
+"""Of an integer of 64 bits for a number in [0, 1) with 53."""
+
 
 @compiled
-def _box_muller(shares: FloatArray) -> None:
-    """Replace pairs of uniform numbers in [0, 1), shape (n, 2), by pairs of independent normal deviates."""
-    for i in range(len(shares)):
-        radius = math.sqrt(-2.0 * log(1.0 - shares[i, 0]))
-        sine, cosine = sin_cos(2.0 * math.pi * shares[i, 1])
-        shares[i, 0], shares[i, 1] = radius * cosine, radius * sine
+def _box_muller(integers: Any, deviates: FloatArray) -> None:
+    """Write a pair of independent normal deviates for each pair of random integers of 64 bits."""
+    for i in range(0, len(integers), 2):
+        radius = math.sqrt(-2.0 * log(1.0 - (integers[i] >> _UNUSED_BITS) / 2.0**53))
+        sine, cosine = sin_cos(2.0 * math.pi * ((integers[i + 1] >> _UNUSED_BITS) / 2.0**53))
+        deviates[i], deviates[i + 1] = radius * cosine, radius * sine
 
 
 def normal_deviates(bits: np.random.PCG64, count: int) -> FloatArray:
     """Return the next ``count`` standard normal deviates; each pair takes two integers of 64 bits."""
-    pairs = (count + 1) // 2
-    shares = (bits.random_raw(2 * pairs) >> np.uint64(11)).astype(np.float64) / 2**53
-    _box_muller(shares.reshape(pairs, 2))
-    return shares[:count]
+    integers = bits.random_raw(count + count % 2)
+    deviates = np.empty(len(integers))
+    _box_muller(integers, deviates)
+    return deviates[:count]
 
 
 class _Gust:
@@ -56,6 +60,7 @@ class _Gust:
         self._bits = bits
         self._step_s = 0.0
         self._paused: FloatArray | None = None  # unit deviates at which the process was disabled
+        self._ahead: FloatArray | None = None  # noise of the steps after the next NOISE_ROWS
         self.set_spread(spread)
 
     def set_spread(self, spread: FloatArray) -> None:
@@ -70,14 +75,22 @@ class _Gust:
         has_noise, self.active = self.active, bool(spread.any())
         self._spread, self._paused = spread, present
         self._record[self._name] = spread * present
-        if not has_noise:
-            self.refill()
+        if self.active and not has_noise:
+            self._noise[:NOISE_ROWS] = self._drawn() if self._ahead is None else self._ahead
+            self._draw_ahead()
         self.set_step(self._step_s)
 
-    def refill(self) -> None:
-        """Draw new noise."""
+    def _drawn(self) -> FloatArray:
+        return normal_deviates(self._bits, 3 * NOISE_ROWS).reshape(NOISE_ROWS, 3)
+
+    def _draw_ahead(self) -> None:
+        self._noise[NOISE_ROWS:] = self._ahead = self._drawn()
+
+    def pass_by(self) -> None:
+        """Draw new noise after ``NOISE_ROWS`` steps."""
         if self.active:
-            self._noise[:] = normal_deviates(self._bits, self._noise.size).reshape(self._noise.shape)
+            self._noise[:NOISE_ROWS] = self._noise[NOISE_ROWS:]
+            self._draw_ahead()
 
     def set_step(self, step_s: float) -> None:
         """Set decay and noise of one step: spread and correlation time do not depend on the step."""
@@ -114,6 +127,7 @@ class Turbulence:
 
     def set_gust(self, gust_m_s: float) -> None:
         """Set the standard deviation of the gusts of wind."""
+        self.rows_left()  # a gust that begins now uses the first noise that is drawn for it
         self._gusts[0].set_spread(_wind_spread(gust_m_s))
         self.active = any(gust.active for gust in self._gusts)
 
@@ -123,9 +137,9 @@ class Turbulence:
             gust.set_step(step_s)
 
     def rows_left(self) -> int:
-        """Return the number of steps with noise left, at least one; draw new noise if none is left."""
-        if int(self._record["noise_row"]) == NOISE_ROWS:
+        """Return the number of steps with noise left, more than ``NOISE_ROWS``."""
+        if (row := int(self._record["noise_row"])) >= NOISE_ROWS:
             for gust in self._gusts:
-                gust.refill()
-            self._record["noise_row"] = 0
-        return NOISE_ROWS - int(self._record["noise_row"])
+                gust.pass_by()
+            self._record["noise_row"] = row = row - NOISE_ROWS
+        return 2 * NOISE_ROWS - row
