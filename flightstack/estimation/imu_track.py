@@ -185,9 +185,7 @@ class ImuTrack:
         return ImuSample(time_s, dt_s, Vector3(*values[:3]), Vector3(*values[3:]))
 
     @property
-    def rows(self) -> FloatArray:
-        """The last samples, oldest first, shape (n, 8)."""
+    def window(self) -> tuple[FloatArray, int]:
+        """The last samples, shape (n, 8), and the index of the oldest one, which the others follow in a ring."""
         count = self._taken[0]
-        if count <= WINDOW:
-            return self.ring[:count]
-        return np.roll(self.ring, -(count % WINDOW), axis=0)
+        return (self.ring[:count], 0) if count <= WINDOW else (self.ring, count % WINDOW)

@@ -5,11 +5,13 @@ Each record is made when it is first asked for.
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
+from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Quaternion, Record, Vector3
 from flightstack.estimation.error_state import Nominal
 from flightstack.estimation.estimator_report import EstimatorReport, estimator_report, nominal_of
@@ -80,7 +82,7 @@ class Sensed:
     @cached_property
     def vibration(self) -> Vibration:
         """Vibration of the inertial sensor."""
-        return vibration_of(self.samples.imu_track.rows)
+        return vibration_of(*self.samples.imu_track.window)
 
     def pose_covariance(self, attitude: Quaternion) -> FloatArray:
         """Return the covariance of position and attitude, shape (6, 6)."""
@@ -95,24 +97,33 @@ class Sensed:
         return motion_covariance(self.memory, attitude, force_frd_m_s2)
 
 
-def vibration_of(rows: FloatArray) -> Vibration:
-    """Return the vibration in successive samples, shape (n, 8): time, duration, rates, specific force."""
+@compiled
+def _size(x: float, y: float, z: float) -> float:
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@compiled
+def _vibration(rows: FloatArray, first: int, sizes: FloatArray) -> None:
+    """Write the sums of the sizes of ``Vibration`` in the samples of a ring whose oldest row is ``first``."""
+    count = len(rows)
+    sizes[:] = 0.0
+    for k in range(1, count):
+        a, b = rows[(first + k - 1) % count], rows[(first + k) % count]
+        ax, ay, az = a[2] * a[1], a[3] * a[1], a[4] * a[1]
+        bx, by, bz = b[2] * b[1], b[3] * b[1], b[4] * b[1]
+        sizes[0] += _size(ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
+        sizes[1] += _size(b[2] - a[2], b[3] - a[3], b[4] - a[4])
+        sizes[2] += _size(b[5] - a[5], b[6] - a[6], b[7] - a[7])
+
+
+def vibration_of(rows: FloatArray, first: int = 0) -> Vibration:
+    """Return the vibration in successive samples, shape (n, 8): time, duration, rates, specific force.
+
+    They begin with the row ``first``, and go on at the first row after the last one.
+    """
     if len(rows) < 2:
         return STILL
+    sizes = np.empty(3)
     with np.errstate(all="ignore"):  # absurd measurements
-        angles = rows[:, 2:5] * rows[:, 1:2]
-        change = np.diff(rows[:, 2:], axis=0)
-        coning = _cross(angles[:-1], angles[1:])
-        return Vibration(*(_mean_size(part) for part in (coning, change[:, :3], change[:, 3:])))
-
-
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the cross products of rows; unlike NumPy's, with equal bits on every processor."""
-    turned, back = (1, 2, 0), (2, 0, 1)
-    product: FloatArray = a[:, turned] * b[:, back] - a[:, back] * b[:, turned]
-    return product
-
-
-def _mean_size(rows: FloatArray) -> float:
-    x, y, z = rows.T
-    return float(sum(np.sqrt(x * x + y * y + z * z).tolist()) / len(rows))
+        _vibration(rows, first, sizes)
+        return Vibration(*(sizes / (len(rows) - 1)).tolist())

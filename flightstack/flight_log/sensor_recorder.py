@@ -139,8 +139,10 @@ class SensorRecorder:
 
         ``truth`` returns None before the first true state.
         """
+        sensed: Sensed | None = None
         if time_us >= self._local_us:
-            self.local_position(time_us, sense())
+            sensed = sense()
+            self.local_position(time_us, sensed)
         log = self._log
         if log is None or time_us < self._truth_us:
             return
@@ -150,7 +152,7 @@ class SensorRecorder:
             self._record_truth(log, time_us, state)
         if time_us >= self._estimator_us:
             self._estimator_us = next_due(time_us, ESTIMATOR_INTERVAL_US)
-            sensed = sense()
+            sensed = sensed or sense()
             fill_estimator(log.sampled[ESTIMATOR.name].append(time_us), sensed)
             if sensed.report.wind_is_observed:
                 fill_wind(log.sampled[WIND_GROUP.name].append(time_us), sensed)
