@@ -10,11 +10,14 @@ from flightstack.core.compiled import IS_DISABLED
 from flightstack.core.contract import ByteArray, FloatArray, RecordArray, SingleArray
 from flightstack.core.kernels.calls import address_of, as_bytes
 from flightstack.core.periods import NEVER_US
+from flightstack.simulator_link.battery_frame import BatteryReport
 from flightstack.simulator_link.frame_kernels import SENSOR_NEWS
 from flightstack.simulator_link.gps_kernels import GPS_SIZE
 from flightstack.simulator_link.sensor_frames import BARO as BARO_FIELDS
 from flightstack.simulator_link.sensor_frames import HIL_VALUES, VALUES
 from flightstack.simulator_link.sensor_frames import MAG as MAG_FIELDS
+from sim_bridge.plant.battery import INTERVAL_US as BATTERY_INTERVAL_US
+from sim_bridge.plant.battery import STATE_COLUMNS, BatteryState, note_battery
 from sim_bridge.plant.compiled_plant import CompiledPlant
 from sim_bridge.plant.layout import CONTACT
 from sim_bridge.plant.near_ground import airspeed
@@ -25,11 +28,13 @@ from sim_bridge.sensors.layout import IMU, MOTION
 from sim_bridge.sensors.magnetometer import Magnetometer, measure_mag
 from sim_bridge.sensors.suite import BARO_SLOT, MAG_SLOT
 from sim_bridge.simulator import Simulator
-from sim_bridge.step_kernel import BARO, MAG, STEP_CALLS, StepCalls, simulate
+from sim_bridge.step_kernel import BARO, CHARGE, MAG, STEP_CALLS, StepCalls, simulate
 
-assert (MAG_SLOT, BARO_SLOT) == (MAG, BARO)
+assert (MAG_SLOT, BARO_SLOT, BatteryState._fields[CHARGE]) == (MAG, BARO, "remaining")
 _NO_BYTES = np.zeros(0, np.uint8)
 _NO_SENSOR: tuple[Any, ...] = (_NO_BYTES, np.zeros(3), np.zeros((0, 0)), np.zeros(1, np.int64))
+_MOST_REPORTS = 8
+"""Of the battery in one call."""
 _NO_TIMES, _NO_FIX = np.full(1, NEVER_US), np.zeros(0)
 _NO_RECEIVER: tuple[Any, ...] = (
     (
@@ -86,7 +91,17 @@ class QuietSteps:
             *self._copied(taken),
         )  # fmt: skip
         sensing = self._sensing()
-        self.world: tuple[Any, ...] = (self._addresses(sensing), plant, sensing, self._slow(), self.news)
+        self.least_charge = np.zeros(1)
+        """Charge up to which a step with a report of the battery is the last one."""
+        self._reports = np.zeros((_MOST_REPORTS, STATE_COLUMNS)), np.zeros(_MOST_REPORTS, np.int64)
+        self._report_count = np.zeros(1, np.int64)
+        period_us = np.full(1, BATTERY_INTERVAL_US)
+        battery = (
+            simulator.battery_due_us, period_us, self.least_charge, *self._reports, self._report_count
+        )  # fmt: skip
+        self.world: tuple[Any, ...] = (
+            self._addresses(sensing), plant, sensing, self._slow(), self.news, battery
+        )  # fmt: skip
         """Argument ``world`` of ``simulate``."""
         self.step = address_of(simulate, self.world, 0, 0)
         """Address of ``simulate``."""
@@ -119,8 +134,9 @@ class QuietSteps:
     def _addresses(self, sensing: tuple[Any, ...]) -> RecordArray:
         plant, frame, sensors = self._plant, self._simulator.frame, self._sensors
         calls = StepCalls(
-            address_of(plant.kernel, plant.memory, self.commands, 0, 1, plant.output), 0, 0, 0, 0, 0
-        )
+            address_of(plant.kernel, plant.memory, self.commands, 0, 1, plant.output), 0, 0, 0, 0, 0,
+            address_of(note_battery, plant.memory, self._reports[0][0]),
+        )  # fmt: skip
         if sensors is not None:
             calls = calls._replace(
                 measure=address_of(measure_imu, *sensing), airspeed=address_of(airspeed, plant.memory)
@@ -149,6 +165,16 @@ class QuietSteps:
         measuring = sensors.mag, sensors.baro, sensors.gnss
         slow = [sensor.noise.ready() for sensor in measuring if sensor is not None]
         return min(steps, sensors.imus.rows_left(), *slow)
+
+    def take_reports(self) -> list[tuple[int, BatteryReport]]:
+        """Return the reports of the battery since the last call, with their times by the simulator's clock [µs]."""
+        count = int(self._report_count[0])
+        if not count:
+            return []
+        self._report_count[0] = 0
+        rows, times_us = self._reports
+        reports = [self._simulator.battery_report(BatteryState(*row)) for row in rows[:count].tolist()]
+        return list(zip(times_us[:count].tolist(), reports, strict=True))
 
     def pass_by(self, count: int, result: int) -> None:
         """Count steps that the kernel made, with the result of the last one; raise PlantDivergedError."""

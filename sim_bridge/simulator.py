@@ -10,10 +10,10 @@ import math
 import numpy as np
 
 from flightstack.core.geodesy import GeoPoint
-from flightstack.core.periods import next_due
+from flightstack.core.periods import NEVER_US, next_due
 from flightstack.mavlink.frames import HEADER_V2
 from flightstack.params.vehicle import Vehicle
-from flightstack.simulator_link.battery_frame import encode_battery
+from flightstack.simulator_link.battery_frame import BatteryReport, encode_battery
 from flightstack.simulator_link.hot_frames import (
     GROUND_CONTACT_FLAG,
     ActuatorsFrame,
@@ -21,7 +21,7 @@ from flightstack.simulator_link.hot_frames import (
 )
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.plant.battery import INTERVAL_US as BATTERY_INTERVAL_US
-from sim_bridge.plant.battery import battery_report
+from sim_bridge.plant.battery import BatteryState, battery_report
 from sim_bridge.plant.faults.checks import Flight, check_faults
 from sim_bridge.plant.faults.effects import plant_faults
 from sim_bridge.plant.faults.schedule import Schedule
@@ -68,7 +68,9 @@ class Simulator:
         self.plant.output = np.frombuffer(self._frame.frame, OUTPUT, 1, _STATE_AT)
         self._flags = 0
         self._battery_seq = 0
-        self._battery_due_us = _NEVER_US if self.plant.battery is None else 0
+        self.battery_due_us = np.full(1, NEVER_US if self.plant.battery is None else 0)
+        """Time of the next report of the battery [µs], which a kernel that notes it moves on."""
+        self._battery_due = self.battery_due_us.data  # a number of an array takes four times as long to read
         self._schedule = Schedule()
         self._change_us = _NEVER_US  # of the next work of ``apply`` for faults
         self._fault_us = _NEVER_US  # of the next begin or end of a fault
@@ -126,7 +128,7 @@ class Simulator:
         return truth if self.sensors is None else bytes(truth) + self.sensors.frames(self.stamp_us)
 
     def _outgoing_truth(self) -> bytes | memoryview:
-        if self.time_us < self._battery_due_us and not self.drops_state:
+        if self.time_us < self._battery_due[0] and not self.drops_state:
             return self.state_frame()
         battery = self.battery_frame()
         return battery if self.drops_state else battery + self.state_frame()
@@ -140,12 +142,17 @@ class Simulator:
     def battery_frame(self) -> bytes:
         """Return the BATTERY_STATUS frame if one is due, else no bytes."""
         battery = self.plant.battery
-        if self.time_us < self._battery_due_us or battery is None or self.vehicle.battery is None:
+        if self.time_us < self._battery_due[0] or battery is None or self.vehicle.battery is None:
             return b""
-        self._battery_due_us = next_due(self.time_us, BATTERY_INTERVAL_US)
-        report = battery_report(battery, self.vehicle.battery.cells)
-        seq, self._battery_seq = self._battery_seq, (self._battery_seq + 1) & 255
-        return encode_battery(report, seq, self._system_id, SIMULATOR_COMPONENT)
+        self._battery_due[0] = next_due(self.time_us, BATTERY_INTERVAL_US)
+        seq = self._battery_seq
+        return encode_battery(self.battery_report(battery), seq, self._system_id, SIMULATOR_COMPONENT)
+
+    def battery_report(self, battery: BatteryState) -> BatteryReport:
+        """Return the next report, of a vehicle with this battery."""
+        assert self.vehicle.battery is not None
+        self._battery_seq = (self._battery_seq + 1) & 255
+        return battery_report(battery, self.vehicle.battery.cells)
 
     @property
     def frame(self) -> PlantStateFrame:
@@ -226,7 +233,7 @@ class Simulator:
         for event in events:
             if event.kind is Kind.BATTERY_LEVEL:
                 self.plant.set_charge(event.value)
-                self._battery_due_us = now_us  # report the change at once
+                self._battery_due[0] = now_us  # report the change at once
         self._set_sent_state(active, [event for event in events if event.kind is Kind.CLOCK_JUMP])
         schedule.remove_past(now_us)
         change_us = schedule.next_change_us(now_us)
@@ -281,18 +288,19 @@ class Simulator:
     @property
     def sends_state_alone(self) -> bool:
         """True if ``outgoing`` has the true state and, with sensors, messages of sensors, but nothing else."""
-        return self._sent is None and self.time_us < self._battery_due_us
+        return self._sent is None and self.time_us < self._battery_due[0]
 
-    def quiet_intervals(self, measures: bool, fixes: bool = True) -> int:
+    def quiet_intervals(self, measures: bool, fixes: bool = True, reports: bool = False) -> int:
         """Return how many of the next intervals change nothing but the state and the inertial sensors.
 
         The bytes after each of them are FS_PLANT_STATE and, with sensors, HIL_SENSOR. With ``measures``, magnetometer
-        and barometer may change too, and with ``fixes`` the GNSS receiver: HIL_GPS precedes HIL_SENSOR.
+        and barometer may change too, and with ``fixes`` the GNSS receiver: HIL_GPS precedes HIL_SENSOR. With
+        ``reports``, the battery may be due.
         """
         sensors = self.sensors
         if self._sent is not None or not (sensors is None or sensors.is_quiet):
             return 0
-        due_us = min(self._change_us, self._battery_due_us)
+        due_us = self._change_us if reports else min(self._change_us, self._battery_due[0])
         if sensors is not None:
             due_us = min(due_us, sensors.next_other_us if measures else sensors.next_us)
             if not fixes:

@@ -19,6 +19,9 @@ from flightstack.simulator_link.gps_kernels import write_gps
 
 MAG, BARO = 0, 1
 """Sensors by the index of their times."""
+CHARGE = 2
+"""Column of the charge in a row of the battery."""
+PAUSES = 4
 
 
 class StepCalls(NamedTuple):
@@ -30,6 +33,7 @@ class StepCalls(NamedTuple):
     measure_baro: int
     airspeed: int
     receive_gnss: int
+    note_battery: int
 
 
 STEP_CALLS = dtype_of(StepCalls)
@@ -72,12 +76,26 @@ def _measure_slow(
 
 
 @compiled
+def _notes_battery(calls: Any, battery: Any, time_us: int, memory: Any) -> bool:
+    """Note the battery if it is due; return True if the vehicle must take this report before it goes on."""
+    due_us, period_us, least_charge, rows, times_us, count = battery
+    if not take_due(due_us, period_us, 0, time_us):
+        return False
+    at = count[0]
+    call_kernel(calls["note_battery"], (memory, rows[at]))
+    times_us[at] = time_us
+    count[0] = at + 1
+    return bool(rows[at, CHARGE] <= least_charge[0] or at + 1 == len(rows))
+
+
+@compiled
 def simulate(world: Any, time_us: int, flags: int) -> int:
     """Advance plant and sensors to ``time_us``, the simulator's time; return the bits of the plant's kernel.
 
-    ``flags`` are those of FS_ACTUATORS. After a result above that of contact nothing is measured.
+    ``flags`` are those of FS_ACTUATORS. After a result above that of contact nothing is measured. ``PAUSES`` is a
+    further bit: a report of the battery is due that the vehicle may act on.
     """
-    calls_array, plant, sensing, slow, news_array = world
+    calls_array, plant, sensing, slow, news_array, battery = world
     memory, commands, steps, output, largest_result, sent, taken = plant
     motion, imus, state, rotor_speeds, noise, wires = sensing
     calls, news = calls_array[0], news_array[0]
@@ -89,4 +107,6 @@ def simulate(world: Any, time_us: int, flags: int) -> int:
     if len(imus) > 0:
         _measure_slow(calls, slow, news, time_us, memory, state, rotor_speeds)
         call_kernel(calls["measure"], (motion, imus, state, rotor_speeds, noise, wires))
+    if _notes_battery(calls, battery, time_us, memory):
+        result |= PAUSES
     return result

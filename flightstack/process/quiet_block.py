@@ -25,6 +25,7 @@ from flightstack.flight_log.sensor_topics import IMU_GROUP
 from flightstack.process.assembly import Stack
 from flightstack.process.quiet_outer import QuietOuter
 from flightstack.process.quiet_sensors import QuietSensors, estimates_of, estimators_of, sensing_of
+from flightstack.simulator_link.battery_frame import BatteryReport
 from flightstack.simulator_link.hot_frames import VALID_FLAG
 from flightstack.vehicle.quiet_kernel import (
     QUIET_CALLS,
@@ -58,6 +59,10 @@ class QuietSimulator(Protocol):
 
     def room(self) -> int:
         """Return for how many steps the kernel can be called."""
+        ...
+
+    def take_reports(self) -> list[tuple[int, BatteryReport]]:
+        """Return the reports of the battery since the last call, with their times by the simulator's clock."""
         ...
 
     def pass_by(self, count: int, result: int) -> None:
@@ -180,7 +185,6 @@ class QuietBlock:
         if self._estimation is not None:
             self._estimation.update(time_us)
         if self._autopilot.is_nominal():
-            self._stack.recorder.battery(time_us)
             intervals = max(0, self._quiet_intervals(time_us))
             most = min(most, 1 + intervals, self._outer.room(time_us), self._room(is_taken=True))
             done = self.run(most, is_taken=True) if most > 0 else 0
@@ -221,6 +225,11 @@ class QuietBlock:
         if flown:
             stack.simulator.pass_by(flown)
         last_outer = self._outer.pass_by(stack.recorder.log, began_us, interval_us, rows)
+        reports = self._simulator.take_reports()
+        if last_outer is not None or reports:
+            boot_us = stack.simulator.stamp_us - stack.simulator.time_us
+            last_us = began_us + interval_us * (0 if last_outer is None else last_outer + 1)
+            self._outer.take_reports([(at_us - boot_us, report) for at_us, report in reports], last_us)
         if waits or last_outer != ticks - 1:
             stack.simulator.has_arrived = True
         if ticks:

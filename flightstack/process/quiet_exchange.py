@@ -13,6 +13,7 @@ from flightstack.process.assembly import Stack, build
 from flightstack.process.exchange_kernel import EXCHANGE, Exchange, exchange
 from flightstack.process.quiet_block import QuietBlock, compiles
 from flightstack.process.quiet_sensors import estimators_of
+from flightstack.simulator_link.battery_frame import BatteryReport
 from flightstack.simulator_link.frame_kernels import SENSOR_NEWS, SHAPE
 from flightstack.simulator_link.gps_kernels import GPS_SIZE
 from flightstack.simulator_link.sensor_frames import (
@@ -72,6 +73,10 @@ class ExchangedSteps:
     def room(self) -> int:
         """Return how many exchanges a call can make."""
         return MOST - int(self.record["began"][0])
+
+    def take_reports(self) -> list[tuple[int, BatteryReport]]:
+        """Return no reports of the battery: they are messages, after which the exchanges go on in Python."""
+        return []
 
     def pass_by(self, count: int, result: int) -> None:
         """Count steps: the link has counted them."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from operator import is_not
 from typing import Any
 
@@ -19,6 +20,7 @@ from flightstack.guidance.fence import fence_step
 from flightstack.guidance.kernels import GoalArrays, goal_kernel
 from flightstack.guidance.mission import MissionProgress
 from flightstack.process.assembly import Stack
+from flightstack.simulator_link.battery_frame import BatteryReport
 from flightstack.vehicle.outer_kernel import OUTER_CALLS, OUTER_MARKS, PROGRESS, OuterCalls, OuterMarks
 
 _NEVER_M = -1.0
@@ -82,8 +84,29 @@ class QuietOuter:
         log, most = self._recorder.log, self._ticks_before(self._autopilot.nominal_until_us, time_us)
         if log is None:
             return min(most, self._divisor * self._no_log.capacity)
-        until_battery = self._ticks_before(self._recorder.battery_due_us, time_us)
-        return min(most, until_battery, self._divisor * (log.outer.capacity - log.outer.n))
+        return min(most, self._divisor * (log.outer.capacity - log.outer.n))
+
+    def take_reports(self, reports: Iterable[tuple[int, BatteryReport]], last_us: int) -> None:
+        """Give the vehicle the reports of the battery, with their times, and record it in the kernel's outer ticks.
+
+        ``last_us`` is the time of the last one.
+        """
+        outers = int(self._marks[0]["outers"])
+        first_us = last_us - (outers - 1) * self._period_us
+        for time_us, report in reports:
+            self._record_battery(first_us, min(last_us, time_us - 1))
+            self._link.take_battery(report, time_us)
+        self._record_battery(first_us, last_us)
+
+    def _record_battery(self, first_us: int, last_us: int) -> None:
+        """Record the battery in those of the outer ticks from ``first_us`` to ``last_us`` in which it is due."""
+        recorder = self._recorder
+        while recorder.log is not None:
+            ticks = max(0, -((first_us - recorder.battery_due_us) // self._period_us))
+            time_us = first_us + ticks * self._period_us
+            if time_us > last_us:
+                break
+            recorder.battery(time_us)
 
     def _ticks_before(self, until_us: int, time_us: int) -> int:
         """Return how many ticks precede the first outer tick from ``until_us`` on, from that at ``time_us``."""

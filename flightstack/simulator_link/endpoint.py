@@ -208,7 +208,7 @@ class SimulatorEndpoint:
             return False
         self._take_time(self.plant.time_us)
         self._uses_hil = False
-        self._take_battery(report)
+        self.take_battery(report, self.time_us)
         return True
 
     def _receive_sensors(self, data: memoryview, sensors: SensorInbox) -> bool:
@@ -230,7 +230,7 @@ class SimulatorEndpoint:
         if at < end:
             fresh = self._receive_any(data[at:]) or fresh
         if battery is not None:
-            self._take_battery(battery)
+            self.take_battery(battery, self.time_us)
         return fresh
 
     def _take_clock(self, sensors: SensorInbox) -> None:
@@ -263,7 +263,7 @@ class SimulatorEndpoint:
                 else:
                     self._take_other(message)
         if battery is not None:
-            self._take_battery(battery)  # last: it gets the time of the state received with it
+            self.take_battery(battery, self.time_us)  # last: it gets the time of the state received with it
         return fresh
 
     def _take_other(self, message: Message) -> None:
@@ -313,8 +313,8 @@ class SimulatorEndpoint:
         frozen_us = 0 if self._uses_hil else now_us - self._changed_us  # coarse HIL values may stay the same
         return Freshness(now_us - self._arrived_us, frozen_us)
 
-    def _take_battery(self, report: BatteryReport) -> None:
-        """Store the report of the first battery; −1 and unused cells mean unknown."""
+    def take_battery(self, report: BatteryReport, time_us: int) -> None:
+        """Store the report of the first battery at ``time_us``; −1 and unused cells mean unknown."""
         if report.number != 0:
             return
         cells_mv = [cell for cell in report.cells_mv if cell != UNUSED_CELL]
@@ -322,7 +322,7 @@ class SimulatorEndpoint:
             sum(cells_mv) * 1e-3 if any(cells_mv) else math.nan,
             report.current_ca * 0.01 if report.current_ca >= 0 else math.nan,
             min(report.remaining_percent, 100) * 0.01 if report.remaining_percent >= 0 else math.nan,
-            self.time_us,
+            time_us,
             report.remaining_percent >= 0,
         )
 

@@ -11,13 +11,15 @@ from flightstack.process.quiet_block import QuietBlock, compiles
 from flightstack.process.quiet_sensors import estimators_of
 from flightstack.simulator_link.hot_frames import VALID_FLAG, ActuatorsFrame
 from flightstack.vehicle.autopilot import Lockstep
-from flightstack.vehicle.quiet_kernel import LARGEST_RESULT
-from sim_bridge import quiet_steps
+from flightstack.vehicle.quiet_kernel import LARGEST_RESULT, PAUSES
+from sim_bridge import quiet_steps, step_kernel
 from sim_bridge.plant.layout import CONTACT
 from sim_bridge.quiet_steps import QuietSteps
 from sim_bridge.simulator import Simulator
 
-assert CONTACT == LARGEST_RESULT
+assert (CONTACT, step_kernel.PAUSES) == (LARGEST_RESULT, PAUSES)
+_CHARGE_ROUNDING = 0.01
+"""Of reports, which are in percent: with more charge than that the battery is not low."""
 
 
 def _have_equal_sensors(stack: Stack, simulator: Simulator) -> bool:
@@ -63,12 +65,15 @@ class QuietTicks:
 
     def _quiet_intervals(self, simulator: Simulator) -> int:
         fixes = self._estimation is not None and self._estimation.takes_fixes
-        return simulator.quiet_intervals(measures=True, fixes=fixes)
+        return simulator.quiet_intervals(measures=True, fixes=fixes, reports=True)
 
     def _fitting(self, simulator: Simulator, actuators: ActuatorsFrame) -> QuietBlock | None:
         """Return the compiled ticks, None if a part of them is not compiled, or is not that of the start."""
-        fits = self._steps is not None and self._steps.fits(simulator, actuators.rotor_speed_rad_s)
-        return self._block if fits else None
+        steps = self._steps
+        if steps is None or not steps.fits(simulator, actuators.rotor_speed_rad_s):
+            return None
+        steps.least_charge[0] = self._now.behaviour.battery_low + _CHARGE_ROUNDING
+        return self._block
 
     def run_periods(self, simulator: Simulator, actuators: ActuatorsFrame, most: int) -> int:
         """Run the outer tick on the newest state and the ticks that follow it while nothing happens, ``most`` at most.

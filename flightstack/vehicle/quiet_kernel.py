@@ -53,6 +53,8 @@ class QuietCounters(NamedTuple):
 
 LARGEST_RESULT = 1
 """Of a step that ticks follow: a plant that touches the ground. Above it the plant has diverged."""
+PAUSES = 4
+"""Further bit of the result of a step after which the tick waits."""
 QUIET_CALLS, QUIET_COUNTERS = dtype_of(QuietCalls), dtype_of(QuietCounters)
 
 
@@ -112,6 +114,8 @@ def _advance(
     result = call_kernel_int(calls["step"], (world, time_us + boot_us, flags))
     if result < 0:
         return False
+    pauses = result & PAUSES != 0
+    result &= ~PAUSES
     counters["flown"] += 1
     counters["result"] = result
     if result > LARGEST_RESULT:
@@ -132,6 +136,9 @@ def _advance(
         ):
             counters["waits"] = 1
             return False
+    if pauses:
+        counters["waits"] = 1
+        return False
     return True
 
 

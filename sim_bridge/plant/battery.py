@@ -14,8 +14,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import Record
+from flightstack.core.contract import FloatArray, Record, RecordArray
 from flightstack.mavlink.fields import int16, int32, whole
 from flightstack.params.battery import Battery
 from flightstack.simulator_link.battery_frame import EXTRA_PLACES, PLACES, UNUSED_CELL, BatteryReport
@@ -99,15 +101,22 @@ def discharge(m: Record, shaft_w: float, step_s: float) -> None:
     m["charge"] = max(m["charge"] - m["drain"] * m["current"] * step_s / m["capacity"], 0.0)
 
 
-def battery_state(m: Record) -> BatteryState:
+STATE_COLUMNS = len(BatteryState._fields)
+
+
+@compiled
+def note_battery(memory: RecordArray, row: FloatArray) -> None:
+    """Write the ``BatteryState`` of the record of a plant."""
+    m = memory[0]
+    row[0], row[1], row[2] = m["voltage"], m["current"], m["charge"]
+    row[3], row[4] = m["consumed"] / 3.6, m["energy"]
+
+
+def battery_state(memory: RecordArray) -> BatteryState:
     """Return the battery state from the record of a plant."""
-    return BatteryState(
-        float(m["voltage"]),
-        float(m["current"]),
-        float(m["charge"]),
-        float(m["consumed"]) / 3.6,
-        float(m["energy"]),
-    )
+    row = np.zeros(STATE_COLUMNS)
+    note_battery(memory, row)
+    return BatteryState(*row.tolist())
 
 
 def battery_report(state: BatteryState, cells: int) -> BatteryReport:

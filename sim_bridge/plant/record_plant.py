@@ -174,7 +174,7 @@ class RecordPlant(ABC):
     @property
     def battery(self) -> BatteryState | None:
         """State of the battery; None without one."""
-        return battery_state(self.memory[0]) if self._has_battery else None
+        return battery_state(self.memory) if self._has_battery else None
 
     @property
     def current_a(self) -> float:

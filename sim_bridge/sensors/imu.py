@@ -40,7 +40,7 @@ from sim_bridge.sensors.layout import IMU, IMU_NOISE, MOTION, write_numbers
 from sim_bridge.sensors.noise import NormalStream, gauss_markov, limited, quantised, with_fault
 
 _MATRIX_DEVIATES, _BIAS_DEVIATES = 18, 18
-_ROWS = 256
+_ROWS = 512
 
 
 class Motion(NamedTuple):
@@ -213,7 +213,7 @@ class ImuSet:
         self._call(self.motion, self.records, state, rotor_speed, self.noise, wires)
 
     def rows_left(self) -> int:
-        """Return for how many of the next measurements there is noise, at least 256; draw more if for fewer."""
+        """Return for how many of the next measurements there is noise, at least 512; draw more if for fewer."""
         if self._left < _ROWS:
             self._draw()
         return self._left
