@@ -13,7 +13,7 @@ MULTIBODY = "multibody"
 PLANT_NAMES = ("rigid", "paper", MULTIBODY)
 NO_MUJOCO = f"the multibody plant needs MuJoCo: {INSTALL_MULTIBODY}"
 
-_KERNELS = ("settle", "quaternion_from_euler", "rotate")
+_KERNELS = ("settle", "note_battery", "quaternion_from_euler", "rotate")
 
 
 def kernels_of(plant: str) -> tuple[str, ...]:

@@ -28,9 +28,9 @@ from sim_bridge.sensors.layout import IMU, MOTION
 from sim_bridge.sensors.magnetometer import Magnetometer, measure_mag
 from sim_bridge.sensors.suite import BARO_SLOT, MAG_SLOT
 from sim_bridge.simulator import Simulator
-from sim_bridge.step_kernel import BARO, CHARGE, MAG, STEP_CALLS, StepCalls, simulate
+from sim_bridge.step_kernel import BARO, MAG, STEP_CALLS, StepCalls, simulate
 
-assert (MAG_SLOT, BARO_SLOT, BatteryState._fields[CHARGE]) == (MAG, BARO, "remaining")
+assert (MAG_SLOT, BARO_SLOT) == (MAG, BARO)
 _NO_BYTES = np.zeros(0, np.uint8)
 _NO_SENSOR: tuple[Any, ...] = (_NO_BYTES, np.zeros(3), np.zeros((0, 0)), np.zeros(1, np.int64))
 _MOST_REPORTS = 8

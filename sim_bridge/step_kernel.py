@@ -19,9 +19,8 @@ from flightstack.simulator_link.gps_kernels import write_gps
 
 MAG, BARO = 0, 1
 """Sensors by the index of their times."""
-CHARGE = 2
-"""Column of the charge in a row of the battery."""
 PAUSES = 4
+"""Bit of the result after a report that the vehicle must take before it goes on."""
 
 
 class StepCalls(NamedTuple):
@@ -82,10 +81,10 @@ def _notes_battery(calls: Any, battery: Any, time_us: int, memory: Any) -> bool:
     if not take_due(due_us, period_us, 0, time_us):
         return False
     at = count[0]
-    call_kernel(calls["note_battery"], (memory, rows[at]))
+    charge = call_kernel_float(calls["note_battery"], (memory, rows[at]))
     times_us[at] = time_us
     count[0] = at + 1
-    return bool(rows[at, CHARGE] <= least_charge[0] or at + 1 == len(rows))
+    return bool(charge <= least_charge[0] or at + 1 == len(rows))
 
 
 @compiled

@@ -82,10 +82,14 @@ class GroundMonitor:
 
     def due_event(self, time_us: int, standing: Standing, behaviour: Behaviour) -> Event | None:
         """Return the disarming event that is due on the ground, after a landing or without a takeoff, or None."""
-        if self._makes_progress(standing) or abs(standing.down_m_s) > STANDING_M_S:
-            self._since_us = time_us
+        self.follow(time_us, standing)
         event, wait_s = self._next_event(standing.goes_on, behaviour)
         return event if 0.0 < wait_s <= (time_us - self._since_us) * 1e-6 else None
+
+    def follow(self, time_us: int, standing: Standing) -> None:
+        """Take the state of a landed vehicle, after which no event is due."""
+        if self._makes_progress(standing) or abs(standing.down_m_s) > STANDING_M_S:
+            self._since_us = time_us
 
     def _next_event(self, goes_on: bool, behaviour: Behaviour) -> tuple[Event, float]:
         """Return the event that follows, and the time after which it does [s]; 0 for never."""
@@ -94,7 +98,7 @@ class GroundMonitor:
         return Event.NO_TAKEOFF, behaviour.disarm_without_takeoff_s
 
     def due_us(self, *, goes_on: bool, behaviour: Behaviour) -> int:
-        """Return a time before which no event is due if the vehicle stands, with its loops stopped."""
+        """Return a time before which no event is due: progress of a takeoff delays it."""
         _event, wait_s = self._next_event(goes_on, behaviour)
         return self._since_us + math.floor(wait_s * 1e6) if wait_s > 0.0 else NEVER_US
 

@@ -11,22 +11,35 @@ import numpy as np
 from flightstack.commander.fault_detector import detect
 from flightstack.control.loops import PythonLoops
 from flightstack.core.arrays import store_outer_row
-from flightstack.core.contract import LoopFlags, RecordArray
+from flightstack.core.contract import STATE_SIZE, LoopFlags, RecordArray
 from flightstack.core.enums import Mode
 from flightstack.core.kernels.calls import address_of
 from flightstack.flight_log.flight_log import DEFAULT_CAPACITY, FlightLog, Trace
 from flightstack.flight_log.topics import OUTER
 from flightstack.guidance.fence import fence_step
-from flightstack.guidance.kernels import GoalArrays, goal_kernel
+from flightstack.guidance.kernels import GoalArrays, goal_kernel, levelling_kernel
+from flightstack.guidance.land_detector import LEVELLING_LIFT
 from flightstack.guidance.mission import MissionProgress
+from flightstack.guidance.navigator import LEVEL_S
 from flightstack.process.assembly import Stack
 from flightstack.simulator_link.battery_frame import BatteryReport
-from flightstack.vehicle.outer_kernel import OUTER_CALLS, OUTER_MARKS, PROGRESS, OuterCalls, OuterMarks
+from flightstack.vehicle.flight_monitor import Lift
+from flightstack.vehicle.outer_kernel import (
+    FLIES,
+    LEVELS,
+    LIFTS,
+    OUTER_CALLS,
+    OUTER_MARKS,
+    PROGRESS,
+    RESTS,
+    OuterCalls,
+    OuterMarks,
+)
 
 _NEVER_M = -1.0
 """A distance to the takeoff altitude that is never reached."""
-_FLYING, _STANDING = int(LoopFlags.OUTER_DUE), 0
-"""Flags in the log of a vehicle that flies, and of one that must not."""
+_FLAGS = {FLIES: LoopFlags.OUTER_DUE, LIFTS: LoopFlags.OUTER_DUE, LEVELS: LoopFlags.SET_TARGET}
+"""Flags in the log, by phase; none while the loops are stopped."""
 
 
 def _bytes(memory: Any) -> Any:
@@ -53,6 +66,9 @@ class QuietOuter:
         self._no_log = Trace(DEFAULT_CAPACITY, columns, lambda: None)
         self._key: tuple[Any, ...] = (None,) * 11
         self._arguments: tuple[Any, ...] = ()
+        self._phase, self._trace = FLIES, self._no_log
+        self._thrust_n = 0.0  # of the target before the kernel
+        self._loops, self._rested = loops, np.zeros(STATE_SIZE)
         self._seen_bytes = b""
         self._progress_is: MissionProgress | None = None
         self.calls = self._addresses(loops)
@@ -73,8 +89,9 @@ class QuietOuter:
             command=address_of(
                 loops.outer_kernel, now.state, now.setpoint, memory, parameters, last, outer_dt_s, target
             ),
+            level=address_of(levelling_kernel, target, 1.0, 1.0, target),
             store=address_of(
-                store_outer_row, self._no_log.rows[0], now.state, now.setpoint, target, _FLYING
+                store_outer_row, self._no_log.rows[0], now.state, now.setpoint, target, 0
             ),
         )  # fmt: skip
         return np.array([calls], OUTER_CALLS)
@@ -116,6 +133,7 @@ class QuietOuter:
         """Return the kernel's argument ``outer``."""
         now, log, link = self._now, self._recorder.log, self._link
         trace = self._no_log if log is None else log.outer
+        self._phase, self._trace, self._thrust_n = self._autopilot.phase, trace, float(self._control[0][4])
         self._marks["at"], self._marks["found"] = trace.n, self._faults.found
         if link.seen is not self._seen_bytes:
             self._seen_bytes = link.seen
@@ -126,7 +144,7 @@ class QuietOuter:
         goal = self._navigator.goal
         key = (
             goal.plan, goal.jumps_left, self._navigator.modes, self._fence.arguments, self._faults.limits, trace,
-            now.status.mode, self._takeoff.altitude_m, now.behaviour, now.status.armed, now.flying,
+            now.status.mode, self._takeoff.altitude_m, now.behaviour, now.status.armed, self._phase,
         )  # fmt: skip
         if any(map(is_not, key, self._key)):
             self._key, self._arguments = key, self._made(now.status.mode, goal, trace)
@@ -140,12 +158,12 @@ class QuietOuter:
         )  # fmt: skip
         views = tuple(_bytes(memory) for memory in memories)
         acceptance_m = self._now.behaviour.altitude_acceptance_m if mode is Mode.TAKEOFF else _NEVER_M
-        is_mission, flags = mode is Mode.MISSION, _FLYING if self._now.flying else _STANDING
+        is_mission, flags = mode is Mode.MISSION, int(_FLAGS.get(self._phase, 0))
         return (
             self._marks,
             (
                 self._state, self._seen, float(self._takeoff.altitude_m), float(acceptance_m), is_mission,
-                self._progress, False, self._now.status.armed,
+                self._progress, self._phase, self._now.status.armed,
             ),
             fence,
             (faults.rotors, faults.detectors, faults.limits),
@@ -153,7 +171,7 @@ class QuietOuter:
                 self._navigator.modes[mode], goal.trajectory, goal.mission, goal.plan, goal.jumps_left,
                 goal.mode_target, goal.land, goal.params, goal.dt_s, setpoint,
             ),
-            self._control,
+            (*self._control, LEVELLING_LIFT * self._navigator.params.weight_n, goal.dt_s / LEVEL_S),
             (trace.rows, trace.times_us, OUTER.size, self._recorder.estimate, flags),
             (views, tuple(np.zeros_like(view) for view in views)),
         )  # fmt: skip
@@ -168,9 +186,22 @@ class QuietOuter:
             return None
         last = marks.last
         time_us = began_us + (last + 1) * interval_us
+        lifts: Iterable[Lift] = ()
+        if self._phase == LIFTS:
+            lifts = self._lifts(slice(marks.at, marks.at + marks.outers))
+        elif self._phase == RESTS:
+            self._rested[6:10] = self._control[0][:4]
+            self._loops.reset(self._rested)
         if log is not None:
             log.outer.n += marks.outers
         self._seen_bytes = self._seen.tobytes()
         self._link.pass_outer(time_us, self._seen_bytes)
-        self._autopilot.pass_outer(time_us, rows[last], marks.found, marks.fell_us)
+        self._autopilot.pass_outer(time_us, rows[last], marks.found, marks.fell_us, lifts)
         return last
+
+    def _lifts(self, ticks: slice) -> Iterable[Lift]:
+        """Return what the monitor of the ground takes in outer ticks: the thrust is that of the tick before."""
+        rows, times_us = self._trace.rows[ticks], self._trace.times_us[ticks].tolist()
+        down_m, down_m_s = rows[:, OUTER.state + 2].tolist(), rows[:, OUTER.state + 5].tolist()
+        thrust_n = [self._thrust_n, *rows[:-1, OUTER.target_thrust].tolist()]
+        return map(Lift, times_us, down_m, down_m_s, thrust_n)

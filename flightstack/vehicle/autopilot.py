@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Protocol
 
 from flightstack.commander.failsafe_monitor import FailsafeMonitor
@@ -13,8 +14,9 @@ from flightstack.flight_log.recorder import FlightRecorder
 from flightstack.guidance.navigator import Navigator
 from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from flightstack.simulator_link.state_steps import is_gap
-from flightstack.vehicle.flight_monitor import FlightMonitor
+from flightstack.vehicle.flight_monitor import FlightMonitor, Lift
 from flightstack.vehicle.flight_state import FlightState
+from flightstack.vehicle.outer_kernel import FLIES, LEVELS, LIFTS, RESTS, STANDS
 
 # module constants for every tick: looking up an enumeration member takes seven times as long
 _MISSION = Mode.MISSION
@@ -105,27 +107,40 @@ class Autopilot:
     def is_nominal(self) -> bool:
         """Return True if the next outer tick does nothing but these, unless the new state makes an event.
 
-        In flight it guides and controls, on the ground it leaves the rotors at idle speed.
+        In flight it guides and controls, on the ground it leaves the rotors at idle speed, or begins or ends a flight.
         """
         now = self.now
-        if now.rests:
-            return False
         if not now.flying:
             return self._monitor.stands()
-        return not (now.loops_reset or now.attitude_is_given) and self._monitor.is_nominal()
+        return (now.rests or not now.loops_reset) and self._monitor.is_nominal()
+
+    @property
+    def phase(self) -> int:
+        """Phase of the next outer tick if it is nominal."""
+        now = self.now
+        if not now.flying:
+            return STANDS
+        if now.landed:
+            return LIFTS
+        if now.rests:
+            return RESTS
+        return LEVELS if now.attitude_is_given else FLIES
 
     @property
     def nominal_until_us(self) -> int:
         """Time from which an outer tick on the ground is not nominal, because it disarms."""
-        return NEVER_US if self.now.flying else self._monitor.stands_until_us
+        return self._monitor.stands_until_us if self.now.landed or not self.now.flying else NEVER_US
 
-    def pass_outer(self, time_us: int, row: FloatArray, found: int, fell_us: int) -> None:
+    def pass_outer(
+        self, time_us: int, row: FloatArray, found: int, fell_us: int, lifts: Iterable[Lift] = ()
+    ) -> None:
         """Follow nominal outer ticks, whose kernels ran. The last was at ``time_us`` and wrote ``row``.
 
-        ``found`` are its bits of ``detect``; ``fell_us`` is the time of the last fall, 0 for none.
+        ``found`` are its bits of ``detect``; ``fell_us`` is the time of the last fall, 0 for none. ``lifts`` has an
+        element for each tick of a vehicle that began to lift off.
         """
         self._good_row[:] = row
-        self._monitor.pass_by(time_us, found, fell_us)
+        self._monitor.pass_by(time_us, found, fell_us, lifts)
 
     def pass_by(self, count: int, time_us: int, row: FloatArray) -> None:
         """Count inner ticks whose kernels ran up to ``row`` at ``time_us``."""

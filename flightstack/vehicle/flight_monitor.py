@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import NamedTuple
+
 from flightstack.commander.failsafe import Action, Failsafe, Phase, phase_of
 from flightstack.commander.failsafe_monitor import EVENTS_OF_ACTION, FailsafeMonitor
 from flightstack.commander.ground_monitor import GroundMonitor, Standing
@@ -21,6 +24,15 @@ _LEAVE_GROUND = frozenset((*AIRBORNE_MODES, *STREAM_MODES))
 
 # used in every outer tick: a member of an enumeration takes seven times as long to look up as a name
 _MISSION, _TAKEOFF = Mode.MISSION, Mode.TAKEOFF
+
+
+class Lift(NamedTuple):
+    """State and thrust target of a landed vehicle in an outer tick with loops that run."""
+
+    time_us: int
+    down_m: float
+    down_m_s: float
+    thrust_n: float
 
 
 class FlightMonitor:
@@ -76,9 +88,9 @@ class FlightMonitor:
             self._modes.choose_loops()
 
     def is_nominal(self) -> bool:
-        """Return True if the next update changes nothing unless the new state makes an event."""
+        """Return True if the next update, with started loops, changes nothing unless the new state makes an event."""
         armed, mode = self._now.status
-        if not armed or self._now.landed or mode in STREAM_MODES:
+        if not armed or mode in STREAM_MODES or self._now.landed is not self._navigator.landed:
             return False
         return self._failsafes.is_nominal(self._phase, mode)
 
@@ -96,14 +108,18 @@ class FlightMonitor:
 
     @property
     def stands_until_us(self) -> int:
-        """Time at which the vehicle, if it stands on, is disarmed."""
-        armed, behaviour = self._now.status.armed, self._now.behaviour
-        return self._ground.due_us(goes_on=False, behaviour=behaviour) if armed else NEVER_US
+        """Time before which the vehicle, if it stays on the ground, is not disarmed."""
+        now = self._now
+        goes_on = now.flying and self._flies_on
+        return self._ground.due_us(goes_on=goes_on, behaviour=now.behaviour) if now.status.armed else NEVER_US
 
-    def pass_by(self, time_us: int, found: int, fell_us: int) -> None:
+    def pass_by(self, time_us: int, found: int, fell_us: int, lifts: Iterable[Lift]) -> None:
         """Follow updates up to ``time_us`` that did nothing; arguments as in ``Autopilot.pass_outer``."""
         if fell_us:
             self._ground.note_fall(fell_us)
+        for at_us, down_m, down_m_s, thrust_n in lifts:
+            standing = Standing(self._flies_on, True, down_m, down_m_s, thrust_n / self._weight_n)
+            self._ground.follow(at_us, standing)
         if self._now.status.armed and not self._now.flying:
             self._ground.stand()
         self._failsafes.pass_by(time_us, found)
@@ -155,10 +171,15 @@ class FlightMonitor:
     def _due_on_ground(self) -> Event | None:
         """Return the event due on the ground: disarming after a landing, or without a takeoff."""
         now = self._now
-        flies_on = now.status.mode in AIRBORNE_MODES or (now.status.mode in STREAM_MODES and now.flying)
         lift = float(now.attitude_target[4]) / self._weight_n
-        standing = Standing(flies_on, now.flying, float(now.state[2]), float(now.state[5]), lift)
+        standing = Standing(self._flies_on, now.flying, float(now.state[2]), float(now.state[5]), lift)
         return self._ground.due_event(now.time_us, standing, now.behaviour)
+
+    @property
+    def _flies_on(self) -> bool:
+        """True if the mode goes on with the flight after a landing."""
+        mode = self._now.status.mode
+        return mode in AIRBORNE_MODES or (mode in STREAM_MODES and self._now.flying)
 
     def _update_mission(self) -> None:
         """Report progress of the mission, and apply the events of its end."""

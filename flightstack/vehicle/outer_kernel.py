@@ -1,6 +1,7 @@
 """A nominal outer tick as compiled code, for the kernel of quiet ticks.
 
-In flight it runs failsafe detectors, guidance and outer loop, on the ground the detectors.
+In flight it runs failsafe detectors, guidance and outer loop, on the ground the detectors, and what of the others goes
+on there: see the phases.
 
 It calls the kernels that monitor, guidance and loops run in any other tick, on the same arrays and in the same order.
 If one of them finds an event, such as a breached fence, a reached mission item or ground contact, it puts their
@@ -18,7 +19,11 @@ from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
 from flightstack.core.kernels.calls import call_kernel, call_kernel_int
 from flightstack.core.record_types import dtype_of
-from flightstack.guidance.land_detector import CONTACT_M_S
+from flightstack.guidance.land_detector import CONTACT_M_S, REST_M_S
+
+STANDS, FLIES, LEVELS, RESTS, LIFTS = range(5)
+"""Phases of nominal outer ticks: on the ground with stopped loops; in the air; in ground contact with little thrust;
+after it, with stopped loops, until the vehicle counts as landed; landed with loops that run, before it lifts off."""
 
 
 class OuterCalls(NamedTuple):
@@ -28,6 +33,7 @@ class OuterCalls(NamedTuple):
     detect: int
     guide: int
     command: int
+    level: int
     store: int
 
 
@@ -65,9 +71,13 @@ def _are_equal(left: Any, right: Any) -> bool:
 
 
 @compiled
-def _touches(land: FloatArray) -> bool:
-    """Return True if the land detector reports landed, or ground contact."""
-    return bool(land[0] > 0.0 or land[1] >= CONTACT_M_S)
+def _phase_of(land: FloatArray) -> int:
+    """Return the phase of a vehicle whose loops were started, by the memory of the land detector."""
+    if land[0] > 0.0:
+        return LIFTS
+    if land[1] < CONTACT_M_S:
+        return FLIES
+    return LEVELS if land[1] < REST_M_S else RESTS
 
 
 @compiled
@@ -91,16 +101,16 @@ def _leaves_fence(calls: Any, fence: Any, state: FloatArray) -> bool:
 def _is_nominal(calls: Any, outer: Any, state: FloatArray, row: FloatArray) -> bool:
     """Advance fence, detectors and guidance; return False after an event, when memories may have changed."""
     marks, watch, fence, faults, guidance, control, _log, _saved = outer
-    _state_bytes, _seen, altitude_m, acceptance_m, is_mission, progress, on_ground, _is_armed = watch
+    _state_bytes, _seen, altitude_m, acceptance_m, is_mission, progress, phase, _is_armed = watch
     number, trajectory, mission, plan, jumps_left, mode_target, land, params, dt_s, setpoint = guidance
     rotors, detectors, limits = faults
-    if _touches(land) or (is_mission and _has_progress(mission, progress)):
+    if _phase_of(land) != phase or (is_mission and _has_progress(mission, progress)):
         return False
     if abs(state[2] + altitude_m) <= acceptance_m or _leaves_fence(calls, fence, state):
         return False
-    found = call_kernel_int(
-        calls["detect"], (state, setpoint, row, rotors, detectors, limits, on_ground, dt_s)
-    )
+    on_ground = phase != FLIES
+    place = setpoint if phase in (FLIES, LIFTS) else state  # the position is not controlled
+    found = call_kernel_int(calls["detect"], (state, place, row, rotors, detectors, limits, on_ground, dt_s))
     if found & ~MOVING != 0:
         return False
     call_kernel(
@@ -110,10 +120,26 @@ def _is_nominal(calls: Any, outer: Any, state: FloatArray, row: FloatArray) -> b
             params, dt_s, setpoint,
         ),
     )  # fmt: skip
-    if _touches(land):
+    if _phase_of(land) != phase:
         return False
     marks[0]["found"] = found
     return True
+
+
+@compiled
+def _command(calls: Any, phase: int, state: FloatArray, setpoint: FloatArray, control: Any) -> None:
+    """Write the attitude target."""
+    target, last_target, memory, parameters, last, outer_dt_s, thrust_n, levelled = control
+    if phase == RESTS:  # as a reset of the loops
+        copy_all(state[6:10], target)
+        target[4] = 0.0
+        copy_all(target, last_target)
+        return
+    copy_all(target, last_target)
+    if phase == LEVELS:
+        call_kernel(calls["level"], (last_target, thrust_n, levelled, target))
+    else:
+        call_kernel(calls["command"], (state, setpoint, memory, parameters, last, outer_dt_s, target))
 
 
 @compiled
@@ -137,33 +163,29 @@ def _stands(calls: Any, outer: Any, state: FloatArray, row: FloatArray) -> bool:
 
 
 @compiled
-def guide(
-    calls: Any, outer: Any, tick: int, time_us: int, flies: bool, state: FloatArray, row: FloatArray
-) -> bool:
+def guide(calls: Any, outer: Any, tick: int, time_us: int, state: FloatArray, row: FloatArray) -> bool:
     """Run the outer tick ``tick`` up to the outer loop; return False, with nothing changed, if it is not nominal.
 
     ``row`` is the newest row of the inner loop.
     """
     marks, watch, _fence, _faults, guidance, control, _log, saved = outer
+    phase = watch[6]
     memories, copies = saved
     if _are_equal(watch[0], watch[1]):  # no new state
         return False
     for k in range(len(memories)):
         copy_all(memories[k], copies[k])
-    is_nominal = _is_nominal(calls, outer, state, row) if flies else _stands(calls, outer, state, row)
-    if not is_nominal:
+    stands = phase == STANDS
+    if not (_stands(calls, outer, state, row) if stands else _is_nominal(calls, outer, state, row)):
         for k in range(len(memories)):
             copy_all(copies[k], memories[k])
         return False
     copy_all(watch[0], watch[1])
     marks[0]["last"] = tick
-    if not flies:
-        return True
-    if abs(state[5]) > FALL_M_S:
-        marks[0]["fell_us"] = time_us
-    target, last_target, memory, parameters, last, outer_dt_s = control
-    copy_all(target, last_target)
-    call_kernel(calls["command"], (state, guidance[9], memory, parameters, last, outer_dt_s, target))
+    if not stands:
+        if abs(state[5]) > FALL_M_S:
+            marks[0]["fell_us"] = time_us
+        _command(calls, phase, state, guidance[9], control)
     return True
 
 

@@ -171,7 +171,7 @@ def fly_quiet_ticks(
             return
         outer_due = (i - outer_in) % divisor == 0
         if outer_due:
-            if not guide(outer_calls, outer, i, time_us, flies, state, row):
+            if not guide(outer_calls, outer, i, time_us, state, row):
                 counters["waits"] = 1
                 return
             if flies:

@@ -77,6 +77,8 @@ class Session:
         self._collect_services()
         self._heartbeat_due_s = 0.0
         self._heartbeat_due_vehicle_s = -math.inf  # as soon as the vehicle's time is known
+        self._vehicle_s: float | None = None  # the vehicle's time in its last message that has it
+        self._timed_s = 0.0  # when it came
 
     @property
     def view(self) -> VehicleView:
@@ -170,6 +172,8 @@ class Session:
         elif not self._is_vehicle(message, peer, now_s):
             return
         is_own = self._builder.add(message, now_s)
+        if self._builder.time_s != self._vehicle_s:
+            self._vehicle_s, self._timed_s = self._builder.time_s, now_s
         if self.observe is not None:
             self.observe(message)
         if is_own:
@@ -206,11 +210,7 @@ class Session:
         frames = []
         if self.peer is not None and self.heartbeat_is_due(now_s):
             frames.append(self.encode(self._heartbeat(mavlink.MAV_STATE_ACTIVE)))
-            due_s = self._heartbeat_due_s
-            keeps_time = now_s - due_s < HEARTBEAT_PERIOD_S - _ROUNDING_S  # those of both sides stay together
-            self.skip_heartbeat(due_s if keeps_time else now_s)
-            if now_s + _ROUNDING_S < due_s:  # it is due in vehicle time alone
-                self._heartbeat_due_s = due_s
+            self._note_heartbeat(now_s)
         for service in self._services:
             messages = service.poll(now_s)
             frames += [self.encode(message) for message in messages if self.peer is not None]
@@ -223,12 +223,21 @@ class Session:
             vehicle_s is not None and vehicle_s >= self._heartbeat_due_vehicle_s
         )
 
+    def _note_heartbeat(self, now_s: float) -> None:
+        """Count a heartbeat: the next ones keep their times, so that those of both sides stay together."""
+        due_s = self._heartbeat_due_s
+        self.skip_heartbeat(now_s)
+        if now_s + _ROUNDING_S < due_s:  # it was due in vehicle time alone
+            self._heartbeat_due_s = due_s
+        elif now_s - due_s < HEARTBEAT_PERIOD_S - _ROUNDING_S:
+            self._heartbeat_due_s = due_s + HEARTBEAT_PERIOD_S
+
     def skip_heartbeat(self, now_s: float) -> None:
         """Send the next heartbeat one period from now: the peer just got one."""
         self._heartbeat_due_s = now_s + HEARTBEAT_PERIOD_S
-        vehicle_s = self._builder.time_s
-        if vehicle_s is not None:
-            self._heartbeat_due_vehicle_s = vehicle_s + HEARTBEAT_PERIOD_S
+        if self._vehicle_s is not None:
+            vehicle_now_s = self._vehicle_s + max(0.0, now_s - self._timed_s)
+            self._heartbeat_due_vehicle_s = vehicle_now_s + HEARTBEAT_PERIOD_S - _ROUNDING_S
 
     def next_deadline(self) -> float | None:
         """Return the time at which to call ``poll`` at the latest; None without a vehicle."""

@@ -105,11 +105,13 @@ STATE_COLUMNS = len(BatteryState._fields)
 
 
 @compiled
-def note_battery(memory: RecordArray, row: FloatArray) -> None:
-    """Write the ``BatteryState`` of the record of a plant."""
+def note_battery(memory: RecordArray, row: FloatArray) -> float:
+    """Write the ``BatteryState`` of the record of a plant; return the charge."""
     m = memory[0]
     row[0], row[1], row[2] = m["voltage"], m["current"], m["charge"]
     row[3], row[4] = m["consumed"] / 3.6, m["energy"]
+    charge: float = m["charge"]
+    return charge
 
 
 def battery_state(memory: RecordArray) -> BatteryState:

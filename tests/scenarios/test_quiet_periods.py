@@ -153,6 +153,17 @@ def test_a_flight_is_the_same_as_by_single_ticks_with_bytes(fly: Callable[[World
     assert_flies_equally(fly, state=state, vehicle="x_quad", seed=5)
 
 
+def test_a_battery_that_becomes_low_in_flight_acts_at_the_same_tick() -> None:
+    """Between two stops of the compiled call."""
+
+    def fly(world: World) -> None:
+        world.takeoff(3.0)
+        world.run_for(20.0)
+        assert {"failsafe_BATTERY_LOW", "failsafe_BATTERY_CRITICAL"} <= {event.name for event in world.events}
+
+    assert_flies_equally(fly, state="truth", vehicle="x_quad", battery_percent=25.0, battery_drain=20.0)
+
+
 def test_one_call_flies_many_periods(monkeypatch: pytest.MonkeyPatch) -> None:
     with World(state="truth") as world:
         world.takeoff(2.0)
