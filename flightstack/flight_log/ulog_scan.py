@@ -20,10 +20,11 @@ _COMPILED_BYTES = 50_000_000
 
 
 @compiled
-def scan_kernel(content: Any, is_known: Any, positions: Any) -> int:
+def scan_kernel(content: Any, is_known: Any, positions: Any, numbers: Any) -> int:
     """Write the position of each message and that behind the last one to ``positions``; return their number.
 
-    ``content`` and ``is_known``, by the type of a message, are bytes or arrays of uint8.
+    ``numbers`` gets the subscription id of each message of data, −1 for others. ``content`` and ``is_known``, by the
+    type of a message, are bytes or arrays of uint8.
     """
     at, end, count = HEADER_SIZE, len(content), 0
     while at + _MESSAGE_HEADER <= end:
@@ -32,22 +33,24 @@ def scan_kernel(content: Any, is_known: Any, positions: Any) -> int:
         if after > end or not is_known[kind] or (kind == DATA_TYPE and after < at + _DATA_HEADER):
             break
         positions[count] = at
+        numbers[count] = content[at + 3] | content[at + 4] << 8 if kind == DATA_TYPE else -1
         count += 1
         at = after
     positions[count] = at
     return count + 1
 
 
-def message_positions(content: bytes) -> Positions:
-    """Return the position of each message, shape (n + 1,): the last one is that behind the last message.
+def scan_messages(content: bytes) -> tuple[Positions, Positions]:
+    """Return the position of each message, and the subscription id of each message of data, −1 for others.
 
-    That is the size of the file if messages of known types fill it to its last byte. The format has no end mark and no
-    checksums: damage inside a message is not detected.
+    There is a further position, that behind the last message. It is the size of the file if messages of known types
+    fill it to its last byte. The format has no end mark and no checksums: damage inside a message is not detected.
     """
-    positions = np.empty(len(content) // _MESSAGE_HEADER + 1, np.int64)
+    most = len(content) // _MESSAGE_HEADER + 1
+    positions, numbers = np.empty(most, np.int64), np.empty(most, np.int64)
     if not IS_DISABLED and ("numba" in sys.modules or len(content) >= _COMPILED_BYTES):
-        count = scan_kernel(np.frombuffer(content, np.uint8), _KNOWN, positions)
+        count = scan_kernel(np.frombuffer(content, np.uint8), _KNOWN, positions, numbers)
     else:
         scan = getattr(scan_kernel, "py_func", scan_kernel)
-        count = scan(content, _IS_KNOWN, positions.data)
-    return positions[:count].copy()  # most of the memory is not used
+        count = scan(content, _IS_KNOWN, positions.data, numbers.data)
+    return positions[:count].copy(), numbers[: count - 1].copy()  # most of the memory is not used

@@ -19,8 +19,8 @@ import numpy as np
 from pyulog import ULog, ULogException
 
 from flightstack.core.errors import ConfigError
-from flightstack.flight_log.ulog import DATA_TYPE, HEADER_SIZE, MESSAGE_HEADER
-from flightstack.flight_log.ulog_scan import message_positions
+from flightstack.flight_log.ulog import HEADER_SIZE, MESSAGE_HEADER
+from flightstack.flight_log.ulog_scan import scan_messages
 
 IndexArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
@@ -29,7 +29,7 @@ DAMAGE = (ULogException, struct.error, ValueError, KeyError, IndexError, Overflo
 NO_DATA = "the log has no data"
 _ROW_AT = 5
 """Offset of the row in a message of data: behind size, type and subscription id."""
-_KIND_AT, _TIME_SIZE = 2, 8
+_TIME_SIZE = 8
 _SHORT = 1 << 8
 _SUBSCRIPTION_TYPE, _FLAG_TYPE = ord("A"), ord("B")
 _INCOMPATIBLE_AT = 8
@@ -93,7 +93,7 @@ class _Rows:
     def __init__(self, content: bytes, topics: list[str] | None) -> None:
         self._content = content
         self._topics = None if topics is None else {topic.encode() for topic in topics}
-        positions = message_positions(content)
+        positions, numbers = scan_messages(content)
         self._begins, self._ends = positions[:-1], positions[1:]
         self.fill_file = bool(positions[-1] == len(content))
         """True if messages of known types fill the file to its last byte.
@@ -103,13 +103,13 @@ class _Rows:
         self.are_regular = self.fill_file
         """True if also no subscription id is used twice, each row has a time, and no data is appended."""
         if self.are_regular:
-            self._gather()
+            self._gather(numbers)
 
-    def _gather(self) -> None:
-        """Find the wanted rows, and the messages that are not data. Messages are counted from 0."""
-        is_row = self._unaligned("u1", self._begins + _KIND_AT) == DATA_TYPE
+    def _gather(self, numbers: IndexArray) -> None:
+        """Find the wanted rows, and the messages that are not data; ``numbers`` are those of ``scan_messages``."""
+        is_row = numbers >= 0
         self._rows, self._others = np.flatnonzero(is_row), np.flatnonzero(~is_row)
-        numbers = self._unaligned("<u2", self._begins[self._rows] + MESSAGE_HEADER.size)
+        numbers = numbers[is_row].astype(np.uint16)
         if numbers.size and numbers.max() < _SHORT:  # sorted in half the time
             numbers = numbers.astype(np.uint8)
         self._of = _grouped(self._rows, numbers)

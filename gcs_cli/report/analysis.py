@@ -19,6 +19,7 @@ from gcs_cli.logs.ulog_parser import DAMAGE, NO_DATA, ParsedLog, parse_ulog
 from gcs_cli.report.flight_data import (
     REAL_TIME,
     Flight,
+    LoopSeries,
     LoopTiming,
     MissionProgress,
     Series,
@@ -89,7 +90,6 @@ class _Reader:
 
     def flight(self) -> Flight:
         log = self._log
-        rotors = self._rotor_count()
         return Flight(
             start_s=self._start_us * 1e-6,
             duration_s=(log.last_timestamp - self._start_us) * 1e-6,
@@ -103,9 +103,7 @@ class _Reader:
             velocity_setpoint=self._series("trajectory_setpoint", _elements("velocity", 3)),
             attitude=self._euler("vehicle_attitude", "q"),
             attitude_target=self._euler("vehicle_attitude_setpoint", "q_d"),
-            rotor_speed=self._series("rotor_speeds", _elements("speed_rad_s", rotors)),
-            rotor_command=self._series("rotor_speeds", _elements("command_rad_s", rotors)),
-            torque=self._series("wrench", _elements("torque_n_m", 3)),
+            read_loops=self._loops,
             battery=self._series("battery_status", ["remaining", "voltage_v"]),
             true_position=self._truth("x", "y", "z"),
             true_velocity=self._truth("vx", "vy", "vz"),
@@ -122,6 +120,14 @@ class _Reader:
             ),
             overruns=self._overruns(),
             loop_timing=self._loop_timing(),
+        )
+
+    def _loops(self) -> LoopSeries:
+        rotors = self._rotor_count()
+        return LoopSeries(
+            rotor_speed=self._series("rotor_speeds", _elements("speed_rad_s", rotors)),
+            rotor_command=self._series("rotor_speeds", _elements("command_rad_s", rotors)),
+            torque=self._series("wrench", _elements("torque_n_m", 3)),
         )
 
     def _statuses(self) -> tuple[Status, ...]:
@@ -160,7 +166,9 @@ class _Reader:
         data = self._data.get(topic)
         if data is None or any(name not in data for name in fields):
             return empty_series(len(fields))
-        values = np.column_stack([data[name].astype(np.float64) for name in fields])
+        values = np.empty((len(data["timestamp"]), len(fields)))
+        for index, name in enumerate(fields):
+            values[:, index] = data[name]
         return series(self._time_s(data), values)
 
     def _euler(self, topic: str, quaternion: str) -> Series:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
@@ -89,6 +89,17 @@ def series(time_s: FloatArray, values: FloatArray) -> Series:
     return Series(time_s, values)
 
 
+class LoopSeries(NamedTuple):
+    """Series at the rate of the inner loop, as in ``Flight``."""
+
+    rotor_speed: Series
+    rotor_command: Series
+    torque: Series
+
+
+NO_LOOPS = LoopSeries(empty_series(0), empty_series(0), empty_series(3))
+
+
 @dataclass(frozen=True)
 class Flight:
     """One flight. Positions NED [m] from the origin, velocities NED [m/s], angles roll, pitch, yaw [rad]."""
@@ -107,10 +118,8 @@ class Flight:
     velocity_setpoint: Series = field(default_factory=lambda: empty_series(3))
     attitude: Series = field(default_factory=lambda: empty_series(3))
     attitude_target: Series = field(default_factory=lambda: empty_series(3))
-    rotor_speed: Series = field(default_factory=lambda: empty_series(0))
-    rotor_command: Series = field(default_factory=lambda: empty_series(0))
-    torque: Series = field(default_factory=lambda: empty_series(3))
-    """Torque that the controller asks for, body FRD [N m]."""
+    read_loops: Callable[[], LoopSeries] = field(default=lambda: NO_LOOPS, compare=False)
+    """Reads the series of the inner loop, a third of a log's numbers, when one of them is asked for."""
     battery: Series = field(default_factory=lambda: empty_series(2))
     """Remaining charge, 0 to 1, and voltage [V]; NaN where unknown."""
     true_position: Series = field(default_factory=lambda: empty_series(3))
@@ -127,6 +136,25 @@ class Flight:
     loop_timing: tuple[LoopTiming, ...] = ()
     damaged: bool = False
     """The log ends within a message, or contains invalid data."""
+
+    @cached_property
+    def _loops(self) -> LoopSeries:
+        return self.read_loops()
+
+    @property
+    def rotor_speed(self) -> Series:
+        """Rotor speeds [rad/s]."""
+        return self._loops.rotor_speed
+
+    @property
+    def rotor_command(self) -> Series:
+        """Commanded rotor speeds [rad/s]."""
+        return self._loops.rotor_command
+
+    @property
+    def torque(self) -> Series:
+        """Torque that the controller asks for, body FRD [N m]."""
+        return self._loops.torque
 
     @property
     def origin(self) -> GeoPoint | None:

@@ -12,7 +12,7 @@ from flightstack.core.errors import ConfigError
 from flightstack.plan import save_plan
 from gcs_cli.errors import CliError
 from gcs_cli.report.analysis import read_flight
-from gcs_cli.report.flight_data import Flight, series
+from gcs_cli.report.flight_data import NO_LOOPS, Flight, series
 from gcs_cli.report.poses import Run, find_run, poses_of
 from tests.support.commands import gcs
 from tests.support.square_plan import square_plan
@@ -72,7 +72,7 @@ def _flight(position: list[list[float]], vehicle: str | None = "paper_quad") -> 
         info={} if vehicle is None else {"vehicle": vehicle},
         position=series(time_s, np.array(position)),
         attitude=series(time_s.copy(), np.zeros((len(position), 3))),
-        rotor_speed=series(time_s.copy(), np.zeros((len(position), 4))),
+        read_loops=lambda: NO_LOOPS._replace(rotor_speed=series(time_s.copy(), np.zeros((len(position), 4)))),
     )
 
 

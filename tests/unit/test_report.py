@@ -20,7 +20,7 @@ from gcs_cli.logs.ulog_reader import read_ulog
 from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.conditions import conditions
 from gcs_cli.report.flight_charts import mode_bands, time_figures
-from gcs_cli.report.flight_data import Flight, LoopTiming, Text, loop_timing, series
+from gcs_cli.report.flight_data import NO_LOOPS, Flight, LoopTiming, Text, loop_timing, series
 from gcs_cli.report.page import render_report, write_report
 from gcs_cli.report.path_charts import map_figure
 from gcs_cli.report.summary import RunInfo, summarise
@@ -176,9 +176,10 @@ def test_values_that_are_no_numbers_leave_gaps_only() -> None:
     angles = series(time_s, np.column_stack([bad] * 3))
     position = series(time_s.copy(), np.column_stack([bad] * 3))
     nothing = series(time_s.copy(), np.full((6, 3), math.nan))
+    loops = NO_LOOPS._replace(rotor_speed=angles)
     for target in (angles, nothing):
         html = report(
-            Flight(6.0, position=position, attitude=angles, attitude_target=target, rotor_speed=angles)
+            Flight(6.0, position=position, attitude=angles, attitude_target=target, read_loops=lambda: loops)
         )
         parsed(html)
         assert not re.search(r"[\"\s,:\[](nan|inf|-inf|infinity)[\"\s,\]]", own_part(html), re.IGNORECASE)

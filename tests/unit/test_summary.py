@@ -21,7 +21,7 @@ from flightstack.plan import Command, Frame, MissionItem, Plan
 from gcs_cli.errors import FAILED
 from gcs_cli.logs.ulog_parser import ParsedLog
 from gcs_cli.report.analysis import flight_in, flight_of, read_flight
-from gcs_cli.report.flight_data import Flight, MissionProgress, Status, series
+from gcs_cli.report.flight_data import NO_LOOPS, Flight, MissionProgress, Status, series
 from gcs_cli.report.flight_figures import attitude_error, rms_command_rate_rad_s2, rms_torque_n_m
 from gcs_cli.report.flight_outcome import COMPLETED, Code, Outcome, with_log
 from gcs_cli.report.summary import RunInfo, summarise, write_summary
@@ -210,11 +210,11 @@ def test_attitude_error_is_the_angle_between_attitude_and_setpoint() -> None:
 
 def test_control_effort_by_hand() -> None:
     time_s = [0.0, 0.5, 1.0, 1.5]
-    flight = Flight(
+    loops = NO_LOOPS._replace(
         torque=samples(time_s, [[9, 9, 9], [1, 0, 0], [-1, 2, 0], [9, 9, 9]]),
         rotor_command=samples(time_s, [[0, 0], [100, 100], [103, 96], [0, 0]]),
-        statuses=armed_from(0.5, 1.5),
     )
+    flight = Flight(read_loops=lambda: loops, statuses=armed_from(0.5, 1.5))
     assert rms_torque_n_m(flight) == pytest.approx([1.0, math.sqrt(2.0), 0.0])
     assert rms_command_rate_rad_s2(flight) == pytest.approx(math.sqrt((6.0**2 + 8.0**2) / 2))
 

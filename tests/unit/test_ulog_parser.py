@@ -13,7 +13,7 @@ from pyulog import ULog
 
 from flightstack.core.errors import ConfigError
 from flightstack.flight_log import ulog_scan
-from flightstack.flight_log.ulog import HEADER_SIZE, MESSAGE_HEADER
+from flightstack.flight_log.ulog import DATA_TYPE, HEADER_SIZE, MESSAGE_HEADER
 from gcs_cli.logs.ulog_parser import LogBytes, parse_ulog
 from tests.support.sample_logs import small_ulog
 from tests.support.truth import World
@@ -132,14 +132,21 @@ def damaged(log: bytes, seed: int) -> bytes:
 @pytest.mark.parametrize("seed", range(30))
 def test_messages_are_found_with_numba_as_without(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     content = damaged(small_ulog(), seed)
-    compiled = ulog_scan.message_positions(content)
+    compiled = ulog_scan.scan_messages(content)
     with monkeypatch.context() as patch:  # NUMBA_DISABLE_JIT=1
         patch.setattr(ulog_scan, "IS_DISABLED", True)
         patch.setattr(ulog_scan, "scan_kernel", ulog_scan.scan_kernel.py_func)
-        debugged = ulog_scan.message_positions(content)
+        debugged = ulog_scan.scan_messages(content)
     monkeypatch.setattr(ulog_scan, "sys", SimpleNamespace(modules={}))
-    plain = ulog_scan.message_positions(content)
-    assert plain.tolist() == compiled.tolist() == debugged.tolist()
-    assert plain[0] == HEADER_SIZE
-    sizes = [MESSAGE_HEADER.size + MESSAGE_HEADER.unpack_from(content, at)[0] for at in plain[:-1]]
-    assert np.diff(plain).tolist() == sizes
+    plain = ulog_scan.scan_messages(content)
+    for number in range(2):
+        assert plain[number].tolist() == compiled[number].tolist() == debugged[number].tolist()
+    positions, numbers = plain
+    assert positions[0] == HEADER_SIZE
+    messages = [MESSAGE_HEADER.unpack_from(content, at) for at in positions[:-1]]
+    assert np.diff(positions).tolist() == [MESSAGE_HEADER.size + size for size, _kind in messages]
+    ids = [int.from_bytes(content[at + 3 : at + 5], "little") for at in positions[:-1]]
+    kinds = [kind for _size, kind in messages]
+    assert numbers.tolist() == [
+        id_ if kind == DATA_TYPE else -1 for id_, kind in zip(ids, kinds, strict=True)
+    ]
