@@ -39,24 +39,37 @@ else:
     register(PartCompiler)  # type: ignore[arg-type]  # of no type
 
 
-_array_types: dict[tuple[Any, ...], numba.types.Type] = {}
-"""Types of arrays by what Numba derives them from."""
+_NUMBERS = (bool, float)
 
 
-def _type_of(example: Any) -> numba.types.Type:
-    """Return Numba's type of ``example``; that of an array of records takes Numba a millisecond, so it is kept."""
+def _key_of(example: Any) -> Any:
+    """Return what Numba derives the type of ``example`` from, or the type: that of records takes it a millisecond."""
+    kind = type(example)
+    if kind is np.ndarray:
+        dtype, flags = example.dtype, example.flags
+        return (
+            dtype, dtype.isalignedstruct, example.ndim,
+            flags.c_contiguous, flags.f_contiguous, flags.writeable, flags.aligned,
+        )  # fmt: skip
     if isinstance(example, tuple):
-        return numba.types.BaseTuple.from_types([_type_of(item) for item in example], type(example))
-    if type(example) is not np.ndarray:
-        return numba.typeof(example)
-    dtype, flags = example.dtype, example.flags
-    key = (
-        dtype, dtype.isalignedstruct, example.ndim,
-        flags.c_contiguous, flags.f_contiguous, flags.writeable, flags.aligned,
-    )  # fmt: skip
-    found = _array_types.get(key)
+        return (kind, *map(_key_of, example))
+    return kind if kind in _NUMBERS else numba.typeof(example)
+
+
+_types: dict[Any, numba.types.Type] = {}
+"""Types by ``_key_of``."""
+
+
+def _type_of(example: Any, key: Any) -> numba.types.Type:
+    """Return Numba's type of ``example``, whose key is ``key``."""
+    found = _types.get(key)
     if found is None:
-        found = _array_types[key] = numba.typeof(example)
+        if isinstance(example, tuple):
+            items = [_type_of(item, of_item) for item, of_item in zip(example, key[1:], strict=True)]
+            found = numba.types.BaseTuple.from_types(items, type(example))
+        else:
+            found = numba.typeof(example)
+        _types[key] = found
     return found
 
 
@@ -89,6 +102,7 @@ class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]  # Numba has no typ
     def __init__(self, function: Callable[..., Any], modules: frozenset[str]) -> None:
         super().__init__(function, targetoptions=_options(function), pipeline_class=KernelCompiler)
         self._modules = modules
+        self._results: dict[Any, Any] = {}  # by the keys of the arguments
         _enable_cache(self, modules, KernelCache)
 
     @cached_property
@@ -122,10 +136,14 @@ class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]  # Numba has no typ
 
     def result_for(self, *examples: Any) -> Any:
         """Return Numba's result of the compilation for the types of ``examples``."""
-        types = tuple(map(_type_of, examples))
-        if types not in self.overloads:
-            self.compile(types)
-        return self.overloads[types]
+        keys = tuple(map(_key_of, examples))
+        found = self._results.get(keys)
+        if found is None:
+            types = tuple(map(_type_of, examples, keys))
+            if types not in self.overloads:
+                self.compile(types)
+            found = self._results[keys] = self.overloads[types]
+        return found
 
     def compiled_for(self, *examples: Any) -> Callable[..., Any]:
         """Return the compiled function for the types of ``examples``, which it does not check."""
