@@ -144,12 +144,13 @@ class SensorRecorder:
             sensed = sense()
             self.local_position(time_us, sensed)
         log = self._log
-        if log is None or time_us < self._truth_us:
+        if log is None:
             return
-        self._truth_us = next_due(time_us, TRUTH_INTERVAL_US)
-        state = truth()
-        if state is not None:
-            self._record_truth(log, time_us, state)
+        if time_us >= self._truth_us:
+            self._truth_us = next_due(time_us, TRUTH_INTERVAL_US)
+            state = truth()
+            if state is not None:
+                self._record_truth(log, time_us, state)
         if time_us >= self._estimator_us:
             self._estimator_us = next_due(time_us, ESTIMATOR_INTERVAL_US)
             sensed = sensed or sense()

@@ -90,13 +90,14 @@ class QuietBlock:
         self._interval_us, self._divisor = stack.rates.interval_us, stack.rates.divisor
         self.waited = False
         """True if the last tick of ``run`` waited for Python."""
+        self.has_taken = False
         self._counters = np.zeros(1, QUIET_COUNTERS)
         self._fraction, self._idle = np.zeros(1), np.zeros(LoopRow.SIZE)
         self._no_log = Trace(DEFAULT_CAPACITY, LoopRow.SIZE, lambda: None)
         self._no_imu_log = Trace(DEFAULT_CAPACITY, RECORD_SIZE, lambda: None)
         sensing = sensing_of(stack, simulator.wires)
         constant = self._constant(sensing)
-        changing = self._changing(0, False, self._no_log, self._no_imu_log)
+        changing = self._changing(0, False, False, self._no_log, self._no_imu_log)
         self._fly = partial(direct(fly_quiet_ticks, *constant, *changing), *constant)
 
     def _addresses(self, sensing: _Arguments) -> RecordArray:
@@ -132,12 +133,12 @@ class QuietBlock:
             simulator.world, simulator.commands, sensing, self._sensors.constant, control,
         )  # fmt: skip
 
-    def _changing(self, count: int, is_taken: bool, log: Trace, imu_log: Trace) -> _Arguments:
+    def _changing(self, count: int, is_taken: bool, takes_on: bool, log: Trace, imu_log: Trace) -> _Arguments:
         """Return the other arguments of the kernel."""
         now, estimation, link = self._stack.now, self._estimation, self._stack.simulator
         estimate = self._estimates[0 if estimation is None else estimation.feed.selected]
         return (
-            count, is_taken, self._autopilot.next_outer, now.time_us, link.stamp_us - link.time_us,
+            count, is_taken, takes_on, self._autopilot.next_outer, now.time_us, link.stamp_us - link.time_us,
             link.flags(now.status.armed) | VALID_FLAG, self._flies, now.row, estimate, self._sensors.following(),
             self._outer.arguments(), (log.rows, log.times_us, log.n), (imu_log.rows, imu_log.times_us, imu_log.n),
         )  # fmt: skip
@@ -192,11 +193,34 @@ class QuietBlock:
             self._simulator.commands[:] = self._autopilot.tick(time_us)
         return done
 
-    def run(self, count: int, is_taken: bool = False) -> int:
+    def run_on(self, most: int) -> int:
+        """Run the ticks that follow the present one, ``most`` at most, and on after records of the estimate.
+
+        Return their number.
+        """
+        count = min(most, self.count(runs_on=True))
+        until_record = self._quiet_intervals(self._stack.now.time_us)
+        takes_on = self._records_next and count == until_record < min(most, self._room(is_taken=False))
+        if count <= 0 and not takes_on:
+            return 0
+        done = self.run(count, takes_on=takes_on)
+        if not self.has_taken:
+            return done
+        more = self.run_periods(most - done)
+        self.waited = not more or self.waited
+        return done + (more or 1)
+
+    @property
+    def _records_next(self) -> bool:
+        """True if the quiet intervals end with a record of the estimate."""
+        return self._estimation is not None and self._estimation.records_next
+
+    def run(self, count: int, is_taken: bool = False, takes_on: bool = False) -> int:
         """Run ``count`` ticks, or fewer.
 
-        With ``is_taken``, vehicle and estimator have the state of the first one, which is run in any case. Return their
-        number. Raise what the simulator raises.
+        With ``is_taken``, vehicle and estimator have the state of the first one, which is run in any case. With
+        ``takes_on``, they get that of the tick after the last one: then ``has_taken`` is True. Return the number of
+        ticks. Raise what the simulator raises.
         """
         stack, recorded = self._stack, self._stack.recorder.log
         log, imu_log = self._logs()
@@ -204,7 +228,7 @@ class QuietBlock:
         self._fraction[0] = self._loops.fraction
         if not flies:
             self._loops.idle(now.state, now.rotor_speed, now.status.armed, self._idle)
-        self._fly(*self._changing(count, is_taken, log, imu_log))
+        self._fly(*self._changing(count, is_taken, takes_on, log, imu_log))
         done = QuietCounters(*self._counters[0].item())
         self._loops.fraction = float(self._fraction[0])
         rows = log.rows[log.n :]
@@ -220,8 +244,8 @@ class QuietBlock:
         ``rows`` are those of the ticks. A tick waits after a reset of the estimate, or for an event of the outer loop.
         """
         stack, interval_us, began_us = self._stack, self._interval_us, self._stack.now.time_us
-        ticks, flown, result, sensed, waits = done
-        self.waited = waits > 0
+        ticks, flown, result, sensed, waits, taken = done
+        self.waited, self.has_taken = waits > 0, taken > 0
         if flown:
             stack.simulator.pass_by(flown)
         last_outer = self._outer.pass_by(stack.recorder.log, began_us, interval_us, rows)
@@ -230,7 +254,7 @@ class QuietBlock:
             boot_us = stack.simulator.stamp_us - stack.simulator.time_us
             last_us = began_us + interval_us * (0 if last_outer is None else last_outer + 1)
             self._outer.take_reports([(at_us - boot_us, report) for at_us, report in reports], last_us)
-        if waits or last_outer != ticks - 1:
+        if waits or taken or last_outer != ticks - 1:
             stack.simulator.has_arrived = True
         if ticks:
             self._autopilot.pass_by(ticks, began_us + ticks * interval_us, rows[ticks - 1])
@@ -238,7 +262,7 @@ class QuietBlock:
         if flown:
             self._simulator.pass_by(flown, result)
         if sensed:
-            self._sensors.pass_by(began_us + (ticks + waits) * interval_us, interval_us)
+            self._sensors.pass_by(began_us + (ticks + waits + taken) * interval_us, interval_us)
         if waits:
             self._simulator.commands[:] = self._autopilot.tick(began_us + (ticks + 1) * interval_us)
         return int(ticks + waits)

@@ -101,12 +101,10 @@ class QuietTicks:
             return 0
         if actuators.flags != self._link.flags(self._now.status.armed) | VALID_FLAG:
             return 0
-        count = min(most, block.count(runs_on=True), self._quiet_intervals(simulator))
-        if count <= 0:
-            return 0
-        done = block.run(count)
-        self.is_idle = not block.waited
-        self._answer(simulator, actuators, done)
+        done = block.run_on(min(most, self._quiet_intervals(simulator)))
+        if done:
+            self.is_idle = not block.waited
+            self._answer(simulator, actuators, done)
         return done
 
     def run(self, simulator: Simulator, actuators: ActuatorsFrame, count: int) -> int:

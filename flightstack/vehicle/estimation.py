@@ -220,6 +220,11 @@ class Estimation:
         recorder_us = self.recorder.due_us(with_truth=not measures)
         return recorder_us if measures and self._lanes.is_alone else min(self._health_due_us, recorder_us)
 
+    @property
+    def records_next(self) -> bool:
+        """True if nothing but a record is due at the time of ``quiet_until_us`` with ``measures``, in flight."""
+        return self._lanes.is_alone and self._now.has_state
+
     def begin_watch(self) -> tuple[int, tuple[int, bool, bool]]:
         """Return the time from which a kernel updates the health, and what it is given.
 
@@ -244,6 +249,7 @@ class Estimation:
         """
         self._time_us = time_us
         self._feed.pass_by(time_us, step_us, samples)
+        self.recorder.state(time_us, self._truth, self.sensed)
         if self._lanes.is_alone and watched.due_us != self._health_due_us:
             self._health_due_us, self.health = watched.due_us, self._lanes.watched()
             self._use_health(watched.conditions)

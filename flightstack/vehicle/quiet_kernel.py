@@ -49,6 +49,8 @@ class QuietCounters(NamedTuple):
     """Samples of the inertial sensors."""
     waits: int
     """1 if a tick is begun that must be run in Python."""
+    taken: int
+    """1 if the state of the next tick is taken, which is not begun."""
 
 
 LARGEST_RESULT = 1
@@ -69,7 +71,10 @@ def _total(numbers: Any) -> float:
 def _sense(
     calls: Any, sensing: Any, time_us: int, interval_us: int, selected: int, record: FloatArray
 ) -> None:
-    """Give each filter the sample of its inertial sensor; ``record`` takes that of the selected one."""
+    """Give each filter the sample of its inertial sensor; ``record`` takes that of the selected one.
+
+    ``sensing`` has records as bytes, with an element for each sensor, none on the true state.
+    """
     wires, tracks, rings, filters, spare_record = sensing
     time_s = time_us * 1e-6
     for k in range(len(tracks)):
@@ -108,7 +113,11 @@ def _advance(
     calls: Any, counters: Any, interval_us: int, world: Any, sensing: Any, slow: Any,
     state: FloatArray, time_us: int, boot_us: int, flags: int, estimate: Any, following: Any, imu_log: Any,
 ) -> bool:  # fmt: skip
-    """Advance simulator and estimate to ``time_us``; return False if no tick is to follow."""
+    """Advance simulator and estimate to ``time_us``; return False if no tick is to follow.
+
+    The tick waits after a reset of the estimate, when the conditions of its health change, and after a report of the
+    battery that the vehicle may act on. ``slow`` and ``following`` are as in ``slow_kernel``.
+    """
     selected, known, is_known, resets = estimate
     records, record_times, record_at = imu_log
     result = call_kernel_int(calls["step"], (world, time_us + boot_us, flags))
@@ -143,31 +152,39 @@ def _advance(
 
 
 @compiled
+def _begin(counters: Any, marks: Any) -> None:
+    counters["ticks"], counters["flown"], counters["result"], counters["sensed"] = 0, 0, 0, 0
+    counters["waits"], counters["taken"] = 0, 0
+    marks["outers"], marks["fell_us"] = 0, 0
+
+
+@compiled
 def fly_quiet_ticks(
     calls_of: Any, counters_array: Any, interval_us: int, divisor: int, world: Any, commands: FloatArray,
-    sensing: Any, slow: Any, control: Any, count: int, is_taken: bool, outer_in: int, time_us: int, boot_us: int,
-    flags: int, flies: bool, last_row: FloatArray, estimate: Any, following: Any, outer: Any, log: Any, imu_log: Any,
+    sensing: Any, slow: Any, control: Any, count: int, is_taken: bool, takes_on: bool, outer_in: int,
+    time_us: int, boot_us: int, flags: int, flies: bool, last_row: FloatArray, estimate: Any, following: Any,
+    outer: Any, log: Any, imu_log: Any,
 ) -> None:  # fmt: skip
     """Run ``count`` ticks, or fewer: what was done is in ``counters_array``, ``marks`` and ``slow``.
 
     The state of the first tick ``is_taken``, or the simulator advances to it with ``commands``; its time is that of
-    the vehicle and ``boot_us``. The first outer tick is that after ``outer_in`` ticks. It stops without a step of the
-    simulator, when its result is larger than ``LARGEST_RESULT``, after a reset of the estimate, when the conditions of
-    its health change, and at an outer tick that is not nominal: then the tick waits. Records are bytes. ``sensing`` has
-    an element for each inertial sensor, none on the true state. ``slow`` and ``following`` are as in ``slow_kernel``.
+    the vehicle and ``boot_us``. If it ``takes_on``, the simulator also advances to the state of the tick after them.
+    The first outer tick is that after ``outer_in`` ticks. It stops without a step of the simulator, when its result is
+    above ``LARGEST_RESULT``, and when the tick waits: see ``_advance`` and ``guide``; for ``sensing`` ``_sense``.
     """
     rows, row_times, row_at = log
     calls, outer_calls = calls_of[0][0], calls_of[1][0]
     state, row, counters, marks = control[0], last_row, counters_array[0], outer[0][0]
-    counters["ticks"], counters["flown"], counters["result"], counters["sensed"] = 0, 0, 0, 0
-    counters["waits"] = 0
-    marks["outers"], marks["fell_us"] = 0, 0
-    for i in range(count):
+    _begin(counters, marks)
+    for i in range(count + 1 if takes_on else count):
         time_us += interval_us
         if (i > 0 or not is_taken) and not _advance(
             calls, counters, interval_us, world, sensing, slow, state, time_us, boot_us, flags, estimate, following,
             imu_log,
         ):  # fmt: skip
+            return
+        if i == count:
+            counters["taken"] = 1
             return
         outer_due = (i - outer_in) % divisor == 0
         if outer_due:
