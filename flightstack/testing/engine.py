@@ -142,6 +142,14 @@ class Engine:
         """Simulated time from which the times of the newest log count [s]."""
         return self.logs[-1].boot_s if self.logs else 0.0
 
+    @property
+    def ready_from_s(self) -> float:
+        """Time from which a vehicle that waits to be ready may be so; infinite for any other."""
+        stack = self.stack
+        if stack.estimation is None or self._now.status.armed or stack.is_ready:
+            return math.inf
+        return (self._boot_us + stack.estimation.health_due_us) * 1e-6
+
     def note_readiness(self) -> None:
         """Look whether the vehicle is ready; once in each outer tick."""
         self.was_ready = self.was_ready or self.stack.is_ready

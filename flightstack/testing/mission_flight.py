@@ -41,7 +41,7 @@ def fly_plan(world: World, plan: Plan, limit_s: float | None = None, step: Step 
 def await_state(world: World, step: Step) -> None:
     """Run until the vehicle may fly on its state, as one on sensors does after seconds, or for ``READY_S``."""
     end_s = world.time_s + READY_S
-    while not world.engine.stack.is_ready and world.time_s < end_s and not step(0.0):
+    while not world.engine.stack.is_ready and world.time_s < end_s and not step(end_s - world.time_s):
         pass
 
 

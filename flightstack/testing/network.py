@@ -173,13 +173,13 @@ class EngineRunner:
         return waits or self._network.idle_s(self._engine.stack.ground, self._engine.time_s) <= MARGIN_S
 
     def _idle_until_s(self) -> float:
-        """Return the time from which messages are due, or a watch or a timer; −inf if it may be now."""
+        """Return the time from which messages, a watch, a timer or readiness are due; −inf if it may be now."""
         engine = self._engine
         self._messages_wait, self._network.has_settled = self._network.has_settled, False
-        if self._messages_wait or not engine.was_ready or any(each_tick() for _, each_tick in self._watches):
+        if self._messages_wait or any(each_tick() for _, each_tick in self._watches):
             return -math.inf
         now_s = engine.time_s
-        until_s = now_s + self._network.idle_s(engine.stack.ground, now_s)
+        until_s = min(now_s + self._network.idle_s(engine.stack.ground, now_s), engine.ready_from_s)
         return min(until_s, *(at_s for at_s, _ in self._timers)) if self._timers else until_s
 
     def _call_due(self) -> None:

@@ -225,6 +225,11 @@ class Estimation:
         """True if nothing but a record is due at the time of ``quiet_until_us`` with ``measures``, in flight."""
         return self._lanes.is_alone and self._now.has_state
 
+    @property
+    def health_due_us(self) -> int:
+        """Time from which the health is updated."""
+        return self._health_due_us
+
     def begin_watch(self) -> tuple[int, tuple[int, bool, bool]]:
         """Return the time from which a kernel updates the health, and what it is given.
 
