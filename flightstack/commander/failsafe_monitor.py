@@ -268,11 +268,11 @@ class FailsafeMonitor:
         Either no failsafe is active, or those that are go on as in the last update.
         """
         self._update_battery_level()
-        if not self.states.is_new or self.fence.is_breached:
+        if self.fence.is_breached:
             return False
-        if phase is Phase.DISARMED:
-            return self._memory is IDLE
-        return not self._has_conditions or self._goes_on(phase, mode)
+        if phase is Phase.DISARMED:  # also without a new state, as before the first one
+            return self._memory is IDLE and not self.states.holds_rotors
+        return (self.states.is_new and not self._has_conditions) or self._goes_on(phase, mode)
 
     def _goes_on(self, phase: Phase, mode: Mode) -> bool:
         if self._settled is None or not self.faults.is_quiet:

@@ -195,8 +195,9 @@ class QuietOuter:
         if log is not None:
             log.outer.n += marks.outers
         self._seen_bytes = self._seen.tobytes()
-        self._link.pass_outer(time_us, self._seen_bytes)
-        self._autopilot.pass_outer(time_us, rows[last], marks.found, marks.fell_us, lifts)
+        self._link.pass_outer(time_us, self._seen_bytes, marks.changed_us)
+        is_new = marks.changed_us == time_us
+        self._autopilot.pass_outer(time_us, is_new, rows[last], marks.found, marks.fell_us, lifts)
         return last
 
     def _lifts(self, ticks: slice) -> Iterable[Lift]:

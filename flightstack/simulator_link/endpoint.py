@@ -188,10 +188,13 @@ class SimulatorEndpoint:
         self.time_us += count * self._interval_us
         self.has_arrived = True
 
-    def pass_outer(self, time_us: int, seen: bytes) -> None:
-        """Count a call of ``freshness`` at ``time_us``, which found a new state with the bytes ``seen``."""
+    def pass_outer(self, time_us: int, seen: bytes, changed_us: int) -> None:
+        """Count calls of ``freshness`` up to ``time_us``, of which the last new state had the bytes ``seen``.
+
+        It came at ``changed_us``; 0 if there was none.
+        """
         self.has_arrived, self.seen = False, seen
-        self._arrived_us = self._changed_us = time_us
+        self._arrived_us, self._changed_us = time_us, changed_us or self._changed_us
 
     def flags(self, armed: bool) -> int:
         """Return the flags of an answer with FS_ACTUATORS."""

@@ -132,14 +132,16 @@ class Autopilot:
         return self._monitor.stands_until_us if self.now.landed or not self.now.flying else NEVER_US
 
     def pass_outer(
-        self, time_us: int, row: FloatArray, found: int, fell_us: int, lifts: Iterable[Lift] = ()
+        self, time_us: int, is_new: bool, row: FloatArray, found: int, fell_us: int, lifts: Iterable[Lift]
     ) -> None:
         """Follow nominal outer ticks, whose kernels ran. The last was at ``time_us`` and wrote ``row``.
 
-        ``found`` are its bits of ``detect``; ``fell_us`` is the time of the last fall, 0 for none. ``lifts`` has an
-        element for each tick of a vehicle that began to lift off.
+        Its state ``is_new``, or as before. ``found`` are its bits of ``detect``; ``fell_us`` is the time of the last
+        fall, 0 for none. ``lifts`` has an element for each tick of a vehicle that began to lift off.
         """
-        self._good_row[:] = row
+        self._failsafes.states.is_new = is_new
+        if is_new:
+            self._good_row[:] = row
         self._monitor.pass_by(time_us, found, fell_us, lifts)
 
     def pass_by(self, count: int, time_us: int, row: FloatArray) -> None:

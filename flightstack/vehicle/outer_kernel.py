@@ -48,6 +48,8 @@ class OuterMarks(NamedTuple):
     """Index of the last one among all ticks."""
     fell_us: int
     """Time of the last fall, or 0."""
+    changed_us: int
+    """Time of the last outer tick whose state was new, or 0."""
     found: int
     """Bits of ``detect``, as before if it was not called."""
 
@@ -169,9 +171,10 @@ def guide(calls: Any, outer: Any, tick: int, time_us: int, state: FloatArray, ro
     ``row`` is the newest row of the inner loop.
     """
     marks, watch, _fence, _faults, guidance, control, _log, saved = outer
-    phase = watch[6]
+    phase, is_armed = watch[6], watch[7]
     memories, copies = saved
-    if _are_equal(watch[0], watch[1]):  # no new state
+    is_new = not _are_equal(watch[0], watch[1])
+    if is_armed and not is_new:
         return False
     for k in range(len(memories)):
         copy_all(memories[k], copies[k])
@@ -180,7 +183,9 @@ def guide(calls: Any, outer: Any, tick: int, time_us: int, state: FloatArray, ro
         for k in range(len(memories)):
             copy_all(copies[k], memories[k])
         return False
-    copy_all(watch[0], watch[1])
+    if is_new:
+        copy_all(watch[0], watch[1])
+        marks[0]["changed_us"] = time_us
     marks[0]["last"] = tick
     if not stands:
         if abs(state[5]) > FALL_M_S:

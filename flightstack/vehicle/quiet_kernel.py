@@ -155,7 +155,7 @@ def _advance(
 def _begin(counters: Any, marks: Any) -> None:
     counters["ticks"], counters["flown"], counters["result"], counters["sensed"] = 0, 0, 0, 0
     counters["waits"], counters["taken"] = 0, 0
-    marks["outers"], marks["fell_us"] = 0, 0
+    marks["outers"], marks["fell_us"], marks["changed_us"] = 0, 0, 0
 
 
 @compiled
