@@ -7,6 +7,7 @@ simulator is in this process, or exchanges its messages with it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any, Protocol, TypeAlias
 
@@ -23,7 +24,7 @@ from flightstack.estimation.imu_track import RECORD_SIZE, take_wire
 from flightstack.flight_log.flight_log import DEFAULT_CAPACITY, Trace
 from flightstack.flight_log.sensor_topics import IMU_GROUP
 from flightstack.process.assembly import Stack
-from flightstack.process.quiet_outer import QuietOuter
+from flightstack.process.quiet_outer import PassedTicks, QuietOuter
 from flightstack.process.quiet_sensors import QuietSensors, estimates_of, estimators_of, sensing_of
 from flightstack.simulator_link.battery_frame import BatteryReport
 from flightstack.simulator_link.hot_frames import VALID_FLAG
@@ -91,6 +92,9 @@ class QuietBlock:
         self.waited = False
         """True if the last tick of ``run`` waited for Python."""
         self.has_taken = False
+        self.on_passed: Callable[[PassedTicks], None] | None = None
+        """Called after the kernel with its ticks, before anything else follows them."""
+        self._passed = PassedTicks(stack.now, self._divisor, self._interval_us)
         self._counters = np.zeros(1, QUIET_COUNTERS)
         self._fraction, self._idle = np.zeros(1), np.zeros(LoopRow.SIZE)
         self._no_log = Trace(DEFAULT_CAPACITY, LoopRow.SIZE, lambda: None)
@@ -228,6 +232,8 @@ class QuietBlock:
         self._fraction[0] = self._loops.fraction
         if not flies:
             self._loops.idle(now.state, now.rotor_speed, now.status.armed, self._idle)
+        if self.on_passed is not None:
+            self._passed.begin()
         self._fly(*self._changing(count, is_taken, takes_on, log, imu_log))
         done = QuietCounters(*self._counters[0].item())
         self._loops.fraction = float(self._fraction[0])
@@ -246,6 +252,9 @@ class QuietBlock:
         stack, interval_us, began_us = self._stack, self._interval_us, self._stack.now.time_us
         ticks, flown, result, sensed, waits, taken = done
         self.waited, self.has_taken = waits > 0, taken > 0
+        if self.on_passed is not None and ticks:
+            self._passed.end(rows[:ticks], self._outer.rows, self._autopilot.next_outer)
+            self.on_passed(self._passed)
         if flown:
             stack.simulator.pass_by(flown)
         last_outer = self._outer.pass_by(stack.recorder.log, began_us, interval_us, rows)

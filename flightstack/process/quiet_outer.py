@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from operator import is_not
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 from flightstack.commander.fault_detector import detect
 from flightstack.control.loops import PythonLoops
 from flightstack.core.arrays import store_outer_row
-from flightstack.core.contract import STATE_SIZE, LoopFlags, RecordArray
+from flightstack.core.contract import STATE_SIZE, FloatArray, LoopFlags, LoopRow, RecordArray
 from flightstack.core.enums import Mode
 from flightstack.core.kernels.calls import address_of
 from flightstack.flight_log.flight_log import DEFAULT_CAPACITY, FlightLog, Trace
@@ -24,6 +24,7 @@ from flightstack.guidance.navigator import LEVEL_S
 from flightstack.process.assembly import Stack
 from flightstack.simulator_link.battery_frame import BatteryReport
 from flightstack.vehicle.flight_monitor import Lift
+from flightstack.vehicle.flight_state import FlightState
 from flightstack.vehicle.outer_kernel import (
     FLIES,
     LEVELS,
@@ -102,6 +103,12 @@ class QuietOuter:
         if log is None:
             return min(most, self._divisor * self._no_log.capacity)
         return min(most, self._divisor * (log.outer.capacity - log.outer.n))
+
+    @property
+    def rows(self) -> FloatArray:
+        """The log's rows of the kernel's outer ticks."""
+        at, outers = int(self._marks[0]["at"]), int(self._marks[0]["outers"])
+        return self._trace.rows[at : at + outers]
 
     def take_reports(self, reports: Iterable[tuple[int, BatteryReport]], last_us: int) -> None:
         """Give the vehicle the reports of the battery, with their times, and record it in the kernel's outer ticks.
@@ -206,3 +213,52 @@ class QuietOuter:
         down_m, down_m_s = rows[:, OUTER.state + 2].tolist(), rows[:, OUTER.state + 5].tolist()
         thrust_n = [self._thrust_n, *rows[:-1, OUTER.target_thrust].tolist()]
         return map(Lift, times_us, down_m, down_m_s, thrust_n)
+
+
+_SETPOINT = slice(OUTER.setpoint, OUTER.target_attitude)
+_TARGET = slice(OUTER.target_attitude, OUTER.loop_flags)
+
+
+class PassedTicks:
+    """The ends of the outer periods in a compiled call, to which what telemetry of the motion reads can be set back.
+
+    It is for the time between the kernel and all that follows it: the vehicle's time is that of before the call.
+    """
+
+    def __init__(self, now: FlightState, divisor: int, interval_us: int) -> None:
+        self._now, self._divisor, self._interval_us = now, divisor, interval_us
+        self._before = now.setpoint.copy(), now.attitude_target.copy()
+        self._inner: FloatArray = np.zeros((0, LoopRow.SIZE))
+        self._outer: FloatArray = np.zeros((0, OUTER.size))
+        self._first = 0
+
+    def begin(self) -> None:
+        """Keep setpoint and attitude target of before the call."""
+        now = self._now
+        self._before[0][:], self._before[1][:] = now.setpoint, now.attitude_target
+
+    def end(self, inner: FloatArray, outer: FloatArray, next_outer: int) -> None:
+        """Take the rows of the loops; the first outer tick of the call came after ``next_outer`` ticks."""
+        self._inner, self._outer = inner, outer
+        self._first = next_outer - 1 if next_outer else self._divisor - 1
+
+    def from_time(self, time_us: int) -> Iterator[int]:
+        """Set the vehicle back to the end of each period from ``time_us`` on, and yield its time; then to now."""
+        now, interval_us, began_us = self._now, self._interval_us, self._now.time_us
+        after = now.state.copy(), now.setpoint.copy(), now.attitude_target.copy(), now.row
+        earliest = -(-(time_us - began_us) // interval_us) - 1
+        late = max(0, -(-(earliest - self._first) // self._divisor))
+        for index in range(self._first + late * self._divisor, len(self._inner), self._divisor):
+            now.time_us, now.row = began_us + (index + 1) * interval_us, self._inner[index]
+            now.state[:] = now.row[LoopRow.STATE]
+            now.setpoint[:], now.attitude_target[:] = self._targets(index)
+            yield now.time_us
+        now.state[:], now.setpoint[:], now.attitude_target[:], now.row = after
+        now.time_us = began_us
+
+    def _targets(self, index: int) -> tuple[FloatArray, FloatArray]:
+        """Return setpoint and attitude target in the tick ``index``, which ends a period."""
+        at = (index - self._first) // self._divisor - (1 if self._first != self._divisor - 1 else 0)
+        if at < 0:
+            return self._before
+        return self._outer[at, _SETPOINT], self._outer[at, _TARGET]

@@ -14,6 +14,7 @@ from flightstack.mavlink.link import Link
 from flightstack.process import compile_helper
 from flightstack.process.assembly import Stack, build, reboot_config, transfer_state
 from flightstack.process.config_check import vehicle_of
+from flightstack.process.quiet_outer import PassedTicks
 from flightstack.services.logs.log_store import NO_LOGS, LogStore
 from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from flightstack.simulator_link.hot_frames import VALID_FLAG, ActuatorsFrame
@@ -99,7 +100,7 @@ class Engine:
         self.lockstep = Lockstep(self._endpoint, self.stack.autopilot, self._interval_us)
         """Ticks of the vehicle on the simulator's clock."""
         self._missed_us = self._next_timing_us = self._ticks = 0
-        self._is_idle = True
+        self.is_idle = True
         """True if the vehicle had no event since the last end of an outer period."""
         if self.stack.estimation is not None:
             self._simulator.start_sensors(self.config.home)
@@ -131,6 +132,15 @@ class Engine:
     def loses_states(self, loses_states: bool) -> None:
         self.settle()
         self._loses_states = loses_states
+
+    def on_passed(self, call: Callable[[PassedTicks], None] | None) -> None:
+        """Call this after compiled calls of ticks."""
+        self._quiet.on_passed(call)
+
+    @property
+    def boot_us(self) -> int:
+        """Simulated time at which the vehicle was switched on [µs]."""
+        return self._boot_us
 
     @property
     def time_s(self) -> float:
@@ -197,7 +207,7 @@ class Engine:
         """
         count, ends = self._run(most, until_s)
         if ends:
-            self._is_idle = True
+            self.is_idle = True
         return count, ends
 
     def _run(self, most: int, until_s: float) -> tuple[int, bool]:
@@ -209,9 +219,9 @@ class Engine:
             self.settle()
             done = self._run_from_outer(self._most(most, until_s))
         if done and not self._left:
-            return done, self._ends_period() and not (self._is_idle and self.time_s < until_s - MARGIN_S)
+            return done, self._ends_period() and not (self.is_idle and self.time_s < until_s - MARGIN_S)
         if not done:
-            self._is_idle = False
+            self.is_idle = False
             if self.tick():
                 return 1, True
             done = 1
@@ -244,7 +254,7 @@ class Engine:
         self.step_is_pending = False
         done = self._quiet.run_on(self._simulator, self.actuators, most)
         if done:
-            self._is_idle = self._is_idle and self._quiet.is_idle
+            self.is_idle = self.is_idle and self._quiet.is_idle
             self._count(done, done)
         else:
             self.step_is_pending = True
@@ -256,7 +266,7 @@ class Engine:
             return 0
         done = self._quiet.run_periods(self._simulator, self.actuators, most)
         if done:
-            self._is_idle = self._is_idle and self._quiet.is_idle
+            self.is_idle = self.is_idle and self._quiet.is_idle
             self._count(done, done - 1)
         return done
 

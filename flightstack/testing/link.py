@@ -62,6 +62,11 @@ class Channel:
         """Return to a perfect channel."""
         self.conditions = PERFECT
 
+    @property
+    def is_instant(self) -> bool:
+        """True if a datagram arrives when it is sent, or never."""
+        return self.conditions == PERFECT or self.conditions.is_cut
+
     def send(self, data: bytes, now_s: float) -> None:
         """Send a datagram at ``now_s``."""
         self.sent += 1

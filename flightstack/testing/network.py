@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 
 from flightstack.core.port_numbers import API, GROUND
 from flightstack.mavlink.dialect import mavlink
+from flightstack.process.quiet_outer import PassedTicks
 from flightstack.services.routing.hub import GroundHub
 from flightstack.services.routing.peer import PeerAddress
 from flightstack.services.telemetry.streams import Streams
@@ -98,9 +99,24 @@ class Network:
                 arrived = True
         return arrived
 
-    def idle_s(self, hub: GroundHub, now_s: float) -> float:
-        """Return the time for which ``exchange`` does nothing, unless the vehicle has an event [s]."""
-        return min(hub.idle_s(now_s), *(client.idle_s(now_s) for client in self.clients.values()))
+    def idle_s(self, hub: GroundHub, now_s: float, motion: bool = True) -> float:
+        """Return the time for which ``exchange`` does nothing, unless the vehicle has an event [s].
+
+        Without ``motion``, nothing but what ``exchange_motion`` does afterwards.
+        """
+        clients = self.clients.values()
+        motion = motion or not all(client.link.from_vehicle.is_instant for client in clients)
+        return min(hub.idle_s(now_s, motion), *(client.idle_s(now_s) for client in clients))
+
+    def exchange_motion(self, hub: GroundHub, now_s: float) -> None:
+        """Pass on streams of the motion as of ``now_s``, at which nothing else was due."""
+        for address, data in hub.poll_motion(now_s):
+            receiver = self._by_address.get(address)
+            if receiver is not None:
+                receiver.link.from_vehicle.send(data, now_s)
+        for client in self.clients.values():
+            for data in client.link.from_vehicle.receive(now_s):
+                client.receive(data, now_s)
 
     def settle(self, hub: GroundHub, now_s: float) -> None:
         """Exchange messages until none is left at this instant."""
@@ -121,6 +137,7 @@ class EngineRunner:
         self._timers: list[tuple[float, Callable[[], None]]] = []
         self._messages_wait = True
         """True if messages may wait that were sent since the last exchange."""
+        self._until_s = -math.inf  # up to which the motion is passed on after compiled calls
 
     def watch(self, callback: Callable[[], None], each_tick: Callable[[], bool]) -> None:
         """Call ``callback`` after every outer tick, or while ``each_tick`` returns False, after those with an event."""
@@ -153,7 +170,8 @@ class EngineRunner:
 
     def _run_period(self, most: int, until_s: float) -> int:
         """Run up to the end of a period, and on until ``until_s`` if nothing happens; ``most`` inner ticks at most."""
-        left, engine = most, self._engine
+        left, engine, self._until_s = most, self._engine, until_s
+        engine.on_passed(self._pass_motion if self._is_streamed else None)
         while left > 0:
             count, is_outer = engine.run(left, until_s)
             left -= count
@@ -172,6 +190,28 @@ class EngineRunner:
         waits, self._messages_wait = self._messages_wait, False
         return waits or self._network.idle_s(self._engine.stack.ground, self._engine.time_s) <= MARGIN_S
 
+    @property
+    def _is_streamed(self) -> bool:
+        """True if streams of the motion are due before anything else."""
+        hub, now_s = self._engine.stack.ground, self._engine.time_s
+        return now_s + hub.motion_idle_s(now_s) < self._until_s - MARGIN_S
+
+    def _pass_motion(self, ticks: PassedTicks) -> None:
+        """Pass on the streams of the motion that were due in a compiled call, as of their times.
+
+        After an event they wait for its messages, up to the end of the period.
+        """
+        engine, hub = self._engine, self._engine.stack.ground
+        boot_s = engine.boot_us * 1e-6
+        due_s = engine.time_s + hub.motion_idle_s(engine.time_s)
+        if not engine.is_idle or due_s >= self._until_s - MARGIN_S:
+            return
+        for time_us in ticks.from_time(math.floor((due_s - boot_s - MARGIN_S) * 1e6)):
+            now_s = boot_s + time_us * 1e-6
+            if due_s - MARGIN_S <= now_s < self._until_s - MARGIN_S:
+                self._network.exchange_motion(hub, now_s)
+                due_s = now_s + hub.motion_idle_s(now_s)
+
     def _idle_until_s(self) -> float:
         """Return the time from which messages, a watch, a timer or readiness are due; −inf if it may be now."""
         engine = self._engine
@@ -179,7 +219,8 @@ class EngineRunner:
         if self._messages_wait or any(each_tick() for _, each_tick in self._watches):
             return -math.inf
         now_s = engine.time_s
-        until_s = min(now_s + self._network.idle_s(engine.stack.ground, now_s), engine.ready_from_s)
+        idle_s = self._network.idle_s(engine.stack.ground, now_s, motion=False)
+        until_s = min(now_s + idle_s, engine.ready_from_s)
         return min(until_s, *(at_s for at_s, _ in self._timers)) if self._timers else until_s
 
     def _call_due(self) -> None:

@@ -6,8 +6,11 @@ three quarters of an inner tick. If all parts are compiled, one kernel runs a bl
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from flightstack.process.assembly import Stack
 from flightstack.process.quiet_block import QuietBlock, compiles
+from flightstack.process.quiet_outer import PassedTicks
 from flightstack.process.quiet_sensors import estimators_of
 from flightstack.simulator_link.hot_frames import VALID_FLAG, ActuatorsFrame
 from flightstack.vehicle.autopilot import Lockstep
@@ -45,6 +48,11 @@ class QuietTicks:
         if compiles(stack) and quiet_steps.compiles(simulator) and _have_equal_sensors(stack, simulator):
             self._steps = QuietSteps(simulator, actuators.rotor_speed_rad_s, stack.simulator.plant.frame)
             self._block = QuietBlock(stack, self._steps)
+
+    def on_passed(self, call: Callable[[PassedTicks], None] | None) -> None:
+        """Call this after compiled calls of ticks."""
+        if self._block is not None:
+            self._block.on_passed = call
 
     def count(self, simulator: Simulator, actuators: ActuatorsFrame) -> int:
         """Return how many of the next ticks are quiet. The last tick's answer was taken and is not applied yet."""

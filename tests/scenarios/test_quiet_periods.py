@@ -304,10 +304,10 @@ def test_a_condition_times_out_after_whole_periods(engine: dict, condition: obje
         assert world.time_s - began_s == pytest.approx(0.35, abs=1e-9)  # one more: the limit itself counts
 
 
-@pytest.mark.parametrize("telemetry", [False, True])
+@pytest.mark.parametrize("telemetry", [None, False, True])
 @pytest.mark.parametrize("start_s", [0.07, 0.08, 0.29])
 def test_messages_come_as_with_an_exchange_in_each_period(
-    start_s: float, telemetry: bool, monkeypatch: pytest.MonkeyPatch
+    start_s: float, telemetry: bool | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A client that connects at any time has streams whose times are rounded in other ways."""
 
@@ -323,6 +323,29 @@ def test_messages_come_as_with_an_exchange_in_each_period(
         return found
 
     quiet = received()
-    monkeypatch.setattr(Network, "idle_s", lambda *_: 0.0)
+    monkeypatch.setattr(Network, "idle_s", lambda *_, **__: 0.0)
     assert quiet == received()
-    assert len(quiet) > 50
+    assert len(quiet) > 20
+
+
+@pytest.mark.parametrize("state", ["truth", "estimated"])
+def test_a_flight_has_the_telemetry_of_an_exchange_in_each_period(
+    state: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From lift-off to landing, at PX4's rates, with outer periods that do not divide those of the streams."""
+
+    def received() -> list[tuple[float, str]]:
+        found: list[tuple[float, str]] = []
+        with World(state=state, telemetry=True, outer_hz=125.0) as world:
+            world.wait_until_ready()
+            world.gcs.session.observe = lambda message: found.append((world.time_s, str(message)))
+            world.takeoff(1.0)
+            world.run_for(3.0)
+            world.land()
+            world.run_until("not armed")
+        return found
+
+    quiet = received()
+    monkeypatch.setattr(Network, "idle_s", lambda *_, **__: 0.0)
+    assert quiet == received()
+    assert len(quiet) > 2000

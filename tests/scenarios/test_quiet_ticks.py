@@ -193,9 +193,12 @@ def test_the_simulator_advances_in_compiled_calls_after_telemetry(monkeypatch: p
 
         monkeypatch.setattr(Engine, "advance", advanced)
         monkeypatch.setattr(Network, "exchange", exchanged)
+        received = world.gcs.counts["ATTITUDE"]
         world.run_for(1.0)
-    assert calls["exchange"] >= 50
-    assert calls["advance"] <= 4  # measured 2: the battery reports twice a second
+        received = world.gcs.counts["ATTITUDE"] - received
+    assert received == 50
+    assert calls["exchange"] <= 8  # measured 6: for messages besides those of the motion
+    assert calls["advance"] <= 1  # after the last tick
 
 
 def test_what_is_read_after_run_on_is_that_of_the_simulator_after_the_newest_tick() -> None:

@@ -229,10 +229,27 @@ class GroundHub:
             yield from self._forwarded(now_s)
         self._forget_silent(now_s)
 
-    def idle_s(self, now_s: float) -> float:
+    def poll_motion(self, now_s: float) -> Iterator[tuple[PeerAddress, bytes]]:
+        """Yield (address, bytes) of streams that are due, if nothing else is."""
+        telemetry = self._telemetry
+        telemetry.begin_poll()
+        for address, peer in self._peers.items():
+            if peer.is_served(now_s):
+                due = peer.streams.due(telemetry.time_us * 1e-6, now_s)
+                for frame in telemetry.frames(due, peer.link):
+                    yield address, frame
+
+    def motion_idle_s(self, now_s: float) -> float:
+        """Return the time for which no stream is due, as ``idle_s``."""
+        vehicle_s = self._now.time_us * 1e-6
+        served = (peer for peer in self._peers.values() if peer.is_served(now_s))
+        return min((peer.streams.idle_s(vehicle_s) for peer in served), default=math.inf)
+
+    def idle_s(self, now_s: float, motion: bool = True) -> float:
         """Return the time for which ``poll`` sends nothing, unless a message arrives or an event happens [s].
 
-        0 or less if it may send something now. The link clock and the vehicle clock must run alike.
+        0 or less if it may send something now. Without ``motion``, nothing but streams of the motion. The link clock
+        and the vehicle clock must run alike.
         """
         has_changed = self._now.status != self._shown or self._area.home != self._home
         if has_changed or self._to_forward or self._journal.has_events or (self._texts and self._is_heard):
@@ -245,7 +262,7 @@ class GroundHub:
                 return 0.0
             idle_s = min(idle_s, peer.heartbeat_due_s - now_s)
             if is_served:
-                idle_s = min(idle_s, peer.streams.idle_s(vehicle_s))
+                idle_s = min(idle_s, peer.streams.idle_s(vehicle_s, motion))
         return idle_s
 
     def _forwarded(self, now_s: float) -> Iterator[tuple[PeerAddress, bytes]]:

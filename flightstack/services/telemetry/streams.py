@@ -13,7 +13,7 @@ from collections.abc import Set
 from itertools import groupby
 
 from flightstack.mavlink.dialect import mavlink
-from flightstack.services.telemetry.telemetry import STREAMED
+from flightstack.services.telemetry.telemetry import MOTION, STREAMED
 
 M = mavlink
 
@@ -154,7 +154,7 @@ class Streams:
         self._default = rates_hz
         self.available = available
         self._streams = {message_id: _Stream(1.0 / rate) for message_id, rate in rates_hz.items()}
-        self._groups: list[tuple[_Stream, list[int]]] = []
+        self._groups: list[tuple[_Stream, list[int], bool]] = []
         self._join()
 
     def _join(self) -> None:
@@ -164,9 +164,9 @@ class Streams:
             list(self._streams), lambda message_id: self._streams[message_id].times
         ):
             joined, message_ids = _Stream(*times), list(members)
-            self._groups.append((joined, message_ids))
+            self._groups.append((joined, message_ids, MOTION.issuperset(message_ids)))
             self._streams.update(dict.fromkeys(message_ids, joined))
-        self._soonest_s = -math.inf
+        self._soonest_s = self._soonest_other_s = -math.inf
 
     def interval_us(self, message_id: int) -> int:
         """Return the interval of a message [µs]; −1 if it is not streamed, 0 if it is not supported."""
@@ -200,9 +200,12 @@ class Streams:
         for message_id in members:
             self.set_interval(message_id, interval_us)
 
-    def idle_s(self, vehicle_s: float) -> float:
-        """Return the time for which nothing is due, from the time ``vehicle_s`` of the last call of ``due`` [s]."""
-        return self._soonest_s - vehicle_s
+    def idle_s(self, vehicle_s: float, motion: bool = True) -> float:
+        """Return the time for which nothing is due, from the time ``vehicle_s`` of the last call of ``due`` [s].
+
+        Without ``motion``, nothing but messages of the motion.
+        """
+        return (self._soonest_s if motion else self._soonest_other_s) - vehicle_s
 
     def due(self, now_s: float, link_now_s: float) -> list[int]:
         """Return the messages that are due on both the vehicle clock and the link clock, by their ids."""
@@ -210,8 +213,8 @@ class Streams:
         due: list[int] = []
         if until_s < self._soonest_s:
             return due
-        soonest_s = math.inf
-        for stream, message_ids in self._groups:
+        soonest_s = soonest_other_s = math.inf
+        for stream, message_ids, is_motion in self._groups:
             vehicle_s = stream.vehicle_s
             if until_s >= vehicle_s and link_now_s >= stream.link_s:
                 stream.sent(now_s, link_now_s)
@@ -219,5 +222,7 @@ class Streams:
                 due += message_ids
             if vehicle_s < soonest_s:  # noqa: PLR1730  # ``min`` takes three times as long
                 soonest_s = vehicle_s
-        self._soonest_s = soonest_s
+            if vehicle_s < soonest_other_s and not is_motion:
+                soonest_other_s = vehicle_s
+        self._soonest_s, self._soonest_other_s = soonest_s, soonest_other_s
         return due
