@@ -74,6 +74,7 @@ VARIANTS = (
     Variant("log", True, Station.IS_GONE),
     Variant("neither", False, Station.IS_GONE),
     Variant("sensors and estimator, log, telemetry sent and read", True, Station.READS, ESTIMATED),
+    Variant("sensors and estimator, log, telemetry sent", True, Station.HEARS, ESTIMATED),
     Variant("sensors and estimator, log", True, Station.IS_GONE, ESTIMATED),
 )
 

@@ -21,10 +21,10 @@ from benchmarks.watching import SIZES, Watched
 from flightstack.simulator_link.hot_frames import ActuatorsFrame, PlantStateFrame
 
 # on a machine of the same kind: PX4 with an external simulator, ArduCopter's SITL in one process
-THREE_PROCESSES = (("≥ 20", "PX4 10"), ("≥ 40", "PX4 18–23"), ("goal 55", "PX4 10"))
+THREE_PROCESSES = (("≥ 20", "PX4 10"), ("≥ 40", "PX4 18–23"), ("goal 100", "PX4 10"))
 PLANT_FLOORS = {"rigid": "≥ 20", "multibody": "≥ 15"}
-ONE_PROCESS = ("≥ 60, goal 150", "ArduCopter 70–76")
-ON_SENSORS = ("goal 120", "ArduCopter 70–76")
+ONE_PROCESS = ("≥ 60, goal 200", "ArduCopter 70–76")
+ON_SENSORS = ("goal 150", "ArduCopter 70–76")
 CAMPAIGNS = (("goal 1000", "RotorPy 0.8, PyBullet 5, JAX 29"), ("goal 400", ""))
 """Others: simulators without autopilot, one vehicle, on the true state."""
 FLIGHTS_A_MINUTE = "goal 1000"
