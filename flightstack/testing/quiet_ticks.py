@@ -6,6 +6,7 @@ three quarters of an inner tick. If all parts are compiled, one kernel runs a bl
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from flightstack.process.assembly import Stack
@@ -40,7 +41,7 @@ class QuietTicks:
     ) -> None:
         self._link, self._lockstep = stack.simulator, lockstep
         self._autopilot, self._estimation = stack.parts.autopilot, stack.estimation
-        self._inbox = stack.simulator.sensors
+        self._failsafes, self._inbox = stack.parts.failsafes, stack.simulator.sensors
         self._now, self._interval_us = stack.now, stack.rates.interval_us
         self.is_idle = False
         """True if all ticks of the last ``run_periods`` or ``run_on`` were compiled: the vehicle had no event."""
@@ -80,7 +81,8 @@ class QuietTicks:
         steps = self._steps
         if steps is None or not steps.fits(simulator, actuators.rotor_speed_rad_s):
             return None
-        steps.least_charge[0] = self._now.behaviour.battery_low + _CHARGE_ROUNDING
+        is_low = self._failsafes.battery_level > 0  # the next report may end that
+        steps.least_charge[0] = math.inf if is_low else self._now.behaviour.battery_low + _CHARGE_ROUNDING
         return self._block
 
     def run_periods(self, simulator: Simulator, actuators: ActuatorsFrame, most: int) -> int:
