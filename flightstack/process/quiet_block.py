@@ -92,6 +92,7 @@ class QuietBlock:
         self.waited = False
         """True if the last tick of ``run`` waited for Python."""
         self.has_taken = False
+        """True if the last ``run`` ended with the state of a tick that is not run."""
         self.on_passed: Callable[[PassedTicks], None] | None = None
         """Called after the kernel with its ticks, before anything else follows them."""
         self._passed = PassedTicks(stack.now, self._divisor, self._interval_us)
@@ -186,25 +187,32 @@ class QuietBlock:
 
         Return their number; 0 if nothing but the outer tick was run, in Python.
         """
-        time_us, done = self._stack.now.time_us + self._interval_us, 0
+        time_us, done, happened = self._stack.now.time_us + self._interval_us, 0, False
         if self._estimation is not None:
+            had_state = self._stack.now.has_state
             self._estimation.update(time_us)
+            happened = self._stack.journal.has_events or self._stack.now.has_state is not had_state
+        if happened:  # its messages are sent at the end of this period
+            most = min(most, self._divisor)
         if self._autopilot.is_nominal():
             intervals = max(0, self._quiet_intervals(time_us))
             most = min(most, 1 + intervals, self._outer.room(time_us), self._room(is_taken=True))
             done = self.run(most, is_taken=True) if most > 0 else 0
         if not done:
             self._simulator.commands[:] = self._autopilot.tick(time_us)
+        self.waited |= happened
         return done
 
-    def run_on(self, most: int) -> int:
-        """Run the ticks that follow the present one, ``most`` at most, and on after records of the estimate.
+    def run_on(self, most: int, takes_on: bool) -> int:
+        """Run the ticks that follow the present one, ``most`` at most, and return their number.
 
-        Return their number.
+        With ``takes_on`` they go on after a record of the estimate that is due in an outer tick.
         """
         count = min(most, self.count(runs_on=True))
         until_record = self._quiet_intervals(self._stack.now.time_us)
-        takes_on = self._records_next and count == until_record < min(most, self._room(is_taken=False))
+        is_outer = (count - self._autopilot.next_outer) % self._divisor == 0
+        takes_on &= self._records_next and is_outer
+        takes_on &= count == until_record < min(most, self._room(is_taken=False))
         if count <= 0 and not takes_on:
             return 0
         done = self.run(count, takes_on=takes_on)

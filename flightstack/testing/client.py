@@ -73,7 +73,9 @@ class Client:
         self.link = link
         """The link to the vehicle."""
         kind = mavlink.MAV_TYPE_ONBOARD_CONTROLLER if is_companion else mavlink.MAV_TYPE_GCS
-        self.session = Session(address[1:], heartbeat_type=kind, own_system=system_id)
+        self.session = Session(
+            address[1:], heartbeat_type=kind, own_system=system_id, counts_vehicle_time=False
+        )
         self.session.observe = self._take
         self.received: dict[str, Message] = {}
         """The newest message of each type."""
@@ -116,6 +118,12 @@ class Client:
         deadline_s = self.session.next_deadline()
         arrival_s = min(self.link.to_vehicle.next_arrival_s, self.link.from_vehicle.next_arrival_s)
         return (arrival_s if deadline_s is None else min(arrival_s, deadline_s)) - now_s
+
+    @property
+    def is_passive(self) -> bool:
+        """True if messages arrive at once, and nothing follows from one but what ``received`` shows."""
+        is_own = self.session.observe == self._take
+        return is_own and self.session.is_passive and self.link.from_vehicle.is_instant
 
     def receive(self, data: bytes, now_s: float) -> None:
         """Process a datagram from the vehicle."""

@@ -138,14 +138,18 @@ class Engine:
         self._quiet.on_passed(call)
 
     @property
-    def boot_us(self) -> int:
-        """Simulated time at which the vehicle was switched on [µs]."""
-        return self._boot_us
+    def is_aligned(self) -> bool:
+        """True if the periods of the outer loop are those of messages, as before a jump of the clock."""
+        return self._left == self.stack.parts.autopilot.next_outer
+
+    def time_at_s(self, vehicle_us: int) -> float:
+        """Return the simulated time at a time of the vehicle [s]."""
+        return (self._boot_us + vehicle_us) * 1e-6
 
     @property
     def time_s(self) -> float:
         """Simulated time since the start of the world [s]; the vehicle counts from its last power cycle."""
-        return (self._boot_us + self._now.time_us) * 1e-6
+        return self.time_at_s(self._now.time_us)
 
     @property
     def newest_boot_s(self) -> float:
@@ -158,7 +162,7 @@ class Engine:
         stack = self.stack
         if stack.estimation is None or self._now.status.armed or stack.is_ready:
             return math.inf
-        return (self._boot_us + stack.estimation.health_due_us) * 1e-6
+        return self.time_at_s(stack.estimation.health_due_us)
 
     def note_readiness(self) -> None:
         """Look whether the vehicle is ready; once in each outer tick."""
@@ -252,7 +256,7 @@ class Engine:
         if not (self.step_is_pending and self._endpoint.answers_exactly):
             return 0
         self.step_is_pending = False
-        done = self._quiet.run_on(self._simulator, self.actuators, most)
+        done = self._quiet.run_on(self._simulator, self.actuators, most, self.is_aligned)
         if done:
             self.is_idle = self.is_idle and self._quiet.is_idle
             self._count(done, done)

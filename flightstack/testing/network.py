@@ -105,7 +105,7 @@ class Network:
         Without ``motion``, nothing but what ``exchange_motion`` does afterwards.
         """
         clients = self.clients.values()
-        motion = motion or not all(client.link.from_vehicle.is_instant for client in clients)
+        motion = motion or not all(client.is_passive for client in clients)
         return min(hub.idle_s(now_s, motion), *(client.idle_s(now_s) for client in clients))
 
     def exchange_motion(self, hub: GroundHub, now_s: float) -> None:
@@ -202,12 +202,11 @@ class EngineRunner:
         After an event they wait for its messages, up to the end of the period.
         """
         engine, hub = self._engine, self._engine.stack.ground
-        boot_s = engine.boot_us * 1e-6
         due_s = engine.time_s + hub.motion_idle_s(engine.time_s)
         if not engine.is_idle or due_s >= self._until_s - MARGIN_S:
             return
-        for time_us in ticks.from_time(math.floor((due_s - boot_s - MARGIN_S) * 1e6)):
-            now_s = boot_s + time_us * 1e-6
+        for time_us in ticks.from_time(math.floor((due_s - engine.time_at_s(0) - MARGIN_S) * 1e6)):
+            now_s = engine.time_at_s(time_us)
             if due_s - MARGIN_S <= now_s < self._until_s - MARGIN_S:
                 self._network.exchange_motion(hub, now_s)
                 due_s = now_s + hub.motion_idle_s(now_s)
@@ -219,7 +218,7 @@ class EngineRunner:
         if self._messages_wait or any(each_tick() for _, each_tick in self._watches):
             return -math.inf
         now_s = engine.time_s
-        idle_s = self._network.idle_s(engine.stack.ground, now_s, motion=False)
+        idle_s = self._network.idle_s(engine.stack.ground, now_s, motion=not engine.is_aligned)
         until_s = min(now_s + idle_s, engine.ready_from_s)
         return min(until_s, *(at_s for at_s, _ in self._timers)) if self._timers else until_s
 

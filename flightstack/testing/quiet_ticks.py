@@ -82,7 +82,9 @@ class QuietTicks:
         if steps is None or not steps.fits(simulator, actuators.rotor_speed_rad_s):
             return None
         is_low = self._failsafes.battery_level > 0  # the next report may end that
-        steps.least_charge[0] = math.inf if is_low else self._now.behaviour.battery_low + _CHARGE_ROUNDING
+        b = self._now.behaviour
+        limit = max(b.battery_low, b.battery_critical, b.battery_emergency)
+        steps.least_charge[0] = math.inf if is_low else limit + _CHARGE_ROUNDING
         return self._block
 
     def run_periods(self, simulator: Simulator, actuators: ActuatorsFrame, most: int) -> int:
@@ -100,18 +102,19 @@ class QuietTicks:
         self._answer(simulator, actuators, done - 1)
         return done or 1
 
-    def run_on(self, simulator: Simulator, actuators: ActuatorsFrame, most: int) -> int:
+    def run_on(self, simulator: Simulator, actuators: ActuatorsFrame, most: int, is_aligned: bool) -> int:
         """Step the simulator, and run the next tick and those that follow while nothing happens, ``most`` at most.
 
-        Return their number; 0, with nothing done, if the first one is not quiet or not compiled, or if the newest
-        answer is that of a vehicle whose status has changed since.
+        Periods of the outer loop and of messages are the same if it ``is_aligned``. Return the number of ticks; 0, with
+        nothing done, if the first one is not quiet or not compiled, or if the newest answer is that of a vehicle whose
+        status has changed since.
         """
         block = self._fitting(simulator, actuators)
         if block is None or not (self._is_in_step(simulator) and self._lockstep.is_quiet):
             return 0
         if actuators.flags != self._link.flags(self._now.status.armed) | VALID_FLAG:
             return 0
-        done = block.run_on(min(most, self._quiet_intervals(simulator)))
+        done = block.run_on(min(most, self._quiet_intervals(simulator)), takes_on=is_aligned)
         if done:
             self.is_idle = not block.waited
             self._answer(simulator, actuators, done)

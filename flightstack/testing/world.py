@@ -162,7 +162,7 @@ class World:
         """Run as ``step``, and on until there are messages to exchange, for ``most_s`` at most.
 
         What the vehicle does by events, such as to disarm or to reach an item, ends it too, and so does a period that
-        is not compiled: on the ground, with a watch, on loops in C. The time is of whole periods, at least one.
+        is not compiled: with a watch, or on loops in C. The time is of whole periods, at least one.
         """
         self._runner.run_on(most_s)
 

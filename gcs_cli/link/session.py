@@ -42,9 +42,10 @@ class Session:
     The first peer that sends an autopilot's heartbeat is the vehicle; datagrams of others are dropped unless the
     vehicle is lost. With ``peer``, only datagrams from that address are accepted, and with ``system_id``, only that
     vehicle. Heartbeats are sent once per second of this clock and of vehicle time, because a simulation that is faster
-    than real time measures their timeout in its own time. ``heartbeat_type`` is the MAV_TYPE that this side announces,
-    ``own_system`` its system id. ``record`` gets every frame, sent and received, without its signature. Sessions of
-    several vehicles on one link share its ``wire``. With ``monitors``, the round trip is measured.
+    than real time measures their timeout in its own time; without ``counts_vehicle_time``, this clock is the vehicle's.
+    ``heartbeat_type`` is the MAV_TYPE that this side announces, ``own_system`` its system id. ``record`` gets every
+    frame, sent and received, without its signature. Sessions of several vehicles on one link share its ``wire``. With
+    ``monitors``, the round trip is measured.
     """
 
     def __init__(
@@ -58,6 +59,7 @@ class Session:
         *,
         wire: Wire | None = None,
         monitors: bool = False,
+        counts_vehicle_time: bool = True,
     ) -> None:
         self._builder = ViewBuilder(VehicleView())
         self.peer = peer
@@ -77,8 +79,7 @@ class Session:
         self._collect_services()
         self._heartbeat_due_s = 0.0
         self._heartbeat_due_vehicle_s = -math.inf  # as soon as the vehicle's time is known
-        self._vehicle_s: float | None = None  # the vehicle's time in its last message that has it
-        self._timed_s = 0.0  # when it came
+        self._counts_vehicle_time = counts_vehicle_time
 
     @property
     def view(self) -> VehicleView:
@@ -148,6 +149,12 @@ class Session:
         self._background.remove(service)
         self._collect_services()
 
+    @property
+    def is_passive(self) -> bool:
+        """True if no service may send something after a message: none is attached, and the request has its result."""
+        is_over = self.service is None or getattr(self.service, "result", None) is not None
+        return is_over and not self._background
+
     def _collect_services(self) -> None:
         chosen = [] if self.service is None else [self.service]
         self._services = (*chosen, self._subscription, *self._background)
@@ -172,8 +179,6 @@ class Session:
         elif not self._is_vehicle(message, peer, now_s):
             return
         is_own = self._builder.add(message, now_s)
-        if self._builder.time_s != self._vehicle_s:
-            self._vehicle_s, self._timed_s = self._builder.time_s, now_s
         if self.observe is not None:
             self.observe(message)
         if is_own:
@@ -220,7 +225,7 @@ class Session:
         """Return True if the next ``poll`` sends a heartbeat."""
         vehicle_s = self._builder.time_s
         return now_s + _ROUNDING_S >= self._heartbeat_due_s or (
-            vehicle_s is not None and vehicle_s >= self._heartbeat_due_vehicle_s
+            self._counts_vehicle_time and vehicle_s is not None and vehicle_s >= self._heartbeat_due_vehicle_s
         )
 
     def _note_heartbeat(self, now_s: float) -> None:
@@ -235,9 +240,9 @@ class Session:
     def skip_heartbeat(self, now_s: float) -> None:
         """Send the next heartbeat one period from now: the peer just got one."""
         self._heartbeat_due_s = now_s + HEARTBEAT_PERIOD_S
-        if self._vehicle_s is not None:
-            vehicle_now_s = self._vehicle_s + max(0.0, now_s - self._timed_s)
-            self._heartbeat_due_vehicle_s = vehicle_now_s + HEARTBEAT_PERIOD_S - _ROUNDING_S
+        vehicle_s = self._builder.time_s
+        if vehicle_s is not None and self._counts_vehicle_time:
+            self._heartbeat_due_vehicle_s = vehicle_s + HEARTBEAT_PERIOD_S
 
     def next_deadline(self) -> float | None:
         """Return the time at which to call ``poll`` at the latest; None without a vehicle."""

@@ -186,6 +186,8 @@ class _Columns(Mapping[str, np.ndarray[Any, Any]]):
         return self._gather().view(self._row)
 
     def __getitem__(self, name: str) -> np.ndarray[Any, Any]:
+        if name not in self:
+            raise KeyError(name)
         return self._table[name]
 
     def __contains__(self, name: object) -> bool:

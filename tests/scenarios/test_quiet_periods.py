@@ -328,24 +328,24 @@ def test_messages_come_as_with_an_exchange_in_each_period(
     assert len(quiet) > 20
 
 
-@pytest.mark.parametrize("state", ["truth", "estimated"])
-def test_a_flight_has_the_telemetry_of_an_exchange_in_each_period(
-    state: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """From lift-off to landing, at PX4's rates, with outer periods that do not divide those of the streams."""
+def test_disarming_is_at_the_same_tick_if_records_are_between_outer_ticks() -> None:
+    def stands(world: World) -> None:
+        world.param_set("COM_DISARM_PRFLT", 1.501)
+        world.wait_until_ready()
+        world.arm()
+        world.run_for(3.0)
+        assert not world.state.armed
 
-    def received() -> list[tuple[float, str]]:
-        found: list[tuple[float, str]] = []
-        with World(state=state, telemetry=True, outer_hz=125.0) as world:
-            world.wait_until_ready()
-            world.gcs.session.observe = lambda message: found.append((world.time_s, str(message)))
-            world.takeoff(1.0)
-            world.run_for(3.0)
-            world.land()
-            world.run_until("not armed")
-        return found
+    assert_flies_equally(stands, state="estimated", inner_hz=625.0, outer_hz=312.5)
 
-    quiet = received()
-    monkeypatch.setattr(Network, "idle_s", lambda *_, **__: 0.0)
-    assert quiet == received()
-    assert len(quiet) > 2000
+
+def test_a_limit_of_the_battery_above_that_of_a_low_one_acts_at_the_same_tick() -> None:
+    def fly(world: World) -> None:
+        world.param_set("COM_LOW_BAT_ACT", 2)
+        world.takeoff(3.0)
+        world.run_for(2.3)
+        world.param_set("BAT_CRIT_THR", 0.4)
+        world.run_for(9.0)
+        assert "failsafe_BATTERY_CRITICAL" in {event.name for event in world.events}
+
+    assert_flies_equally(fly, state="truth", vehicle="x_quad", battery_percent=42.0, battery_drain=40.0)

@@ -173,7 +173,7 @@ def test_most_ticks_in_flight_are_quiet(state: str, monkeypatch: pytest.MonkeyPa
 
         monkeypatch.setattr(Autopilot, "tick", counted)
         world.run_for(1.0)
-    assert len(calls) <= 0.02 * 500  # that records the battery, and few more
+    assert len(calls) <= 2  # of 500
 
 
 def test_the_simulator_advances_in_compiled_calls_after_telemetry(monkeypatch: pytest.MonkeyPatch) -> None:

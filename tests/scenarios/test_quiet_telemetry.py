@@ -1,0 +1,121 @@
+"""Clients hear what they hear with an exchange of messages in each period, at the same times."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from flightstack.mavlink.dialect import mavlink
+from flightstack.testing import Client, World
+from flightstack.testing.network import Network
+from tests.support.bytes_engine import BytesEngine
+
+
+def _heard(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, bytes]]:
+    """Times and bytes of what clients receive from now on."""
+    found: list[tuple[float, bytes]] = []
+    receive = Client.receive
+
+    def received(client: Client, data: bytes, now_s: float) -> None:
+        found.append((now_s, data))
+        receive(client, data, now_s)
+
+    monkeypatch.setattr(Client, "receive", received)
+    return found
+
+
+def hops(world: World) -> None:
+    """Take off and land."""
+    world.wait_until_ready()
+    world.takeoff(1.0)
+    world.run_for(3.0)
+    world.land()
+    world.run_until("not armed")
+
+
+def reports(world: World) -> None:
+    """Texts of the estimate come between those of the autopilot."""
+    world.wait_until_ready()
+    world.takeoff(2.0)
+    world.run_for(2.0)
+    world.fault("sensor:mag:off", for_s=1.196)
+    world.run_for(5.0)
+
+
+def boots(world: World) -> None:
+    """Wait, without a look at the vehicle, and boot again."""
+    world.run_for(4.0)
+    world.power_cycle(0.5)
+    world.run_for(4.0)
+
+
+def jumps(world: World) -> None:
+    """The periods of the outer loop are no longer those of messages."""
+    world.wait_until_ready()
+    world.takeoff(2.0)
+    world.run_for(2.0)
+    world.fault("clock jump 0.404")
+    world.run_for(3.0)
+
+
+_HEARD = (
+    ("truth", hops, {"outer_hz": 125.0}), ("estimated", hops, {}), ("estimated", reports, {}),
+    ("estimated", reports, {"inner_hz": 400.0, "outer_hz": 400.0}), ("estimated", boots, {"seed": 7}),
+    ("truth", jumps, {}), ("estimated", jumps, {}), ("truth", boots, {}),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("telemetry", [False, True])
+@pytest.mark.parametrize(("state", "fly", "rates"), _HEARD)
+def test_clients_hear_the_same_at_the_same_times(
+    state: str,
+    fly: Callable[[World], None],
+    rates: dict[str, float],
+    telemetry: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As with an exchange of messages in each period, and of bytes between vehicle and simulator in each tick."""
+    found = _heard(monkeypatch)
+    with World(state=state, telemetry=telemetry, **rates) as world:
+        fly(world)
+    quiet = found[:]
+    found.clear()
+    monkeypatch.setattr(Network, "idle_s", lambda *_, **__: 0.0)
+    with World(state=state, telemetry=telemetry, make_engine=BytesEngine, **rates) as world:
+        fly(world)
+    assert quiet == found
+    assert len(quiet) > 30
+
+
+def test_a_client_reacts_to_telemetry_in_its_period(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Lander:
+        """Lands above 1 m."""
+
+        def __init__(self) -> None:
+            self.is_due = False
+
+        def receive(self, message: Any, now_s: float) -> None:
+            self.is_due |= message.get_type() == "LOCAL_POSITION_NED" and message.z < -1.0
+
+        def poll(self, now_s: float) -> list[Any]:
+            due, self.is_due = self.is_due, False
+            command = mavlink.MAV_CMD_NAV_LAND
+            return [mavlink.MAVLink_command_long_message(1, 1, command, 0, *[0.0] * 7)] if due else []
+
+        def next_deadline(self) -> float | None:
+            return 0.0 if self.is_due else None
+
+    def landed(world: World) -> tuple[bytes, list[str]]:
+        world.gcs.session.attach(Lander())
+        world.takeoff(2.0)
+        world.run_for(6.0)
+        return world.engine.newest_log(), world.texts
+
+    with World(state="truth", telemetry=True) as world:
+        quiet = landed(world)
+    monkeypatch.setattr(Network, "idle_s", lambda *_, **__: 0.0)
+    with World(state="truth", telemetry=True) as world:
+        assert landed(world) == quiet
+    assert "Landing detected" in quiet[1]
