@@ -61,8 +61,8 @@ class Client:
     >>> world = World(telemetry=True)
     >>> tablet = world.add_client("tablet")
     >>> world.run_for(1.0)
-    >>> abs(tablet.received["ATTITUDE"].roll) < 0.1, tablet.counts["ATTITUDE"] > 10
-    (True, True)
+    >>> abs(tablet.received["ATTITUDE"].roll) < 0.1, tablet.counts["ATTITUDE"] > 10, tablet.is_passive
+    (True, True, True)
     """
 
     def __init__(
