@@ -61,8 +61,8 @@ class Client:
     >>> world = World(telemetry=True)
     >>> tablet = world.add_client("tablet")
     >>> world.run_for(1.0)
-    >>> abs(tablet.received["ATTITUDE"].roll) < 0.1, tablet.counts["ATTITUDE"] > 10, tablet.is_passive
-    (True, True, True)
+    >>> abs(tablet.received["ATTITUDE"].roll) < 0.1, tablet.counts["ATTITUDE"] > 10
+    (True, True)
     """
 
     def __init__(
@@ -118,12 +118,6 @@ class Client:
         deadline_s = self.session.next_deadline()
         arrival_s = min(self.link.to_vehicle.next_arrival_s, self.link.from_vehicle.next_arrival_s)
         return (arrival_s if deadline_s is None else min(arrival_s, deadline_s)) - now_s
-
-    @property
-    def is_passive(self) -> bool:
-        """True if messages arrive at once, and nothing follows from one but what ``received`` shows."""
-        is_own = self.session.observe == self._take
-        return is_own and self.session.is_passive and self.link.from_vehicle.is_instant
 
     def receive(self, data: bytes, now_s: float) -> None:
         """Process a datagram from the vehicle."""

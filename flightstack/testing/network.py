@@ -105,7 +105,7 @@ class Network:
         Without ``motion``, nothing but what ``exchange_motion`` does afterwards.
         """
         clients = self.clients.values()
-        motion = motion or not all(client.is_passive for client in clients)
+        motion = motion or not all(map(_is_passive, clients))
         return min(hub.idle_s(now_s, motion), *(client.idle_s(now_s) for client in clients))
 
     def exchange_motion(self, hub: GroundHub, now_s: float) -> None:
@@ -125,6 +125,12 @@ class Network:
             if not self.exchange(hub, now_s):
                 return
         raise AssertionError(f"clients and vehicle exchange messages without end at t = {now_s:.3f} s")
+
+
+def _is_passive(client: Client) -> bool:
+    """Return True if messages arrive at once, and nothing follows from one but what the client shows."""
+    observes_itself = getattr(client.session.observe, "__self__", None) is client
+    return observes_itself and client.session.is_passive and client.link.from_vehicle.is_instant
 
 
 class EngineRunner:
