@@ -13,17 +13,21 @@ from __future__ import annotations
 import contextlib
 import os
 import socket
+from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 
 _PINNED_EXCHANGES = 8192  # exchanges: a fraction of a second at full speed
 _FREE_EXCHANGES = 16
 
 
-def _allowed() -> set[int]:
-    return os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
+@cache
+def allowed_cpus() -> frozenset[int]:
+    """Return the CPUs of this process before a leader or follower moved it: a later one may use all of them too."""
+    return frozenset(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else frozenset()
 
 
-def _set_affinity(cpus: set[int]) -> None:
+def _set_affinity(cpus: Iterable[int]) -> None:
     with contextlib.suppress(OSError):  # not permitted, or CPU offline
         os.sched_setaffinity(0, cpus)
 
@@ -38,7 +42,7 @@ class AffinityLeader:
     """Process that chooses the CPU of both."""
 
     def __init__(self) -> None:
-        self._allowed = _allowed()
+        self._allowed = allowed_cpus()
         self._is_pinned = True
 
     def update(self) -> int:
@@ -59,7 +63,7 @@ class AffinityFollower:
 
     def __init__(self, connection: socket.socket) -> None:
         self._connection = connection
-        self._allowed = _allowed()
+        self._allowed = allowed_cpus()
         self._cpu = -1
 
     def update(self) -> None:

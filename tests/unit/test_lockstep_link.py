@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from flightstack.transports.cpu_affinity import AffinityFollower, AffinityLeader
+from flightstack.transports.cpu_affinity import AffinityFollower, AffinityLeader, allowed_cpus
 from flightstack.transports.tcp import LinkClosedError, TcpClient
 
 PROCESSORS = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
@@ -100,8 +100,33 @@ def test_the_follower_goes_where_the_peer_sends_from(
         assert os.sched_getaffinity(0) == {processor}
 
 
+@needs_two
+def test_a_later_follower_and_a_later_leader_move_too(
+    free_to_move: None, link: tuple[TcpClient, socket.socket]
+) -> None:
+    """A vehicle on sensors has one follower until it is ready, and another in flight; a simulator a leader a client."""
+    client, peer = link
+    for processor in sorted(PROCESSORS)[:2]:
+        follower = AffinityFollower(client.socket)
+        os.sched_setaffinity(0, {processor})
+        peer.sendall(b"x")
+        assert client.receive() is not None
+        os.sched_setaffinity(0, {min(PROCESSORS)})  # as the follower before it left it
+        follower.update()
+        assert os.sched_getaffinity(0) == {processor}
+    AffinityLeader().update()
+    assert os.sched_getaffinity(0) == PROCESSORS
+
+
+@pytest.fixture
+def no_processors() -> Iterator[None]:
+    allowed_cpus.cache_clear()
+    yield
+    allowed_cpus.cache_clear()
+
+
 def test_a_system_without_such_calls_is_left_alone(
-    monkeypatch: pytest.MonkeyPatch, link: tuple[TcpClient, socket.socket]
+    no_processors: None, monkeypatch: pytest.MonkeyPatch, link: tuple[TcpClient, socket.socket]
 ) -> None:
     monkeypatch.delattr(os, "sched_getaffinity", raising=False)
     monkeypatch.delattr(os, "sched_setaffinity", raising=False)
