@@ -42,7 +42,7 @@ from flightstack.transports.cpu_affinity import AffinityFollower
 from flightstack.transports.tcp import LinkClosedError, TcpClient
 
 GROUND_POLL_NS = 500_000
-GROUND_IDLE_NS = 2_000_000
+GROUND_IDLE_NS = 5_000_000
 """Intervals of polling the ground links with and without traffic; a poll takes 40 µs."""
 GROUND_BUSY_NS = 50_000_000
 """Time after received data in which the ground links are also served while waiting for the simulator.

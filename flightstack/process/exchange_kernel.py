@@ -46,7 +46,10 @@ class Exchange(NamedTuple):
     takes_fixes: bool
     """True if the filters take HIL_GPS."""
     deadline_ns: int
-    """Time of the monotonic clock from which no exchange begins."""
+    """Time of the monotonic clock from which no exchange begins that would be followed by an outer tick."""
+    outer_us: int
+    """Time of an outer tick by the simulator's clock, and the period of the outer loop."""
+    period_us: int
     ended_ns: int
     """Time at which the newest state was there."""
     waited_ns: int
@@ -143,7 +146,8 @@ def exchange(world: Any, time_us: int, flags: int) -> int:
     line, record, answer, took_ns, taking = world
     e = record[0]
     began_ns = now_ns(line)
-    if began_ns >= e["deadline_ns"] or e["began"] == len(took_ns):
+    is_due = began_ns >= e["deadline_ns"] and (time_us - e["outer_us"]) % e["period_us"] == 0
+    if is_due or e["began"] == len(took_ns):
         return -1
     took_ns[e["began"]] = began_ns - e["ended_ns"]
     e["began"] += 1

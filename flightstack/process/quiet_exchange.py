@@ -48,12 +48,13 @@ class ExchangedSteps:
         )
         self.news: RecordArray = np.zeros(1, SENSOR_NEWS)
         self.gps: ByteArray = np.zeros(GPS_SIZE, np.uint8)
-        self._estimation = stack.estimation
+        self._estimation, self._autopilot = stack.estimation, stack.parts.autopilot
+        self._link, self._interval_us = link, stack.rates.interval_us
         self.record: RecordArray = np.zeros(1, EXCHANGE)
         frame = as_bytes(answer.frame)
         self.record[0] = Exchange(
-            frame.ctypes.data, answer.shape.size, answer.shape.extra, stack.rates.interval_us, int(ACCEL | GYRO),
-            int(MAG), int(BARO), False, 0, 0, 0, 0,
+            frame.ctypes.data, answer.shape.size, answer.shape.extra, self._interval_us, int(ACCEL | GYRO),
+            int(MAG), int(BARO), False, 0, 0, stack.rates.divisor * self._interval_us, 0, 0, 0,
         )  # fmt: skip
         self._took_ns = np.zeros(MOST, np.int64)
         shapes = np.array([[plant.shape], [SENSOR_SHAPE], [GPS_SHAPE]], SHAPE)
@@ -63,10 +64,11 @@ class ExchangedSteps:
         self.step = address_of(exchange, self.world, 0, 0)
 
     def begin(self, began_ns: int, deadline_ns: int) -> None:
-        """Prepare for ticks from ``began_ns`` on, with no exchange after ``deadline_ns``."""
+        """Prepare for ticks from ``began_ns`` on; the first outer tick after ``deadline_ns`` is left to another call."""
         self.socket.clear()
         record = self.record
         record["deadline_ns"], record["ended_ns"] = deadline_ns, began_ns
+        record["outer_us"] = self._link.stamp_us + self._autopilot.next_outer * self._interval_us
         record["waited_ns"], record["began"] = 0, 0
         record["takes_fixes"] = self._estimation is not None and self._estimation.takes_fixes
 

@@ -22,7 +22,7 @@ from sim_bridge.server.endpoint import FlightStackEndpoint
 from sim_bridge.server.exchange_kernel import EXCHANGES, Exchanges, serve_steps
 from sim_bridge.simulator import Simulator
 
-MOST = 50
+MOST = 250
 """Steps of a call at most: a signal ends the process between two calls."""
 _OUTBOX = 4096
 _NO_FRAME = np.zeros(0, np.uint8)
