@@ -55,6 +55,15 @@ Timeout = Annotated[
     ),
 ]
 Check = Annotated[bool, typer.Option("--check", help="Check the options and exit.")]
+HeadStart = Annotated[
+    float,
+    typer.Option(
+        metavar="SECONDS",
+        help="Simulated time that passes as fast as possible before that of --speed, "
+        "as while a vehicle estimates its first state.",
+        **shared.IN_SIMULATION,
+    ),
+]
 State = Annotated[str | None, typer.Option(hidden=True, help="--state of the flight stack, if it is known.")]
 Clock = Annotated[str | None, typer.Option(hidden=True, help="--clock of the flight stack, if it is known.")]
 
@@ -87,6 +96,7 @@ class SimulatorOptions:
     home: Home = "47.397742,8.545594,488.0"
     view: View = False
     timeout: Timeout = None
+    head_start: HeadStart = 0.0
     check: Check = False
     state: State = None
     clock: Clock = None

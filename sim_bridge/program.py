@@ -74,6 +74,7 @@ def server_options(given: SimulatorOptions) -> ServerOptions:
         faults=faults,
         home=arguments.parse_home(given.home),
         speed=arguments.parse_speed(given.speed),
+        head_start_s=arguments.check_range("--head-start", given.head_start, 0.0, 3600.0),
         host=given.host,
         port=default_port if port is None else int(arguments.check_range("--port", port, 0, 65535)),
         system_id=system_id(given.instance),

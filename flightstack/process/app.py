@@ -7,12 +7,12 @@ import math
 import select
 import signal
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from types import FrameType
 
 from flightstack.core.enums import Mode, Severity
 from flightstack.core.errors import ConfigError, TargetError
+from flightstack.core.periods import NEVER_US
 from flightstack.firmware.choice import PYTHON, SERIAL, parse_loops
 from flightstack.params.config import StackConfig
 from flightstack.process.assembly import Stack, reboot_config, transfer_state
@@ -40,6 +40,7 @@ from flightstack.process.process_files import ProcessFiles
 from flightstack.process.quiet_exchange import compile_kernels
 from flightstack.transports.cpu_affinity import AffinityFollower
 from flightstack.transports.tcp import LinkClosedError, TcpClient
+from flightstack.vehicle.estimation import Estimation
 
 GROUND_POLL_NS = 500_000
 GROUND_IDLE_NS = 5_000_000
@@ -127,7 +128,7 @@ class App:
                 if holds_time:
                     if self.stack.estimation is not None:
                         waits = True
-                        self._run(simulator, until=self.stack.estimation.is_ready)
+                        self._run(simulator, self.stack.estimation)
                         waits = False
                     self._hold_time(simulator)
                 holds_time = False
@@ -224,14 +225,14 @@ class App:
 
     # ------------------------------------------------------------------ loops
 
-    def _run(self, simulator: TcpClient, until: Callable[[], bool] | None = None) -> None:
-        """Run the loops until ``until`` is true before an outer tick, whose state stays unanswered."""
+    def _run(self, simulator: TcpClient, starting: Estimation | None = None) -> None:
+        """Run the loops until ``starting`` is ready before an outer tick, whose state stays unanswered."""
         if self._lockstep:
-            self._run_lockstep(simulator, until)
+            self._run_lockstep(simulator, starting)
         else:
-            self._run_real_time(simulator, until)
+            self._run_real_time(simulator, starting)
 
-    def _run_lockstep(self, simulator: TcpClient, until: Callable[[], bool] | None) -> None:
+    def _run_lockstep(self, simulator: TcpClient, starting: Estimation | None) -> None:
         """Answer each state with actuator commands; the simulator drives the time."""
         link, loop = self.stack.simulator, LockstepLoop(self.stack, simulator)
         self._follower = AffinityFollower(simulator.socket)
@@ -240,11 +241,12 @@ class App:
         while True:
             data = None
             if fresh:
-                is_over = is_over or (until is not None and until())
+                is_over = is_over or (starting is not None and starting.is_ready())
                 if is_over and loop.ends_period:
                     return
-                may_run_on = until is None and not owes_ground
-                data = loop.run(self._next_ground_ns, self._next_log_us, may_run_on)
+                stop_us = NEVER_US if starting is None else starting.health_due_us
+                may_run_on = not (owes_ground or is_over)
+                data = loop.run(self._next_ground_ns, min(self._next_log_us, stop_us), may_run_on)
                 owes_ground = owes_ground or loop.serves_ground
                 if loop.ends_period:
                     self._end_period()
@@ -280,7 +282,7 @@ class App:
                 return self.stack.simulator.receive(data)
             check_deadline(deadline_s, self.stack, self._process)
 
-    def _run_real_time(self, simulator: TcpClient, until: Callable[[], bool] | None) -> None:
+    def _run_real_time(self, simulator: TcpClient, starting: Estimation | None) -> None:
         """Tick at fixed deadlines on the newest state; the machine's clock drives the time."""
         link, autopilot, timing = self.stack.simulator, self.stack.autopilot, self.stack.timing
         minimise_timer_slack()
@@ -294,7 +296,7 @@ class App:
             data = simulator.receive_now()
             if data is not None and link.receive(data):
                 heard_s = began_ns * 1e-9
-            if until is not None and until():
+            if starting is not None and starting.is_ready():
                 return
             commands = autopilot.tick(time_us)
             simulator.send(link.answer(commands, autopilot.now.status.armed))

@@ -64,7 +64,7 @@ class ExchangedSteps:
         self.step = address_of(exchange, self.world, 0, 0)
 
     def begin(self, began_ns: int, deadline_ns: int) -> None:
-        """Prepare for ticks from ``began_ns`` on; the first outer tick after ``deadline_ns`` is left to another call."""
+        """Prepare for ticks from ``began_ns`` on, up to the first outer tick after ``deadline_ns``."""
         self.socket.clear()
         record = self.record
         record["deadline_ns"], record["ended_ns"] = deadline_ns, began_ns

@@ -22,7 +22,7 @@ from gcs_cli.report.flight_outcome import Code, Outcome, ends_in_air, outcome_of
 from gcs_cli.transfers.plan_parts import Uploads
 from gcs_cli.vehicle.view_types import VehicleView
 
-READY_PAUSE_S = 0.1
+READY_PAUSE_S = 0.02
 """Pause between two requests for the vehicle's state before arming."""
 SHUT_DOWN_TIMEOUT_S = 3.0
 _FACTOR_NEEDS_S = 0.05

@@ -138,7 +138,8 @@ _LOCAL = "the links of this flight stay on this machine"
 NOT_PASSED = {
     "host": _SET, "port": _SET, "sim_host": _SET, "sim_port": _SET, "gcs": _SET, "gcs_port": _SET,
     "wait_for_start": _SET, "exit_on_gcs_loss": _SET, "clock": "lockstep: the flight is the same at any speed",
-    "timeout": "--timeout of gcs fly", "sim_timeout": "--timeout of gcs fly", "log": "--out of gcs fly",
+    "head_start": "set by gcs fly for a vehicle on its sensors", "timeout": "--timeout of gcs fly",
+    "sim_timeout": "--timeout of gcs fly", "log": "--out of gcs fly",
     "params": "--params of gcs fly, which creates no file", "outer_hz": "--outer-hz of gcs fly",
     "home": "--home of gcs fly, or the plan's home", "overwrite": "--overwrite of gcs fly",
     "state_dir": "none: a flight depends on its command line alone",

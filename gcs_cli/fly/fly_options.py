@@ -8,7 +8,7 @@ from flightstack.core.geodesy import GeoPoint
 from flightstack.core.port_numbers import system_id, vehicle_api_port, vehicle_ground_port
 from flightstack.firmware.choice import FREE, parse_loops
 from flightstack.params.behaviour import SPECS
-from flightstack.params.config import DEFAULT_HOME, StackConfig, parse_home
+from flightstack.params.config import DEFAULT_HOME, ESTIMATED, StackConfig, parse_home
 from flightstack.params.gains_file import hidden_gains
 from flightstack.params.store import read_assignment
 from flightstack.params.vehicle import Vehicle, load_vehicle
@@ -30,6 +30,8 @@ from sim_bridge.command import check_port as check_simulator_port
 from sim_bridge.errors import UsageProblemError
 
 GCS_LOSS_S = 5.0
+_HEAD_START_S = 1.5
+"""Simulated time in which a vehicle on its sensors becomes ready: after 1.1 s with the built-in ones."""
 _RETURN = Command.NAV_RETURN_TO_LAUNCH
 
 
@@ -142,6 +144,7 @@ def simulator_arguments(options: FlyOptions, home: GeoPoint) -> list[str]:
         f"--home={home_text(home)}",
         f"--timeout={options.timeout_s:g}",
         f"--clock={'realtime' if runs_freely(options) else 'lockstep'}",
+        *([f"--head-start={_HEAD_START_S:g}"] if options.state == ESTIMATED else []),
     ]
 
 

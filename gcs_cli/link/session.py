@@ -18,6 +18,8 @@ from gcs_cli.vehicle.view_builder import ViewBuilder, update
 from gcs_cli.vehicle.view_types import LOST_AFTER_S, VehicleView
 
 HEARTBEAT_PERIOD_S = 1.0
+GREETING_PERIOD_S = 0.1
+"""Period of heartbeats to an address at which no vehicle was heard yet: one that starts hears them soon."""
 _ROUNDING_S = 0.5e-6
 """Above the rounding of an hour's sum of periods."""
 _BROADCAST = 0
@@ -41,8 +43,9 @@ class Session:
 
     The first peer that sends an autopilot's heartbeat is the vehicle; datagrams of others are dropped unless the
     vehicle is lost. With ``peer``, only datagrams from that address are accepted, and with ``system_id``, only that
-    vehicle. Heartbeats are sent once per second of this clock and of vehicle time, because a simulation that is faster
-    than real time measures their timeout in its own time; without ``counts_vehicle_time``, this clock is the vehicle's.
+    vehicle. Heartbeats are sent to a vehicle once per second of this clock and of vehicle time, because a simulation
+    that is faster than real time measures their timeout in its own time; without ``counts_vehicle_time``, this clock is
+    the vehicle's.
     ``heartbeat_type`` is the MAV_TYPE that this side announces, ``own_system`` its system id. ``record`` gets every
     frame, sent and received, without its signature. Sessions of several vehicles on one link share its ``wire``. With
     ``monitors``, the round trip is measured.
@@ -234,12 +237,16 @@ class Session:
         self.skip_heartbeat(now_s)
         if now_s + _ROUNDING_S < due_s:  # it was due in vehicle time alone
             self._heartbeat_due_s = due_s
-        elif now_s - due_s < HEARTBEAT_PERIOD_S - _ROUNDING_S:
-            self._heartbeat_due_s = due_s + HEARTBEAT_PERIOD_S
+        elif now_s - due_s < self._heartbeat_period_s - _ROUNDING_S:
+            self._heartbeat_due_s = due_s + self._heartbeat_period_s
+
+    @property
+    def _heartbeat_period_s(self) -> float:
+        return GREETING_PERIOD_S if self._builder.identity is None else HEARTBEAT_PERIOD_S
 
     def skip_heartbeat(self, now_s: float) -> None:
         """Send the next heartbeat one period from now: the peer just got one."""
-        self._heartbeat_due_s = now_s + HEARTBEAT_PERIOD_S
+        self._heartbeat_due_s = now_s + self._heartbeat_period_s
         vehicle_s = self._builder.time_s
         if vehicle_s is not None and self._counts_vehicle_time:
             self._heartbeat_due_vehicle_s = vehicle_s + HEARTBEAT_PERIOD_S

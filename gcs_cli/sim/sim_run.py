@@ -41,8 +41,9 @@ from gcs_cli.sim.sim_vehicles import (
 )
 from gcs_cli.vehicle_link import open_signing
 
-_STEP_S = 0.1
-_REQUEST_S = 0.25
+_STEP_S, _START_STEP_S = 0.1, 0.02
+"""Pause between two looks at the processes, when all vehicles are ready and before."""
+_REQUEST_S = 0.05
 """Pause between two requests for the vehicle's state before it is ready."""
 _END_TIMEOUT_S = 10.0
 
@@ -152,7 +153,7 @@ class Fleet:
             if shows:
                 processes.show_notices()
             processes.check()
-        time.sleep(_STEP_S)
+        time.sleep(_STEP_S if self.is_ready else _START_STEP_S)
 
     def show_notices(self) -> None:
         """Print the new warnings of all processes."""

@@ -31,7 +31,7 @@ from sim_bridge.server.connection import (
     listen,
 )
 from sim_bridge.server.endpoint import FlightStackEndpoint
-from sim_bridge.server.session import Session
+from sim_bridge.server.session import Pace, Session
 from sim_bridge.simulator import Simulator
 
 if TYPE_CHECKING:
@@ -49,6 +49,7 @@ class ServerOptions(NamedTuple):
     plant_options: PlantOptions
     home: GeoPoint
     speed: float  # math.inf: unlimited
+    head_start_s: float  # simulated time before that of the speed
     host: str
     port: int
     system_id: int
@@ -98,7 +99,8 @@ def _simulate(options: ServerOptions, listener: socket.socket) -> int:
     with client, view:
         connection = Connection(client, stop, timeout_s)
         quiet = None if math.isfinite(options.speed) else _quiet_exchanges(link, client.fileno())
-        return _run(Session(link, connection, options.speed, stop, quiet), connection, timeout_s)
+        pace = Pace(options.speed, round(options.head_start_s * 1e6))
+        return _run(Session(link, connection, pace, stop, quiet), connection, timeout_s)
 
 
 def _print_start(options: ServerOptions, port: int) -> None:

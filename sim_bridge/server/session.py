@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from flightstack.transports.cpu_affinity import AffinityLeader
 from sim_bridge.server.connection import Connection, PeerClosedError, StoppedError, StopSignal
@@ -95,6 +95,15 @@ FREEWHEEL_S = 0.05
 """Wait for an answer while the client's answers have not begun; PX4 takes 20 to 40 steps to start."""
 
 
+class Pace(NamedTuple):
+    """How fast simulated time passes."""
+
+    speed: float
+    """Simulated time over wall time; infinite without a limit."""
+    from_us: int = 0
+    """Simulated time from which the speed is held [µs]."""
+
+
 class Session:
     """The session of one client."""
 
@@ -102,7 +111,7 @@ class Session:
         self,
         link: FlightStackEndpoint,
         connection: Connection,
-        speed: float,
+        pace: Pace,
         stop: StopSignal,
         quiet: QuietExchanges | None = None,
     ) -> None:
@@ -110,8 +119,8 @@ class Session:
         self.link = link
         self.exchanges = 0
         self.wall_s = 0.0
-        self._speed = speed
-        self.pacer = None if math.isinf(speed) else Pacer(speed, stop.is_set)
+        self._pace = pace
+        self.pacer = None if math.isinf(pace.speed) else Pacer(pace.speed, stop.is_set)
         # at a limited speed the process sleeps, and the scheduler chooses the processor
         self._leader = AffinityLeader() if self.pacer is None else None
         self._move_at = 1
@@ -164,7 +173,7 @@ class Session:
         self.exchanges += 1
         if self.exchanges >= self._move_at and self._leader is not None:
             self._move_at = self.exchanges + self._leader.update()
-        if self.pacer is not None:
+        if self.pacer is not None and link.simulator.time_us >= self._pace.from_us:
             self.pacer.wait_until(link.simulator.time_us, LEAD_NS)
 
     def _run_quietly(self, quiet: QuietExchanges, count: int) -> None:
@@ -207,7 +216,7 @@ class Session:
             f"{self.exchanges} exchanges, {self.link.stale} stale and {self.link.bad} bad messages, "
             f"{self.link.simulator.plant.bad_commands} bad commands"
         ]
-        if math.isinf(self._speed) and self.link.free_running:
+        if math.isinf(self._pace.speed) and self.link.free_running:
             lines.append("--speed max had no effect: the flight stack runs in real time")
         if self.pacer is not None and self.pacer.lateness.count:
             late = self.pacer.lateness

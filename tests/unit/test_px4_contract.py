@@ -15,7 +15,7 @@ from flightstack.simulator_link.sensor_frames import ACCEL, BARO, GYRO, MAG
 from sim_bridge.plant.faults.schedule import parse_fault
 from sim_bridge.server.connection import PeerClosedError
 from sim_bridge.server.endpoint import FlightStackEndpoint
-from sim_bridge.server.session import Session
+from sim_bridge.server.session import Pace, Session
 from sim_bridge.simulator import Simulator
 from tests.support.sensor_vehicles import X_QUAD, with_sensors
 
@@ -81,7 +81,7 @@ class Running:
 def flown(vehicle=X_QUAD, *specs: str) -> Px4:
     simulator, px4 = Simulator(vehicle), Px4()
     simulator.inject(*(parse_fault(spec, 4) for spec in specs))
-    session = Session(FlightStackEndpoint(simulator, vehicle, HOME), px4, math.inf, Running())  # type: ignore[arg-type]
+    session = Session(FlightStackEndpoint(simulator, vehicle, HOME), px4, Pace(math.inf), Running())  # type: ignore[arg-type]
     with pytest.raises(PeerClosedError):
         session.run()
     return px4
