@@ -12,7 +12,6 @@ from types import FrameType
 
 from flightstack.core.enums import Mode, Severity
 from flightstack.core.errors import ConfigError, TargetError
-from flightstack.core.periods import NEVER_US
 from flightstack.firmware.choice import PYTHON, SERIAL, parse_loops
 from flightstack.params.config import StackConfig
 from flightstack.process.assembly import Stack, reboot_config, transfer_state
@@ -244,9 +243,9 @@ class App:
                 is_over = is_over or (starting is not None and starting.is_ready())
                 if is_over and loop.ends_period:
                     return
-                stop_us = NEVER_US if starting is None else starting.health_due_us
+                next_log_us = self._next_log_us if starting is None else 0  # no further than this period
                 may_run_on = not (owes_ground or is_over)
-                data = loop.run(self._next_ground_ns, min(self._next_log_us, stop_us), may_run_on)
+                data = loop.run(self._next_ground_ns, next_log_us, may_run_on)
                 owes_ground = owes_ground or loop.serves_ground
                 if loop.ends_period:
                     self._end_period()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -24,8 +25,21 @@ def render_page(folder: Path, template: str, *, more: Sequence[Path] = (), **val
 
     ``more``: folders of other templates that it imports.
     """
+    return _environment((folder, *more)).get_template(template).render(**values)
+
+
+def load_templates(folder: Path, *more: Path) -> None:
+    """Compile the templates that pages of ``folder`` need, which takes longer than to render one."""
+    environment = _environment((folder, *more))
+    for template in environment.list_templates(["html"]):
+        environment.get_template(template)
+
+
+@cache
+def _environment(folders: tuple[Path, ...]) -> Environment:
+    """Return the templates and assets of the folders; the first one is that of the page."""
     environment = Environment(
-        loader=FileSystemLoader([folder, *more, _HERE / "templates"]),
+        loader=FileSystemLoader([*folders, _HERE / "templates"]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -39,9 +53,9 @@ def render_page(folder: Path, template: str, *, more: Sequence[Path] = (), **val
         "plotly_js": _plotly_js(),
         "charts_js": _asset(_HERE / "charts.js"),
         "is_space": lambda figure: hasattr(figure, "paths"),
-        "asset": lambda name: _asset(folder / name),
+        "asset": lambda name: _asset(folders[0] / name),
     }
-    return environment.get_template(template).render(**values)
+    return environment
 
 
 def shown(value: Any, spec: str = "", unit: str = "") -> str:

@@ -35,9 +35,12 @@ def fly(
     ] = None,
 ) -> None:
     """Fly a mission in simulation and write log, summary and report."""
-    from gcs_cli.fly.fly_run import run_fly
+    from gcs_cli.fly.prepared import PreparedStack
 
-    run_fly(complete_options(context, "fly", options, run), run, out)
+    with PreparedStack() as stack:
+        from gcs_cli.fly.fly_run import run_fly
+
+        run_fly(complete_options(context, "fly", options, run), run, out, stack)
 
 
 @app.command(cls=PanelCommand)
@@ -60,7 +63,10 @@ def sim(
     out = output_of(context, as_json)
     if watch and out.as_json:
         raise CliError("give either --watch or --json: the view needs the terminal", USAGE)
-    from gcs_cli.sim.sim_run import simulate
+    from gcs_cli.fly.prepared import PreparedStack
 
-    run = RunOptions(instance=instance, timeout=timeout)
-    simulate(complete_options(context, "sim", options, run), out, watch)
+    with PreparedStack() as stack:
+        from gcs_cli.sim.sim_run import simulate
+
+        run = RunOptions(instance=instance, timeout=timeout)
+        simulate(complete_options(context, "sim", options, run), out, watch, stack)

@@ -10,6 +10,7 @@ from rich.console import Console
 from flightstack.core.errors import ConfigError
 from flightstack.params.vehicle import NO_DRAG_PLANT
 from flightstack.plan import Plan
+from gcs_cli.charts.pages import load_templates
 from gcs_cli.errors import CliError
 from gcs_cli.fly.flight import Flown
 from gcs_cli.fly.fly_flags import FlyOptions
@@ -18,9 +19,14 @@ from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.conditions import conditions
 from gcs_cli.report.flight_data import Flight as FlightData
 from gcs_cli.report.flight_outcome import Code, Outcome, with_log
-from gcs_cli.report.page import write_report
+from gcs_cli.report.page import TEMPLATES, write_report
 from gcs_cli.report.summary import RunInfo, max_overshoot_m, summarise, write_summary
 from gcs_cli.run_directory import LOG_NAME, REPORT_NAME, RESULTS, SUMMARY_NAME, TLOG_NAME
+
+
+def prepare() -> None:
+    """Load what the report needs besides the modules."""
+    load_templates(TEMPLATES)
 
 
 def _drag_of(options: FlyOptions) -> tuple[float, float, float]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import json
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from flightstack.core.port_numbers import vehicle_ground_port
@@ -26,6 +26,7 @@ from gcs_cli.fly.fly_options import (
     simulator_arguments,
     stack_arguments,
 )
+from gcs_cli.fly.prepared import PreparedStack
 from gcs_cli.fly.processes import Child, Children, Interruption
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.endpoint import LOOPBACK, UDP_IN, VehicleEndpoint
@@ -50,7 +51,12 @@ _RESULTS = "gcs_cli.fly.fly_results"
 
 
 def fly(
-    options: FlyOptions, plan: Plan, out: Path | None, display: Display, overwrite: bool = False
+    options: FlyOptions,
+    plan: Plan,
+    out: Path | None,
+    display: Display,
+    overwrite: bool = False,
+    prepared: PreparedStack | None = None,
 ) -> Flown:
     """Fly ``plan`` with a simulator and a flight stack of our own; raise CliError if they cannot be started.
 
@@ -72,7 +78,7 @@ def fly(
             longest_flight_s(options, plan),
             STALL_S / min(1.0, options.speed_factor),
         )
-        with _recording(connection, folder), Children(folder) as children:
+        with _recording(connection, folder), Children(folder, prepared) as children:
             home = home_of(options, plan)
             children.start(SIMULATOR, "sim_bridge", simulator_arguments(options, home))
             children.start(
@@ -98,7 +104,7 @@ def _flown(flight: Flight, outcome: Outcome, folder: Path) -> Flown:
     return Flown(folder, outcome, wall_time_s, overruns, flight.returned_by_us)
 
 
-@contextmanager
+@contextlib.contextmanager
 def _recording(connection: Connection, folder: Path) -> Iterator[None]:
     """Record the session's frames in the directory of the flight."""
     with TlogFile(folder / TLOG_NAME) as tlog:
@@ -117,7 +123,7 @@ def run_flight(
 ) -> None:
     """Exchange messages, watch the children and draw until the flight is over."""
     # 0.2 s, which is long for the vehicle in simulated time: heartbeats continue
-    importer = threading.Thread(target=importlib.import_module, args=(_RESULTS,), daemon=True)
+    importer = threading.Thread(target=_prepare_results, daemon=True)
     while not flight.is_over:
         if flight.outcome is not None and children.wait(0.0):
             return  # no process is left to shut down
@@ -138,6 +144,11 @@ def run_flight(
             importer.start()
 
 
+def _prepare_results() -> None:
+    with contextlib.suppress(CliError):  # the report raises it again
+        importlib.import_module(_RESULTS).prepare()
+
+
 def _show_notices(children: Children, display: Display) -> None:
     for line in children.notices():
         display.note(line)
@@ -153,13 +164,15 @@ def _failed_child(flight: Flight, children: Children) -> Child | None:
     return children.culprit(_END_TIMEOUT_S)
 
 
-def run_fly(options: FlyOptions, run: RunOptions, out: Path | None) -> None:
+def run_fly(
+    options: FlyOptions, run: RunOptions, out: Path | None, prepared: PreparedStack | None = None
+) -> None:
     """Fly the mission, write the results to ``out`` and print a summary; raise CliError, ConfigError."""
     items = checked_plan(options)
     console = FlyConsole(stderr=run.as_json, highlight=False)
     display = make_display(console)
     try:
-        flown = fly(options, items, out, display, run.overwrite)
+        flown = fly(options, items, out, display, run.overwrite, prepared)
     finally:
         display.close()
     results = importlib.import_module(_RESULTS)  # late: see run_flight

@@ -12,6 +12,7 @@ from types import FrameType
 from typing import Any, Protocol, TypeVar
 
 from flightstack.process.supervised import supervised
+from gcs_cli.fly.prepared import PreparedStack
 
 _TAIL_BYTES = 4096
 _POLL_S = 0.02
@@ -66,18 +67,20 @@ class Child:
     Its standard input is a pipe that closes at the latest when this process ends.
     """
 
-    def __init__(self, name: str, arguments: Sequence[str], log_path: Path) -> None:
+    def __init__(self, name: str, process: subprocess.Popen[bytes], log_path: Path) -> None:
         self.name = name
         self._log_path = log_path
         self._read = 0
+        self._process = process
+
+    @classmethod
+    def start(cls, name: str, command: Sequence[str], log_path: Path) -> Child:
+        """Start a command with its output in ``log_path``."""
         with log_path.open("wb") as log:
-            self._process = subprocess.Popen(
-                arguments,
-                stdin=subprocess.PIPE,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
+            process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=log, stderr=subprocess.STDOUT, start_new_session=True
             )
+        return cls(name, process, log_path)
 
     @property
     def pid(self) -> int:
@@ -138,13 +141,21 @@ class Children:
     The last one started is stopped first: it depends on those before it.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, prepared: PreparedStack | None = None) -> None:
+        """``prepared`` becomes the flight stack."""
         self._folder = folder
+        self._prepared = prepared
         self._all: list[Child] = []
 
     def start(self, name: str, module: str, arguments: Sequence[str]) -> Child:
         """Start a Python module of this installation; its output goes to ``<name>.log``."""
-        child = Child(name, supervised(module, *arguments), self._folder / f"{name}.log")
+        log_path = self._folder / f"{name}.log"
+        log_path.write_bytes(b"")
+        process = None if self._prepared is None else self._prepared.take(module, arguments, log_path)
+        if process is None:
+            child = Child.start(name, supervised(module, *arguments), log_path)
+        else:
+            child = Child(name, process, log_path)
         self.add(child)
         return child
 

@@ -21,6 +21,7 @@ from flightstack.process.supervised import supervised
 from flightstack.transports.udp import UdpSocket
 from gcs_cli.errors import FAILED, NO_ANSWER, CliError
 from gcs_cli.fly.fly_options import check_options, check_ports, simulator_arguments
+from gcs_cli.fly.prepared import PreparedStack
 from gcs_cli.fly.processes import Children, Interruption
 from gcs_cli.link import calls
 from gcs_cli.link.endpoint import LOOPBACK
@@ -121,7 +122,9 @@ class Fleet:
     Their output goes to a temporary directory.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, prepared: PreparedStack | None) -> None:
+        """``prepared`` becomes the flight stack of the first vehicle."""
+        self._prepared = prepared
         self._all: list[VehicleProcesses] = []
         self._ends = contextlib.ExitStack()
         self._folder = Path(self._ends.enter_context(tempfile.TemporaryDirectory(prefix="gcs-sim-")))
@@ -135,7 +138,7 @@ class Fleet:
         """Start the processes of a vehicle."""
         folder = self._folder / str(vehicle.instance)
         folder.mkdir()
-        processes = VehicleProcesses(vehicle, self._ends.enter_context(Children(folder)))
+        processes = VehicleProcesses(vehicle, self._ends.enter_context(Children(folder, self._prepared)))
         self._ends.callback(processes.close)
         self._all.append(processes)
 
@@ -185,13 +188,13 @@ def check_vehicle(vehicle: SimOptions) -> None:
     check_ports(vehicle)
 
 
-def simulate(options: SimOptions, out: Output, watch: bool) -> None:
+def simulate(options: SimOptions, out: Output, watch: bool, prepared: PreparedStack | None = None) -> None:
     """Run the vehicles until a signal, the end of the view, or the end of a process; raise CliError, ConfigError."""
     vehicles = vehicles_of(options)
     for vehicle in vehicles:
         check_vehicle(vehicle)
     first, *others = vehicles
-    with Interruption() as interruption, Fleet() as fleet:
+    with Interruption() as interruption, Fleet(prepared) as fleet:
         due_s = time.monotonic() + options.timeout_s
         fleet.start(first)
         while not interruption.reason and not fleet.is_ready:

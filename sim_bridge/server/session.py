@@ -61,8 +61,10 @@ class Lateness:
 class Pacer:
     """Paces simulated time at ``speed`` times wall time, by absolute deadlines."""
 
-    def __init__(self, speed: float, stopped: Callable[[], bool]) -> None:
+    def __init__(self, speed: float, stopped: Callable[[], bool], from_us: int = 0) -> None:
+        """Simulated time before ``from_us`` passes as fast as possible."""
         self._ns_per_us = 1000.0 / speed
+        self._from_us = from_us
         self._stopped = stopped
         self._base_ns: int | None = None
         self._base_us = 0
@@ -74,6 +76,8 @@ class Pacer:
 
         A delay of more than 0.5 s (a suspended machine, a debugger) resets the origin.
         """
+        if time_us < self._from_us:
+            return
         now = time.monotonic_ns()
         if self._base_ns is None:
             self._base_ns, self._base_us = now, time_us
@@ -120,7 +124,7 @@ class Session:
         self.exchanges = 0
         self.wall_s = 0.0
         self._pace = pace
-        self.pacer = None if math.isinf(pace.speed) else Pacer(pace.speed, stop.is_set)
+        self.pacer = None if math.isinf(pace.speed) else Pacer(pace.speed, stop.is_set, pace.from_us)
         # at a limited speed the process sleeps, and the scheduler chooses the processor
         self._leader = AffinityLeader() if self.pacer is None else None
         self._move_at = 1
@@ -173,7 +177,7 @@ class Session:
         self.exchanges += 1
         if self.exchanges >= self._move_at and self._leader is not None:
             self._move_at = self.exchanges + self._leader.update()
-        if self.pacer is not None and link.simulator.time_us >= self._pace.from_us:
+        if self.pacer is not None:
             self.pacer.wait_until(link.simulator.time_us, LEAD_NS)
 
     def _run_quietly(self, quiet: QuietExchanges, count: int) -> None:

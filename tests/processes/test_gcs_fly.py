@@ -321,7 +321,7 @@ def test_a_child_that_does_not_listen_is_killed(tmp_path: Path, monkeypatch: pyt
     os.mkfifo(tmp_path / "told")
     told = os.open(tmp_path / "told", os.O_RDONLY | os.O_NONBLOCK)
     monkeypatch.chdir(tmp_path)
-    child = Child("deaf", [sys.executable, str(tmp_path / "deaf.py")], tmp_path / "deaf.log")
+    child = Child.start("deaf", [sys.executable, str(tmp_path / "deaf.py")], tmp_path / "deaf.log")
     assert select.select([told], [], [], LONG_S)[0]
     os.close(told)
     with Children(tmp_path) as children:

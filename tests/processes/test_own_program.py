@@ -11,7 +11,9 @@ import pytest
 
 import flightstack
 from flightstack.process.command_line import own_program
-from flightstack.process.supervised import supervised
+from flightstack.process.supervised import order, prepared, supervised
+from gcs_cli.fly.prepared import PreparedStack
+from gcs_cli.fly.processes import Children
 
 
 @pytest.mark.parametrize("inside", [False, True], ids=["elsewhere", "in the checkout"])
@@ -25,6 +27,35 @@ def test_folders_of_the_same_name_are_not_run(
         own_program("flightstack", "--version"), capture_output=True, text=True, check=False
     )
     assert (done.stdout, done.stderr) == (f"flightstack {flightstack.__version__}\n", "")
+
+
+def test_a_prepared_program_runs_what_it_is_given_and_ends_with_its_pipe(tmp_path: Path) -> None:
+    output = tmp_path / "output.log"
+    output.touch()
+    with subprocess.Popen(prepared("flightstack"), stdin=subprocess.PIPE) as process:
+        assert process.stdin is not None
+        process.stdin.write(order(str(output), "flightstack", "--version"))
+        process.stdin.flush()
+        assert process.wait() == 0
+    assert output.read_text() == f"flightstack {flightstack.__version__}\n"
+
+
+def test_a_prepared_program_that_is_not_needed_ends_with_its_pipe() -> None:
+    with subprocess.Popen(prepared("flightstack"), stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.communicate() == (None, b"")
+    assert process.returncode == 0
+
+
+def test_one_prepared_flight_stack_is_taken_once(tmp_path: Path) -> None:
+    with PreparedStack() as stack, Children(tmp_path, stack) as children:
+        children.start("sim-bridge", "sim_bridge", ["--version"])
+        first = children.start("flightstack", "flightstack", ["--version"])
+        assert children.wait(60.0)
+        assert first.last_line == f"flightstack {flightstack.__version__}"
+        again = children.start("second", "flightstack", ["--version"])
+        assert children.wait(60.0)
+        assert again.last_line == first.last_line
+        assert len({child.pid for child in children.ended()}) == 3
 
 
 def test_supervised_program_ends_when_its_pipe_closes() -> None:

@@ -55,8 +55,16 @@ def children_of(pid: int) -> dict[str, int]:
             continue
         if parent == pid and "-m" in arguments:
             module, *rest = arguments[arguments.index("-m") + 1 :]
-            found[rest[1] if module == SUPERVISOR else module] = int(entry.name)
+            found[program_of(module, rest)] = int(entry.name)
     return found
+
+
+def program_of(module: str, arguments: Sequence[str]) -> str:
+    """Return the program that ``python -m MODULE ARGUMENTS`` runs: that of the supervisor, or the module."""
+    if module != SUPERVISOR:
+        return module
+    _, program, *rest = arguments
+    return program if program != "-" else rest[0].partition(".")[0]  # one that waits for its command line
 
 
 def await_output(process: subprocess.Popen[Any], text: str) -> None:

@@ -7,6 +7,7 @@ programs that the server has started. Tests of a parent that is killed start new
 from __future__ import annotations
 
 import contextlib
+import os
 import subprocess
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -14,6 +15,7 @@ from types import SimpleNamespace
 from typing import IO, Any
 from unittest import mock
 
+import gcs_cli.fly.prepared
 import gcs_cli.fly.processes
 import gcs_cli.scenarios.pool
 from tests.support.programs import Program
@@ -32,6 +34,14 @@ def _logged(command: Sequence[str], *, stdout: IO[bytes], **_: Any) -> Program:
     return child
 
 
+def _prepared(command: Sequence[str], **_: Any) -> Any:
+    """Start a program that waits for its arguments on a binary pipe."""
+    with open(os.devnull, "wb") as nowhere:
+        child: Any = _logged(command, stdout=nowhere)
+    child.stdin = child.stdin.detach()
+    return child
+
+
 def _worker(command: Sequence[str], *, cwd: Path | None, **_: Any) -> Any:
     """Start a program with binary pipes."""
     child: Any = _start(command, directory=cwd, shares_errors=True)
@@ -42,8 +52,9 @@ def _worker(command: Sequence[str], *, cwd: Path | None, **_: Any) -> Any:
 @contextlib.contextmanager
 def warm_children() -> Iterator[None]:
     """Start the children of commands in this process from the warm server."""
-    names = {"PIPE": subprocess.PIPE, "STDOUT": subprocess.STDOUT}
+    names = {"PIPE": subprocess.PIPE, "STDOUT": subprocess.STDOUT, "DEVNULL": subprocess.DEVNULL}
     with (
+        mock.patch.object(gcs_cli.fly.prepared, "subprocess", SimpleNamespace(Popen=_prepared, **names)),
         mock.patch.object(gcs_cli.fly.processes, "subprocess", SimpleNamespace(Popen=_logged, **names)),
         mock.patch.object(gcs_cli.scenarios.pool, "subprocess", SimpleNamespace(Popen=_worker, **names)),
     ):

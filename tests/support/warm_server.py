@@ -26,7 +26,7 @@ from flightstack.params.config import StackConfig
 from flightstack.params.vehicle import load_vehicle
 from flightstack.process.assembly import build
 from sim_bridge.simulator import Simulator
-from tests.support.process import SUPERVISOR
+from tests.support.process import program_of
 from tests.support.programs import ASKS, GIVEN, LARGEST_ANSWER, NEW_INTERPRETERS, PROGRAMS
 from tests.support.warm_children import warm_children
 
@@ -144,7 +144,7 @@ class Server:
         for stream in streams:
             os.close(stream)
         module, arguments = request["module"], request["arguments"]
-        self._programs[pid] = request["parent"], arguments[1] if module == SUPERVISOR else module
+        self._programs[pid] = request["parent"], program_of(module, arguments)
         self._selector.register(ours, selectors.EVENT_READ)
         self._selector.register(os.pidfd_open(pid), selectors.EVENT_READ, (pid, report))
         return pid

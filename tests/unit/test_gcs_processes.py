@@ -77,7 +77,7 @@ def test_notices_of_a_child_are_read_once_and_in_whole_lines(tmp_path: Path) -> 
         "flightstack: shut down by the ground station\nflightstack: warning: half a"
     )
     with Children(tmp_path) as children:
-        child = Child("sim-bridge", [sys.executable, "-c", program, said], tmp_path / "sim-bridge.log")
+        child = Child.start("sim-bridge", [sys.executable, "-c", program, said], tmp_path / "sim-bridge.log")
         children.add(child)
         assert children.wait(60.0)
         assert children.notices() == [

@@ -42,6 +42,16 @@ def test_heartbeats_are_sent_once_a_second_as_a_ground_station() -> None:
     assert (message.type, message.autopilot) == (mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID)
 
 
+def test_an_address_is_greeted_more_often_until_its_vehicle_is_heard() -> None:
+    """A vehicle that starts meets its ground station within a tenth of a second."""
+    session = Session(peer=HERE)
+    sent = [tenth for tenth in range(10) if heartbeats(session.poll(tenth / 10))]
+    assert sent == list(range(10))
+    met(session, FakeVehicle())
+    sent = [tenth for tenth in range(10, 31) if heartbeats(session.poll(tenth / 10))]
+    assert sent == [10, 20, 30]
+
+
 def test_heartbeats_follow_vehicle_time_when_it_is_faster_than_real_time() -> None:
     session = met(Session(), FakeVehicle())
 

@@ -56,6 +56,13 @@ def test_pacer_in_slow_motion_sleeps_in_each_tick(clock: Clock) -> None:
     assert clock.sleeps_ms == [20.0] * 3
 
 
+def test_pacer_with_a_head_start_counts_from_its_end(clock: Clock) -> None:
+    pacer = Pacer(1.0, lambda: False, from_us=100 * TICK_US)
+    for tick in range(105):
+        pacer.wait_until(tick * TICK_US, lead_ns=0)
+    assert clock.sleeps_ms == [2.0] * 4
+
+
 def test_late_pacer_counts_lateness_and_does_not_sleep(clock: Clock) -> None:
     pacer = Pacer(1.0, lambda: False)
     pacer.wait_until(0, LEAD_NS)

@@ -179,6 +179,9 @@ def test_notices_are_printed_after_the_view(
     class NoisyChildren(contextlib.nullcontext[None]):
         """Children that write a warning while the view runs."""
 
+        def __init__(self, *_: object) -> None:
+            super().__init__()
+
         def start(self, *_: object) -> None:
             pass
 
