@@ -24,10 +24,9 @@ STARTED_S = time.time()
 _KEPT_S = 14 * 86_400.0
 """Lifetime of a directory after its last use."""
 _IMPORT = re.compile(
-    rf"^[ \t]*(?:from[ \t]+((?:{'|'.join(OWN_PACKAGES)})[\w.]*)[ \t]+import[ \t]+(\([^)]*\)|[^\n]+)"
+    rf"\n[ \t]*(?:from[ \t]+((?:{'|'.join(OWN_PACKAGES)})[\w.]*)[ \t]+import[ \t]+(\([^)]*\)|[^\n]+)"
     rf"|import[ \t]+((?:{'|'.join(OWN_PACKAGES)})[^\n]*)"
-    rf"|importlib\.import_module\(\"((?:{'|'.join(OWN_PACKAGES)})[\w.]*)\"\))",
-    re.MULTILINE,
+    rf"|importlib\.import_module\(\"((?:{'|'.join(OWN_PACKAGES)})[\w.]*)\"\))"
 )
 
 
@@ -38,17 +37,32 @@ def is_own(module_name: str) -> bool:
 
 @cache
 def _path(top: Path, module_name: str) -> Path | None:
-    base = top.joinpath(*module_name.split("."))
-    for path in (base.with_suffix(".py"), base / "__init__.py"):
-        if path.is_file():
-            return path
+    """Return the file of a module; None for the name of something in a module."""
+    parent, _, name = module_name.rpartition(".")
+    package = _path(top, parent) if parent else None
+    if package is not None and package.name != "__init__.py":  # a module: most imported names are in one
+        return None
+    folder = top.joinpath(*parent.split(".")) if package is None else package.parent
+    if f"{name}.py" in _entries(folder):
+        return folder / f"{name}.py"
+    if name in _entries(folder) and "__init__.py" in _entries(folder / name):
+        return folder / name / "__init__.py"
     return None
+
+
+@cache
+def _entries(folder: Path) -> frozenset[str]:
+    """Return the names in a folder, none if it is no folder."""
+    try:
+        return frozenset(os.listdir(folder))
+    except OSError:
+        return frozenset()
 
 
 def _imports(text: str) -> set[str]:
     """Return all module names that a source may import; an imported name may itself be a module."""
     found: set[str] = set()
-    for package, names, plain, late in _IMPORT.findall(text):
+    for package, names, plain, late in _IMPORT.findall(f"\n{text}"):
         if late:
             found.add(late)
             continue
