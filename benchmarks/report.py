@@ -218,9 +218,6 @@ def _transfers(taken: Transfers) -> str:
 
 def _start(results: dict[str, Any]) -> str:
     rows: list[Row] = [(name, took.text()) for name, took in results["start"].items()]
-    if "three_processes" in results:
-        command_s = results["three_processes"][three_processes.ON_SENSORS].command_s
-        rows.append(("gcs fly missions/square.plan (make fly), all of it", command_s.text()))
     return table("START", ("", "s"), rows)
 
 
