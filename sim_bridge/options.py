@@ -60,7 +60,7 @@ HeadStart = Annotated[
     typer.Option(
         metavar="SECONDS",
         help="Simulated time that passes as fast as possible before that of --speed, "
-        "as while a vehicle estimates its first state.",
+        "as while a vehicle estimates its first state; in lockstep.",
         **shared.IN_SIMULATION,
     ),
 ]

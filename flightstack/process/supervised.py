@@ -62,7 +62,11 @@ def _end_with_parent(descriptor: int) -> None:
 if __name__ == "__main__":
     pipe, module_name = int(sys.argv.pop(1)), sys.argv.pop(1)
     if module_name == _READS:
-        importlib.import_module(sys.argv.pop(1))
+        try:
+            importlib.import_module(sys.argv.pop(1))
+        except BaseException:
+            _take_order(pipe)  # its output is where the reason is looked for
+            raise
         module_name = _take_order(pipe)
     threading.Thread(target=_end_with_parent, args=(pipe,), daemon=True).start()
     runpy.run_module(module_name, run_name="__main__", alter_sys=True)

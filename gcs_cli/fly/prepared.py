@@ -30,7 +30,8 @@ class PreparedStack:
     def take(self, module: str, arguments: Sequence[str], output: Path) -> subprocess.Popen[bytes] | None:
         """Run ``module`` with its output in the file ``output``; return None if this process cannot.
 
-        That is the case for another module than the flight stack, after the first call, and if the imports failed.
+        That is the case for another module than the flight stack, after the first call, and if the process has ended.
+        One whose imports fail says why in ``output``.
         """
         process = self._process
         if module != _STACK or process is None or process.poll() is not None:

@@ -19,7 +19,7 @@ from gcs_cli.vehicle.view_types import LOST_AFTER_S, VehicleView
 
 HEARTBEAT_PERIOD_S = 1.0
 GREETING_PERIOD_S = 0.1
-"""Period of heartbeats to an address at which no vehicle was heard yet: one that starts hears them soon."""
+"""Period of heartbeats to ``peer`` until it is heard: a vehicle that starts hears them soon."""
 _ROUNDING_S = 0.5e-6
 """Above the rounding of an hour's sum of periods."""
 _BROADCAST = 0

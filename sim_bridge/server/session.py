@@ -71,6 +71,10 @@ class Pacer:
         self.lateness = Lateness()
         self.slips = 0
 
+    def end_head_start(self) -> None:
+        """Hold the speed from now on."""
+        self._from_us = 0
+
     def wait_until(self, time_us: int, lead_ns: int = 0) -> None:
         """Sleep until the deadline of ``time_us``, if it is at least ``lead_ns`` ahead; the first call sets the origin.
 
@@ -198,6 +202,7 @@ class Session:
         link, connection = self.link, self._connection
         if self.pacer is None:  # --speed max has no effect on a client with a clock of its own
             self.pacer = Pacer(1.0, self._stop.is_set)
+        self.pacer.end_head_start()  # a client on its own clock takes the newest state only
         if self._leader is not None:
             self._leader.release()
             self._leader = None

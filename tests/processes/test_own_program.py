@@ -46,6 +46,15 @@ def test_a_prepared_program_that_is_not_needed_ends_with_its_pipe() -> None:
     assert process.returncode == 0
 
 
+def test_a_prepared_program_that_cannot_be_imported_says_so_in_its_output(tmp_path: Path) -> None:
+    output = tmp_path / "output.log"
+    output.touch()
+    with subprocess.Popen(prepared("flightstack.missing"), stdin=subprocess.PIPE) as process:
+        process.communicate(order(str(output), "flightstack", "--version"))
+    assert process.returncode == 1
+    assert output.read_text().splitlines()[-1] == "ModuleNotFoundError: No module named 'flightstack.missing'"
+
+
 def test_one_prepared_flight_stack_is_taken_once(tmp_path: Path) -> None:
     with PreparedStack() as stack, Children(tmp_path, stack) as children:
         children.start("sim-bridge", "sim_bridge", ["--version"])

@@ -285,7 +285,7 @@ def test_the_children_are_told_everything() -> None:
     assert simulator_arguments(options, home) == [
         "--vehicle=x_quad", "--plant=paper", "--speed=4", "--instance=2", "--seed=9", "--wind=3,-1", "--gust=0.5",
         "--torque-gust=0.02", "--ideal-rotors", "--state=estimated", "--port=4562", "--home=47.1,-8.2,3.5",
-        "--timeout=12", "--clock=lockstep",
+        "--timeout=12", "--clock=lockstep", "--head-start=1.1",
     ]  # fmt: skip
     assert stack_arguments(options, home, Path("runs/x"), 40_000) == [
         "--vehicle=x_quad", "--controller=backstepping", "--gains=paper", "--loops=c", "--state=estimated",
@@ -313,6 +313,19 @@ def test_wind_acts_on_the_papers_vehicle_with_drag() -> None:
     checked_plan(FlyOptions(HOP, wind="0,0", gust=0.0))
     assert "--drag" in simulator_arguments(windy, GeoPoint(47.1, -8.2, 3.5))
     assert flown_vehicle(windy).linear_drag_n_s_m == (0.153, 0.153, 0.153)
+
+
+@pytest.mark.parametrize(
+    ("state", "loops", "starts_ahead"),
+    [("estimated", "host", True), ("truth", "host", False), ("estimated", "host,free", False)],
+)
+def test_only_a_vehicle_that_estimates_in_lockstep_starts_ahead(
+    state: str, loops: str, starts_ahead: bool
+) -> None:
+    """The state of the simulator is known at once; a target on its own timer takes the newest state only."""
+    options = FlyOptions(HOP, speed="1", state=state, loops=loops)
+    told = simulator_arguments(options, GeoPoint(47.1, -8.2, 3.5))
+    assert any(argument.startswith("--head-start") for argument in told) is starts_ahead
 
 
 def test_the_simulator_is_told_about_battery_and_faults() -> None:

@@ -61,6 +61,11 @@ def test_pacer_with_a_head_start_counts_from_its_end(clock: Clock) -> None:
     for tick in range(105):
         pacer.wait_until(tick * TICK_US, lead_ns=0)
     assert clock.sleeps_ms == [2.0] * 4
+    pacer = Pacer(1.0, lambda: False, from_us=100 * TICK_US)
+    pacer.end_head_start()
+    for tick in range(3):
+        pacer.wait_until(tick * TICK_US, lead_ns=0)
+    assert clock.sleeps_ms == [2.0] * 6
 
 
 def test_late_pacer_counts_lateness_and_does_not_sleep(clock: Clock) -> None:

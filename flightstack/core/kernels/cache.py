@@ -43,11 +43,9 @@ def _path(top: Path, module_name: str) -> Path | None:
     if package is not None and package.name != "__init__.py":  # a module: most imported names are in one
         return None
     folder = top.joinpath(*parent.split(".")) if package is None else package.parent
-    if f"{name}.py" in _entries(folder):
-        return folder / f"{name}.py"
     if name in _entries(folder) and "__init__.py" in _entries(folder / name):
         return folder / name / "__init__.py"
-    return None
+    return folder / f"{name}.py" if f"{name}.py" in _entries(folder) else None
 
 
 @cache
