@@ -13,8 +13,7 @@ import signal
 import sys
 from pathlib import Path
 
-from gcs_cli.fly.prepared import PreparedStack
-from gcs_cli.fly.processes import Child, Children
+from gcs_cli.fly.processes import Child, Children, PreparedStack
 from gcs_cli.run_directory import SIMULATOR, STACK
 
 _LISTENS = {SIMULATOR: b", speed ", STACK: b"; simulator "}

@@ -35,7 +35,7 @@ def fly(
     ] = None,
 ) -> None:
     """Fly a mission in simulation and write log, summary and report."""
-    from gcs_cli.fly.prepared import PreparedStack  # noqa: PLC0415  # --help has no use for it
+    from gcs_cli.fly.processes import PreparedStack  # noqa: PLC0415  # --help has no use for it
 
     with PreparedStack() as stack:
         from gcs_cli.fly.fly_run import run_fly
@@ -63,7 +63,7 @@ def sim(
     out = output_of(context, as_json)
     if watch and out.as_json:
         raise CliError("give either --watch or --json: the view needs the terminal", USAGE)
-    from gcs_cli.fly.prepared import PreparedStack  # noqa: PLC0415  # --help has no use for it
+    from gcs_cli.fly.processes import PreparedStack  # noqa: PLC0415  # --help has no use for it
 
     with PreparedStack() as stack:
         from gcs_cli.sim.sim_run import simulate

@@ -26,8 +26,7 @@ from gcs_cli.fly.fly_options import (
     simulator_arguments,
     stack_arguments,
 )
-from gcs_cli.fly.prepared import PreparedStack
-from gcs_cli.fly.processes import Child, Children, Interruption
+from gcs_cli.fly.processes import Child, Children, Interruption, PreparedStack
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.endpoint import LOOPBACK, UDP_IN, VehicleEndpoint
 from gcs_cli.link.tlog import TlogFile
@@ -88,15 +87,16 @@ def fly(
             if flight.shut_down_accepted:
                 children.wait(_END_TIMEOUT_S)
             _show_notices(children, display)
-    assert flight.outcome is not None
-    if flight.began_s is None and flight.outcome.exit_code == USAGE:
-        remove_run(folder, new if out is not None else [folder, *new])
-        raise CliError(flight.outcome.reason, USAGE)
-    return _flown(flight, flight.outcome, folder)
+    return _flown(flight, folder, new if out is not None else [folder, *new])
 
 
-def _flown(flight: Flight, outcome: Outcome, folder: Path) -> Flown:
-    wall_time_s = None
+def _flown(flight: Flight, folder: Path, new: list[Path]) -> Flown:
+    """Return the result; remove the ``new`` folders of options that were refused, and raise CliError."""
+    outcome, wall_time_s = flight.outcome, None
+    assert outcome is not None
+    if flight.began_s is None and outcome.exit_code == USAGE:
+        remove_run(folder, new)
+        raise CliError(outcome.reason, USAGE)
     if flight.began_s is not None and flight.ended_s is not None:
         wall_time_s = flight.ended_s - flight.began_s
     timing = flight.view.timing

@@ -21,8 +21,7 @@ from flightstack.process.supervised import supervised
 from flightstack.transports.udp import UdpSocket
 from gcs_cli.errors import FAILED, NO_ANSWER, CliError
 from gcs_cli.fly.fly_options import check_options, check_ports, simulator_arguments
-from gcs_cli.fly.prepared import PreparedStack
-from gcs_cli.fly.processes import Children, Interruption
+from gcs_cli.fly.processes import Children, Interruption, PreparedStack
 from gcs_cli.link import calls
 from gcs_cli.link.endpoint import LOOPBACK
 from gcs_cli.link.session import Session

@@ -12,8 +12,7 @@ import pytest
 import flightstack
 from flightstack.process.command_line import own_program
 from flightstack.process.supervised import order, prepared, supervised
-from gcs_cli.fly.prepared import PreparedStack
-from gcs_cli.fly.processes import Children
+from gcs_cli.fly.processes import Children, PreparedStack
 
 
 @pytest.mark.parametrize("inside", [False, True], ids=["elsewhere", "in the checkout"])

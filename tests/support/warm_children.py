@@ -15,7 +15,6 @@ from types import SimpleNamespace
 from typing import IO, Any
 from unittest import mock
 
-import gcs_cli.fly.prepared
 import gcs_cli.fly.processes
 import gcs_cli.scenarios.pool
 from tests.support.programs import Program
@@ -27,18 +26,12 @@ def _start(command: Sequence[str], **options: Any) -> Program:
     return Program(command[first], command[first + 1 :], listens=True, **options)
 
 
-def _logged(command: Sequence[str], *, stdout: IO[bytes], **_: Any) -> Program:
-    """Start a program whose output goes to the file ``stdout``."""
-    child = _start(command, log=stdout)
-    child.stdout.close()
-    return child
-
-
-def _prepared(command: Sequence[str], **_: Any) -> Any:
-    """Start a program that waits for its arguments on a binary pipe."""
+def _logged(command: Sequence[str], *, stdout: IO[bytes] | int, **_: Any) -> Any:
+    """Start a program with a binary pipe, whose output goes to the file ``stdout``, or nowhere."""
     with open(os.devnull, "wb") as nowhere:
-        child: Any = _logged(command, stdout=nowhere)
+        child: Any = _start(command, log=nowhere if isinstance(stdout, int) else stdout)
     child.stdin = child.stdin.detach()
+    child.stdout.close()
     return child
 
 
@@ -54,7 +47,6 @@ def warm_children() -> Iterator[None]:
     """Start the children of commands in this process from the warm server."""
     names = {"PIPE": subprocess.PIPE, "STDOUT": subprocess.STDOUT, "DEVNULL": subprocess.DEVNULL}
     with (
-        mock.patch.object(gcs_cli.fly.prepared, "subprocess", SimpleNamespace(Popen=_prepared, **names)),
         mock.patch.object(gcs_cli.fly.processes, "subprocess", SimpleNamespace(Popen=_logged, **names)),
         mock.patch.object(gcs_cli.scenarios.pool, "subprocess", SimpleNamespace(Popen=_worker, **names)),
     ):

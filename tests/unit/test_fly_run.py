@@ -27,9 +27,9 @@ def test_results_are_imported_once_beside_the_exchange_of_messages(monkeypatch: 
     importers: list[threading.Thread] = []
     is_imported = threading.Event()
 
-    def import_module(name: str) -> None:
+    def import_module(name: str) -> SimpleNamespace:
         importers.append(threading.current_thread())
-        is_imported.set()
+        return SimpleNamespace(prepare=is_imported.set)
 
     class Connection:
         now_s, steps = 0.0, 0

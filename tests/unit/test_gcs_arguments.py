@@ -315,19 +315,6 @@ def test_wind_acts_on_the_papers_vehicle_with_drag() -> None:
     assert flown_vehicle(windy).linear_drag_n_s_m == (0.153, 0.153, 0.153)
 
 
-@pytest.mark.parametrize(
-    ("state", "loops", "starts_ahead"),
-    [("estimated", "host", True), ("truth", "host", False), ("estimated", "host,free", False)],
-)
-def test_only_a_vehicle_that_estimates_in_lockstep_starts_ahead(
-    state: str, loops: str, starts_ahead: bool
-) -> None:
-    """The state of the simulator is known at once; a target on its own timer takes the newest state only."""
-    options = FlyOptions(HOP, speed="1", state=state, loops=loops)
-    told = simulator_arguments(options, GeoPoint(47.1, -8.2, 3.5))
-    assert any(argument.startswith("--head-start") for argument in told) is starts_ahead
-
-
 def test_the_simulator_is_told_about_battery_and_faults() -> None:
     faults = ("rotor:2:off@12.5", "battery:level=0.1@20")
     options = FlyOptions(HOP, battery_start=40.0, battery_drain=3.5, faults=faults)

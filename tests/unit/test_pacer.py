@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from flightstack.params.config import DEFAULT_HOME
+from gcs_cli.fly.fly_flags import FlyOptions
+from gcs_cli.fly.fly_options import simulator_arguments
 from sim_bridge.server import session
 from sim_bridge.server.session import LEAD_NS, Lateness, Pacer
 
@@ -84,3 +87,16 @@ def test_lateness_above_the_bins_is_not_printed_as_their_end() -> None:
         late.add(250_000_000)
     assert late.percentile_text(99.0) == "> 100 ms"
     assert late.max_us == 250_000.0
+
+
+@pytest.mark.parametrize(
+    ("state", "loops", "starts_ahead"),
+    [("estimated", "host", True), ("truth", "host", False), ("estimated", "host,free", False)],
+)
+def test_only_a_vehicle_that_estimates_in_lockstep_starts_ahead(
+    state: str, loops: str, starts_ahead: bool
+) -> None:
+    """The state of the simulator is known at once; a target on its own timer takes the newest state only."""
+    options = FlyOptions(speed="1", state=state, loops=loops)
+    told = simulator_arguments(options, DEFAULT_HOME)
+    assert any(argument.startswith("--head-start") for argument in told) is starts_ahead

@@ -26,7 +26,7 @@ from tools.structure import (
 
 LONGEST_FILE = 400
 MOST_HOPS = 12
-ONE_DEFINITION = {"flightstack": 15, "sim_bridge": 4, "gcs_cli": 15}
+ONE_DEFINITION = {"flightstack": 14, "sim_bridge": 4, "gcs_cli": 15}
 SMALL_WITHOUT_REASON = {"flightstack": 0, "sim_bridge": 0, "gcs_cli": 0}
 """Files with one small definition whose docstring does not say why it is a module of its own."""
 LONG_FUNCTIONS = {"flightstack": 2, "sim_bridge": 0, "gcs_cli": 0}
