@@ -59,8 +59,8 @@ HeadStart = Annotated[
     float,
     typer.Option(
         metavar="SECONDS",
-        help="Simulated time that passes as fast as possible before that of --speed, "
-        "as while a vehicle estimates its first state; in lockstep.",
+        help="In lockstep, let so much simulated time pass as fast as possible, and the rest at --speed. "
+        "gcs gives 1.1 to a vehicle on its sensors, which then is ready.",
         **shared.IN_SIMULATION,
     ),
 ]
