@@ -1,4 +1,4 @@
-"""Copies between arrays and tuples. In compiled functions they are LLVM code: see ``kernels.intrinsics``."""
+"""Copies between arrays, tuples and bytes. In compiled functions they are LLVM code: see ``kernels.intrinsics``."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from flightstack.core.contract import FloatArray
+from flightstack.core.contract import ByteArray, FloatArray
 
 
 def as_tuple(array: Any, count: int) -> Any:
@@ -21,6 +21,11 @@ def store(out: np.ndarray[Any, np.dtype[np.float64]], values: Any) -> None:
     """
     for index in range(len(values)):
         out[index] = values[index]
+
+
+def put(out: ByteArray, at: int, number: np.generic) -> None:
+    """Write the bytes of a NumPy number from ``out[at]`` on, in the order of the machine."""
+    out[at : at + number.itemsize] = np.frombuffer(number.tobytes(), np.uint8)
 
 
 def local_zeros(*shape: int) -> FloatArray:

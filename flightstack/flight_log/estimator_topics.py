@@ -12,7 +12,7 @@ from flightstack.estimation.estimator_report import ControlFlags, RejectionFlags
 from flightstack.estimation.kalman import BARO, GNSS_POSITION, GNSS_VELOCITY, MAG, OBSERVATIONS, RANGE
 from flightstack.estimation.selector import SPEED_M_S, TURN_RAD, LaneReport
 from flightstack.estimation.sensed import Sensed
-from flightstack.flight_log.topics import Bit, Derived, Field, Group, Topic
+from flightstack.flight_log.topics import Bit, Field, Group, Opposite, Topic
 
 _DEVICE = 1
 """Device id of the sensors in use, as in the topics of the measurements."""
@@ -91,12 +91,6 @@ def _flag_fields(column: int, flags: Mapping[str, int | None]) -> list[Field]:
 _SAMPLE = Field("uint64_t", "timestamp_sample", 0, AT.horizon_us)
 
 
-def _negated(at: int, length: int) -> Derived:
-    """Return a function of the rows: the values from a column on, with the opposite sign."""
-    columns = slice(at, at + length) if length else at
-    return lambda rows: -rows[:, columns]
-
-
 def _innovation_topic(name: str, first: int, default: float, is_signed: bool = False) -> Topic:
     """Return a topic of PX4's ``estimator_innovations`` kind, of values by row of the filter's observations.
 
@@ -108,7 +102,7 @@ def _innovation_topic(name: str, first: int, default: float, is_signed: bool = F
         return Field("float", field, length, default=default)
 
     def opposite(field: str, length: int, row: int) -> Field:
-        return Field("float", field, length, _negated(first + row, length) if is_signed else first + row)
+        return Field("float", field, length, Opposite(first + row) if is_signed else first + row)
 
     return Topic(
         name,
@@ -244,23 +238,18 @@ class SelectorColumns(NamedTuple):
     changed_us: int = 0
     changes: int = 1
     selected: int = 2
-    available: int = 3
-    faults: int = 4  # gyro, accelerometer
-    ratios: int = 6
-    relative: int = 6 + _MOST_LANES
-    healthy: int = 6 + 2 * _MOST_LANES
-    turns: int = 6 + 3 * _MOST_LANES
-    speeds: int = 6 + 3 * _MOST_LANES + _MOST_SENSORS
-    size: int = 6 + 3 * _MOST_LANES + 2 * _MOST_SENSORS
+    device: int = 3  # id of the selected inertial sensor: its number from 1
+    available: int = 4
+    faults: int = 5  # gyro, accelerometer
+    ratios: int = 7
+    relative: int = 7 + _MOST_LANES
+    healthy: int = 7 + 2 * _MOST_LANES
+    turns: int = 7 + 3 * _MOST_LANES
+    speeds: int = 7 + 3 * _MOST_LANES + _MOST_SENSORS
+    size: int = 7 + 3 * _MOST_LANES + 2 * _MOST_SENSORS
 
 
 SELECT_AT = SelectorColumns()
-
-
-def _device(rows: FloatArray) -> FloatArray:
-    """Device id of the selected inertial sensor: its number from 1."""
-    numbers: FloatArray = rows[:, SELECT_AT.selected] + 1.0
-    return numbers
 
 
 SELECTOR_GROUP = Group(
@@ -272,9 +261,9 @@ SELECTOR_GROUP = Group(
             (
                 Field("uint64_t", "last_instance_change", 0, SELECT_AT.changed_us),
                 Field("uint32_t", "instance_changed_count", 0, SELECT_AT.changes),
-                Field("uint32_t", "accel_device_id", 0, _device),
+                Field("uint32_t", "accel_device_id", 0, SELECT_AT.device),
                 Field("uint32_t", "baro_device_id", default=_DEVICE),
-                Field("uint32_t", "gyro_device_id", 0, _device),
+                Field("uint32_t", "gyro_device_id", 0, SELECT_AT.device),
                 Field("uint32_t", "mag_device_id", default=_DEVICE),
                 Field("float", "combined_test_ratio", _MOST_LANES, SELECT_AT.ratios),
                 Field("float", "relative_test_ratio", _MOST_LANES, SELECT_AT.relative),
@@ -297,7 +286,8 @@ def fill_selector(row: FloatArray, report: LaneReport) -> None:
     selection, facts, count = report.selection, report.facts, len(report.facts)
     records = selection.lanes
     row[:] = 0.0
-    row[: SELECT_AT.faults] = _us(selection.changed_s), selection.changes, selection.selected, count
+    selected = selection.selected
+    row[: SELECT_AT.faults] = _us(selection.changed_s), selection.changes, selected, selected + 1, count
     row[SELECT_AT.faults] = any(record.turn_rad >= TURN_RAD for record in records)
     row[SELECT_AT.faults + 1] = any(record.speed_m_s >= SPEED_M_S for record in records)
     for at, values in (

@@ -17,7 +17,8 @@ import numpy as np
 from flightstack.core.contract import FloatArray, LoopRow
 from flightstack.core.geodesy import GeoPoint
 from flightstack.flight_log import ulog
-from flightstack.flight_log.row_block import RowBlock, TimeArray, content_size
+from flightstack.flight_log.row_block import RowBlock, content_size
+from flightstack.flight_log.row_kernel import TimeArray
 from flightstack.flight_log.topics import (
     EVENT_TOPICS,
     OUTER,
@@ -50,12 +51,11 @@ class LogFile(Protocol):
 class Trace:
     """Buffered rows: ``rows[:n]``, shape (capacity, columns), and ``times_us[:n]``."""
 
-    __slots__ = ("_each", "_flush", "capacity", "n", "rows", "times_us")
+    __slots__ = ("_flush", "capacity", "n", "rows", "times_us")
 
     def __init__(self, capacity: int, columns: int, flush: Callable[[], None]) -> None:
         self.capacity = capacity
         self.rows: FloatArray = np.zeros((capacity, columns))
-        self._each: list[FloatArray] = list(self.rows)  # reused views: creating one takes longer
         self.times_us: TimeArray = np.zeros(capacity, np.uint64)
         self.n = 0
         self._flush = flush
@@ -67,7 +67,8 @@ class Trace:
         index = self.n
         self.times_us[index] = time_us
         self.n = index + 1
-        return self._each[index]
+        row: FloatArray = self.rows[index]
+        return row
 
 
 class _EventTopic:
@@ -120,7 +121,7 @@ class FlightLog:
         self._closed = False
         first_outer_id = len(self._inner_topics)
         first_event_id = first_outer_id + len(OUTER_TOPICS)
-        self._inner_block = RowBlock(self._inner_topics, 0, capacity)
+        self._inner_block = RowBlock(self._inner_topics, 0)
         self._first_outer_id = first_outer_id
         self._outer_block: RowBlock | None = None
         known = {"vehicle_status": {"system_type": system_type(rotors)}}
@@ -147,11 +148,11 @@ class FlightLog:
         }  # fmt: skip
         capacity = self.outer.capacity
         self.outer = Trace(capacity, outer.columns, self.flush)
-        self._outer_block = RowBlock(outer.topics, self._first_outer_id, capacity, reference)
+        self._outer_block = RowBlock(outer.topics, self._first_outer_id, reference)
         topics = [*self._inner_topics, *outer.topics, *EVENT_TOPICS]
         for group in groups:
             trace = self.sampled[group.name] = Trace(capacity, group.columns, self.flush)
-            self._sampled_blocks.append((trace, RowBlock(group.topics, len(topics), capacity, reference)))
+            self._sampled_blocks.append((trace, RowBlock(group.topics, len(topics), reference)))
             topics += group.topics
         self._write(ulog.file_header(time_us), ulog.HEADER_SIZE)
         parts = []

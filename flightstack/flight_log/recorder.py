@@ -23,6 +23,7 @@ from flightstack.core.enums import NAVIGATION_STATE
 from flightstack.core.geodesy import GeoPoint
 from flightstack.core.periods import next_due
 from flightstack.flight_log.flight_log import FlightLog
+from flightstack.flight_log.row_block import RowBlock
 from flightstack.flight_log.topics import (
     ARMING_STATE_ARMED,
     ARMING_STATE_DISARMED,
@@ -30,7 +31,6 @@ from flightstack.flight_log.topics import (
     OUTER,
     OUTER_GROUP,
     Group,
-    outer_heading,
 )
 from flightstack.guidance.mission import MissionProgress
 
@@ -74,7 +74,7 @@ class FlightRecorder:
         """Return the row for the inner loop at a time [µs]; the scratch row without an open log."""
         sizes = (OUTER.size, STATE_SIZE, SETPOINT_SIZE, ATTITUDE_TARGET_SIZE)
         self._store_outer = direct(store_outer_row, *(np.zeros(size) for size in sizes), 0)
-        outer_heading(np.zeros((0, OUTER.size)))  # compile now and not at the first write
+        RowBlock((), 0)  # compile its kernel now and not at the first flight
         self._mission = (MissionProgress(0, -1, False, False), 0)
         self._missions = 0
         self._armed = False

@@ -2,123 +2,142 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import groupby
-from typing import Any, TypeAlias
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from struct import calcsize, pack_into
+from typing import NamedTuple
 
 import numpy as np
 
+from flightstack.core.compiled import direct
 from flightstack.core.contract import FloatArray
 from flightstack.flight_log import ulog
-from flightstack.flight_log.topics import Bit, Derived, Field, Topic
-from flightstack.mavlink.fields import STRUCT_CODES
+from flightstack.flight_log.row_kernel import (
+    DOUBLE,
+    FLAG,
+    HEADING,
+    OPPOSITE,
+    PART,
+    SINGLE,
+    TIME,
+    WHOLE,
+    Part,
+    TimeArray,
+    put_rows,
+)
+from flightstack.flight_log.topics import Bit, Field, Heading, Opposite, Topic
+from flightstack.mavlink.fields import RANGES, STRUCT_CODES
 
-TimeArray: TypeAlias = np.ndarray[Any, np.dtype[np.uint64]]
-_Records: TypeAlias = np.ndarray[Any, Any]
-
-_TIMESTAMP = "Q"
-
-
-def content_size(topic: Topic) -> int:
-    """Return the size [bytes] of a data message: subscription id, timestamp and fields."""
-    return 2 + 8 + sum(_field_dtype(field).itemsize for field in topic.fields)
-
-
-def _field_dtype(field: Field) -> np.dtype[Any]:
-    code = "<" + STRUCT_CODES[field.type]
-    return np.dtype((code, (field.length,))) if field.length else np.dtype(code)
-
-
-def _joined(fields: Iterable[Field]) -> Iterator[Field]:
-    """Yield the fields, as one array where flags or columns follow each other: writing one takes microseconds."""
-    for column, run in groupby(fields, lambda field: getattr(field.source, "column", None)):
-        if column is None:
-            yield from _joined_columns(run)
-        else:
-            flags = list(run)
-            yield flags[0]._replace(length=len(flags), source=_bits(column, flags))
+_TIME_SIZE = 8
+_FLOATS = {"f": SINGLE, "d": DOUBLE}
+_RUNS = (SINGLE, OPPOSITE, DOUBLE, WHOLE)
+"""Kinds that may have several numbers."""
+_LARGEST_WHOLE = 2.0**53
+"""Above it a float64 does not hold every whole number: 285 years in microseconds."""
 
 
-def _joined_columns(fields: Iterable[Field]) -> Iterator[Field]:
-    """Yield the fields, those of one type from successive columns as one array."""
-    last: Field | None = None
-    for field in fields:
-        if last is None:
-            last = field
-        elif isinstance(last.source, int) and (field.type, field.source) == (
-            last.type,
-            last.source + _width(last),
-        ):
-            last = last._replace(length=_width(last) + _width(field))
-        else:
-            yield last
-            last = field
-    if last is not None:
-        yield last
+def _size(field: Field) -> int:
+    """Return the size of a number [bytes]."""
+    return calcsize("<" + STRUCT_CODES[field.type])
 
 
 def _width(field: Field) -> int:
     return max(1, field.length)
 
 
-def _bits(column: int, flags: Iterable[Field]) -> Derived:
-    """Return a function of the rows: for each flag 1 where it is set in the column."""
-    masks = np.array([field.source.flag for field in flags if isinstance(field.source, Bit)])
-    return lambda rows: rows[:, column, np.newaxis].astype(np.int64) & masks != 0
+def content_size(topic: Topic) -> int:
+    """Return the size [bytes] of a data message: subscription id, timestamp and fields."""
+    return 2 + _TIME_SIZE + sum(_size(field) * _width(field) for field in topic.fields)
+
+
+def _part(field: Field, source: int | Bit | Opposite | Heading, offset: int) -> Part:
+    """Return how the kernel writes a field."""
+    code = STRUCT_CODES[field.type]
+    low, high = RANGES.get(code, (0, 0))
+    kinds = {int: _FLOATS.get(code, WHOLE), Opposite: OPPOSITE, Heading: HEADING, Bit: FLAG}
+    flag = source.flag if isinstance(source, Bit) else 0
+    largest = _LARGEST_WHOLE if flag else min(high, _LARGEST_WHOLE)
+    column = source if isinstance(source, int) else source.column
+    return Part(kinds[type(source)], column, _width(field), offset, _size(field), flag, low, largest)
+
+
+def _goes_on(last: Part, part: Part) -> bool:
+    """Return True if the numbers of a part follow those of the last one, in the row and in its bytes."""
+    end = {"source": last.source + last.number, "offset": last.offset + last.number * last.size}
+    return last.kind in _RUNS and part == last._replace(**end, number=part.number)
+
+
+def _joined(parts: Iterable[Part]) -> list[Part]:
+    """Return the parts, those that go on as one."""
+    joined: list[Part] = []
+    for part in parts:
+        if joined and _goes_on(joined[-1], part):
+            joined[-1] = joined[-1]._replace(number=joined[-1].number + part.number)
+        else:
+            joined.append(part)
+    return joined
+
+
+class _Layout(NamedTuple):
+    """A data message without its header."""
+
+    parts: tuple[Part, ...]
+    content: bytes
+    """Default values."""
+    constants: tuple[tuple[str, str, int], ...]
+    """Name, code and offset of the fields without a source."""
+
+
+@cache
+def _layout(topic: Topic) -> _Layout:
+    """Return the layout of a data message."""
+    parts, content, constants = [Part(TIME, 0, 1, 0, _TIME_SIZE)], bytearray(_TIME_SIZE), []
+    for field in topic.fields:
+        code, offset = "<" + STRUCT_CODES[field.type], len(content)
+        if field.source is None:
+            constants.append((field.name, code, offset))
+            content += np.full(_width(field), field.default, code).tobytes()
+        else:
+            parts.append(_part(field, field.source, offset))
+            content += bytes(_size(field) * _width(field))
+    return _Layout(tuple(_joined(parts)), bytes(content), tuple(constants))
+
+
+def _content(layout: _Layout, constants: Mapping[str, float]) -> bytes:
+    """Return the message with these values of constant numbers, by name."""
+    content = bytearray(layout.content)
+    for name, code, offset in layout.constants:
+        if name in constants:
+            pack_into(code, content, offset, constants[name])
+    return bytes(content)
 
 
 class RowBlock:
-    """Converts rows in a preallocated buffer of packed records; constants are written once."""
+    """Converts rows in a buffer that grows with the largest number of them; headers and constants stay in it."""
 
     def __init__(
-        self,
-        topics: Sequence[Topic],
-        first_message_id: int,
-        capacity: int,
-        constants: Mapping[str, float] | None = None,
+        self, topics: Sequence[Topic], first_message_id: int, constants: Mapping[str, float] | None = None
     ) -> None:
-        """Lay out ``capacity`` rows. ``constants`` are values of fields without a source, by name."""
-        joined = [(topic, list(_joined(topic.fields))) for topic in topics]
-        columns: list[tuple[str, Any]] = []
-        for topic, fields in joined:
-            columns.append((f"{topic.name}.header", "V5"))
-            columns.append((f"{topic.name}.timestamp", "<u8"))
-            columns.extend((f"{topic.name}.{field.name}", _field_dtype(field)) for field in fields)
-        records = np.zeros(capacity, np.dtype(columns))
-        self._stamps: list[_Records] = []
-        self._copies: list[tuple[_Records, slice | int]] = []
-        self._derived: list[tuple[_Records, Derived]] = []
-        for message_id, (topic, fields) in enumerate(joined, first_message_id):
-            header = ulog.DATA_HEADER.pack(content_size(topic), ulog.DATA_TYPE, message_id)
-            records[f"{topic.name}.header"] = np.void(header)
-            self._stamps.append(records[f"{topic.name}.timestamp"])
-            for field in fields:
-                self._bind(records[f"{topic.name}.{field.name}"], field, constants or {})
-        self.row_size = records.dtype.itemsize
-        self._bytes = records.view(np.uint8).data
-
-    def _bind(self, column: _Records, field: Field, constants: Mapping[str, float]) -> None:
-        if field.source is None:
-            column[:] = constants.get(field.name, field.default)
-        elif not isinstance(field.source, int):
-            assert not isinstance(field.source, Bit)  # they are joined
-            self._derived.append((column, field.source))
-        elif field.length:
-            self._copies.append((column, slice(field.source, field.source + field.length)))
-        else:
-            self._copies.append((column, field.source))
+        """``constants`` are values of fields without a source, by name."""
+        row, parts = bytearray(), list[Part]()
+        for message_id, topic in enumerate(topics, first_message_id):
+            layout = _layout(topic)
+            row += ulog.DATA_HEADER.pack(content_size(topic), ulog.DATA_TYPE, message_id)
+            parts += (part._replace(offset=len(row) + part.offset) for part in layout.parts)
+            row += _content(layout, constants or {})
+        self.row_size = len(row)
+        self._row, self._parts = np.frombuffer(row, np.uint8), np.array(parts, PART)
+        self._bytes = self._row.copy()
+        self._put = direct(put_rows, self._bytes, 0, self._parts, np.zeros(0, np.uint64), np.zeros((0, 1)))
 
     def encode(self, times_us: TimeArray, rows: FloatArray) -> memoryview:
-        """Return the messages of ``rows``, shape (n, columns), n ≤ capacity; valid until the next call.
+        """Return the messages of ``rows``, shape (n, columns); valid until the next call.
 
-        Out-of-range values become infinite (floats) or undefined (integers) and raise no error.
+        Out-of-range values become infinite (floats) or the next value in range (integers), and raise no error.
         """
-        count = len(rows)
-        with np.errstate(over="ignore", invalid="ignore"):
-            for column in self._stamps:
-                column[:count] = times_us
-            for column, source in self._copies:
-                column[:count] = rows[:, source]
-            for column, derive in self._derived:
-                column[:count] = derive(rows)
-        return self._bytes[: count * self.row_size]
+        size = len(rows) * self.row_size
+        if size > len(self._bytes):
+            self._bytes = np.tile(self._row, len(rows))
+        with np.errstate(over="ignore"):
+            self._put(self._bytes, self.row_size, self._parts, times_us, rows)
+        return self._bytes.data[:size]

@@ -12,7 +12,7 @@ from flightstack.core.contract import STATE_SIZE, FloatArray
 from flightstack.estimation.sensor_feed import fix_row
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, MagSample, RangeSample
 from flightstack.flight_log.sensor_rows import store_baro, store_gnss, store_mag
-from flightstack.flight_log.topics import Field, Group, Topic, outer_heading
+from flightstack.flight_log.topics import Field, Group, Heading, Topic
 from flightstack.mavlink.dialect import mavlink
 
 _DEVICE = 1
@@ -171,7 +171,7 @@ TRUTH_GROUP = Group(
                 Field("float", "vx", 0, 3),
                 Field("float", "vy", 0, 4),
                 Field("float", "vz", 0, 5),
-                Field("float", "heading", 0, outer_heading),
+                Field("float", "heading", 0, Heading(6)),
                 Field("float", "ref_alt"),
                 *(
                     Field("bool", name, default=1)

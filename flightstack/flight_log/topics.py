@@ -6,19 +6,12 @@ padding is needed. The columns of the inner loop's trace are ``LoopRow``.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import nan
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
-import numpy as np
-
-from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray, LoopRow, Quaternion
+from flightstack.core.contract import LoopRow
 from flightstack.core.enums import NAVIGATION_STATE, Mode
-from flightstack.core.geometry import heading
 from flightstack.params.vehicle import system_type
-
-Derived: TypeAlias = Callable[[FloatArray], FloatArray]
 
 
 class OuterColumns(NamedTuple):
@@ -43,16 +36,28 @@ class Bit(NamedTuple):
     flag: int
 
 
+class Opposite(NamedTuple):
+    """Numbers from a column on, with the opposite sign."""
+
+    column: int
+
+
+class Heading(NamedTuple):
+    """Yaw [rad] of the quaternion in four columns."""
+
+    column: int
+
+
 class Field(NamedTuple):
     """A field, an array if ``length`` is not 0.
 
-    ``source`` is the first column of the trace, a flag in a column, a function of the rows, or None for a constant.
+    ``source`` is the first column of the trace, something that is made of columns, or None for a constant.
     """
 
     type: str
     name: str
     length: int = 0
-    source: int | Bit | Derived | None = None
+    source: int | Bit | Opposite | Heading | None = None
     default: float = 0.0
 
 
@@ -69,26 +74,6 @@ class Group(NamedTuple):
     name: str
     columns: int
     topics: tuple[Topic, ...]
-
-
-@compiled
-def write_headings(rows: FloatArray, headings: FloatArray) -> None:
-    """Write the heading [rad] of each row, which begins with a state as that of the outer loop's trace."""
-    for i in range(len(rows)):
-        w, x, y, z = (
-            rows[i, ATTITUDE_AT],
-            rows[i, ATTITUDE_AT + 1],
-            rows[i, ATTITUDE_AT + 2],
-            rows[i, ATTITUDE_AT + 3],
-        )
-        headings[i] = heading(Quaternion(w, x, y, z))
-
-
-def outer_heading(rows: FloatArray) -> FloatArray:
-    """Return the heading [rad] of each row, shape (rows,): see ``write_headings``."""
-    headings = np.empty(len(rows))
-    write_headings(rows, headings)
-    return headings
 
 
 def inner_topics(rotors: int) -> tuple[Topic, ...]:
@@ -136,7 +121,7 @@ OUTER_TOPICS = (
             Field("float", "vx", 0, OUTER.state + 3),
             Field("float", "vy", 0, OUTER.state + 4),
             Field("float", "vz", 0, OUTER.state + 5),
-            Field("float", "heading", 0, outer_heading),
+            Field("float", "heading", 0, Heading(ATTITUDE_AT)),
             Field("float", "ref_alt"),
             Field("bool", "xy_valid", default=1),
             Field("bool", "z_valid", default=1),

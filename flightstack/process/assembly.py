@@ -50,7 +50,7 @@ from flightstack.vehicle.status import VehicleStatus, vehicle_info, vehicle_stat
 
 _KERNELS = (
     "inner_kernel", "outer_kernel", "rest_kernel", "levelling_kernel", "goal_kernel",
-    "follow_rotors", "detect", "fence_step", "store_outer_row", "write_headings", "read_motion", "pack_frames",
+    "follow_rotors", "detect", "fence_step", "store_outer_row", "put_rows", "read_motion", "pack_frames",
 )  # fmt: skip
 _LOOP_KERNELS = ("inner_kernel", "outer_kernel")
 _ESTIMATOR_KERNELS = ("imu_kernel", "push_kernel", "field_kernel", "update_health")

@@ -1,9 +1,10 @@
-"""Copies between arrays and tuples in compiled functions, and their use in kernels."""
+"""Copies between arrays, tuples and bytes in compiled functions, and their use in kernels."""
 
 from __future__ import annotations
 
 import ast
 import os
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,9 @@ import pytest
 from numba.core.errors import TypingError
 
 from flightstack.core import compiled as module
-from flightstack.core.array_items import as_tuple, store
+from flightstack.core.array_items import as_tuple, put, store
 from flightstack.core.compiled import compiled
+from flightstack.core.contract import ByteArray
 
 JIT = pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
 TEMPLATES = ("inner_kernel", "_advance", "_slope_at")
@@ -41,6 +43,37 @@ def test_store_converts_and_follows_strides() -> None:
     out = np.zeros(10)[::2]
     fill(out, np.array([4.0, 9.0, 5.0]))
     assert out.tolist() == [1.0, 2.5, 1.0, 4.0, 5.0]
+
+
+@compiled
+def put_numbers(out: ByteArray, value: float, number: int) -> None:
+    put(out, 1, np.float32(value))
+    put(out, 5, np.float64(value))
+    put(out, 13, np.uint16(number))
+    put(out, 15, np.int64(number))
+
+
+def test_put_writes_the_bytes_of_a_number_at_any_place() -> None:
+    out = np.full(24, 0xEE, np.uint8)
+    put_numbers(out, -1.25e-3, 513)
+    assert out.tobytes() == b"\xee" + struct.pack("=fdHq", -1.25e-3, -1.25e-3, 513, 513) + b"\xee"
+
+
+READ_ONLY_BYTES = np.zeros(9, np.uint8)
+READ_ONLY_BYTES.flags.writeable = False
+
+
+@JIT
+@pytest.mark.parametrize(
+    "out", [np.zeros(9), np.zeros((3, 9), np.uint8), READ_ONLY_BYTES], ids=["floats", "matrix", "read-only"]
+)
+def test_put_is_refused_for(out: Any) -> None:
+    @compiled
+    def write(out: Any) -> None:
+        put(out, 0, np.float64(1.0))
+
+    with pytest.raises(TypingError, match="put"):
+        write(out)
 
 
 READ_ONLY = np.zeros(3)

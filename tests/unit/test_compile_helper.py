@@ -48,7 +48,7 @@ os.write(1, str(compile_helper.helper.pid).encode())
 os._exit(0)
 """
 
-LAST_KERNEL = "topics.write_headings"
+LAST_KERNEL = "row_kernel.put_rows"
 """The last one of the task COMMANDER."""
 
 

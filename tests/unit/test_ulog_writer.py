@@ -213,7 +213,7 @@ def test_a_loop_may_write_its_rows_in_place() -> None:
 
 
 def test_values_that_do_not_fit_neither_raise_nor_warn() -> None:
-    block = RowBlock(inner_topics(4), 0, 4)
+    block = RowBlock(inner_topics(4), 0)
     rows = np.array([[math.nan], [1e300], [-1e300], [math.inf]]) * np.ones((4, LoopRow.SIZE))
     assert len(block.encode(np.arange(4, dtype=np.uint64), rows)) == 4 * block.row_size
 

@@ -1,4 +1,4 @@
-"""Functions that Numba compiles in a way of their own: portable math, and copies between arrays and tuples.
+"""Functions that Numba compiles in a way of their own: portable math, and copies between arrays, tuples and bytes.
 
 Compiled from Python, each pair of types of a copy would be a function of its own for Numba, 5 % of the compilation in
 all. Kernels that are read from the cache do without this module.
@@ -22,7 +22,7 @@ from numba.np import linalg
 from numba.np.arrayobj import load_item, make_array, populate_array, store_item
 
 from flightstack.core import portable_math
-from flightstack.core.array_items import as_tuple, local_zeros, store
+from flightstack.core.array_items import as_tuple, local_zeros, put, store
 
 
 @cache
@@ -111,6 +111,25 @@ def _lower_store_array(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         )
         item = context.cast(builder, item, values_type.dtype, out_type.dtype)
         store_item(context, builder, out_type, item, _pointer(context, builder, out_type, out, loop.index))
+    return context.get_dummy_value()
+
+
+@type_callable(put)
+def _type_put(_: Any) -> Any:
+    def result(out: Any, at: Any, number: Any) -> Any:
+        takes = _is_vector(out) and out.mutable and out.dtype == numba.types.uint8
+        is_number = isinstance(number, (numba.types.Integer, numba.types.Float))
+        return numba.types.none if takes and is_number and isinstance(at, numba.types.Integer) else None
+
+    return result
+
+
+@lower_builtin(put, numba.types.Array, numba.types.Integer, numba.types.Number)
+def _lower_put(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    out_type, out = sig.args[0], make_array(sig.args[0])(context, builder, args[0])
+    at = context.cast(builder, args[1], sig.args[1], numba.types.intp)
+    place = builder.bitcast(_pointer(context, builder, out_type, out, at), args[2].type.as_pointer())
+    builder.store(args[2], place, align=1)
     return context.get_dummy_value()
 
 
