@@ -21,8 +21,8 @@ from flightstack.params.vehicle import load_vehicle
 from flightstack.process.command_line import own_program
 from flightstack.testing.instances import ServerError, free_instance
 from flightstack.testing.setup import Setup
-from gcs_cli.fly.fly_flags import TO_SIMULATOR, TO_STACK, FlyOptions, passed
-from gcs_cli.fly.fly_options import outer_rate_hz
+from gcs_cli.fly.fly_flags import TO_STACK, FlyOptions, passed
+from gcs_cli.fly.fly_options import home_text, outer_rate_hz, simulator_arguments
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.endpoint import LOOPBACK, parse_endpoint, vehicle_connection
@@ -76,7 +76,7 @@ class Server:
             self.instance = free_instance(taken)
             taken.add(self.instance)
             try:
-                self.guard = self._start(speed)
+                self.guard = self._start(speed, timeout_s)
                 self._await_ports(end_s)
                 self._await_health(end_s)
             except _BusyError:  # another program took a port since: try the next instance
@@ -142,14 +142,14 @@ class Server:
     ) -> None:
         self.stop()
 
-    def _start(self, speed: float) -> subprocess.Popen[bytes]:
-        options = replace(fly_options(self.setup, self.instance, speed), faults=self._faults)
+    def _start(self, speed: float, timeout_s: float) -> subprocess.Popen[bytes]:
+        options = fly_options(self.setup, self.instance, speed)
+        options = replace(options, faults=self._faults, timeout_s=timeout_s)
         home = self.setup.home
-        at = f"--home={home.latitude_deg!r},{home.longitude_deg!r},{home.altitude_m!r}"
-        simulator = [*passed(options, TO_SIMULATOR), at]
+        simulator = simulator_arguments(options, home)
         stack = [
-            *passed(options, TO_STACK), at, f"--outer-hz={outer_rate_hz(options)!r}", f"--log={self.log}",
-            "--params=none", "--state-dir=none", "--overwrite",
+            *passed(options, TO_STACK), f"--home={home_text(home)}", f"--outer-hz={outer_rate_hz(options)!r}",
+            f"--log={self.log}", "--params=none", "--state-dir=none", "--overwrite",
         ]  # fmt: skip
         command = own_program(
             "flightstack.testing.server_guard", str(self.folder), json.dumps(simulator), json.dumps(stack)
