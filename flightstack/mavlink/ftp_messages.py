@@ -19,7 +19,6 @@ MAX_SEQUENCE = 0xFFFF
 MAX_OFFSET = 0xFFFF_FFFF
 _HEADER = struct.Struct("<HBBBBBxI")
 _PAYLOAD = 251
-_TARGETS = struct.Struct("<BBB")
 _CRC_START = 0xFFFF_FFFF
 UINT32 = struct.Struct("<I")
 
@@ -133,20 +132,9 @@ def read_packet(message: Message) -> Packet:
     return Packet(sequence, session, opcode, size, request, bool(burst_complete), offset, data)
 
 
-class FtpMessage(mavlink.MAVLink_file_transfer_protocol_message):  # type: ignore[misc]
-    """FILE_TRANSFER_PROTOCOL with a bytes payload: pymavlink packs 251 integers one by one."""
-
-    def pack(self, mav: object, force_mavlink1: bool = False) -> bytes:
-        """Return the frame; MAVLink 2 drops trailing zeros of the payload, MAVLink 1 does not."""
-        content = _TARGETS.pack(self.target_network, self.target_system, self.target_component)
-        content += bytes(self.payload)
-        frame: bytes = self._pack(mav, self.crc_extra, content, force_mavlink1=force_mavlink1)
-        return frame
-
-
 def ftp_message(target: Address, packet: Packet) -> Message:
     """Return the message with ``packet`` for ``target``."""
-    return FtpMessage(0, *target, packet.pack().ljust(_PAYLOAD, b"\x00"))
+    return mavlink.MAVLink_file_transfer_protocol_message(0, *target, packet.pack().ljust(_PAYLOAD, b"\x00"))
 
 
 def mavlink_crc32(data: bytes, crc: int = 0) -> int:

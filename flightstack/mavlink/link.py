@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from flightstack.mavlink.decoding import received
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.fields import PACKING_ERRORS, fit
 from flightstack.mavlink.frames import (
     CHECKSUM_SIZE,
     HEADER_V2,
@@ -19,6 +18,7 @@ from flightstack.mavlink.frames import (
     pack_frame,
 )
 from flightstack.mavlink.packed import PackedMessage
+from flightstack.mavlink.payloads import payload_of
 from flightstack.mavlink.signing import LinkSigning
 
 if TYPE_CHECKING:
@@ -46,8 +46,8 @@ class Link:
         With ``signing``, sent messages are signed, and received ones without a required signature count as bad.
         """
         self._signing = signing
-        self._codec = mavlink.MAVLink(None, system_id, component_id)
-        self._codec.robust_parsing = True
+        self._system_id, self._component_id = system_id, component_id
+        self._sequence = 0
         self._reader = FrameReader()
         self._keeps_unknown = keeps_unknown
         self.received = 0
@@ -62,29 +62,21 @@ class Link:
         Out-of-range values are fitted in ``message`` (``fields.fit``).
         """
         if message.__class__ is PackedMessage:
-            packing = message.packing
-            return self._frame(packing.message_id, message.payload, packing.crc_extra)
-        try:
-            frame: bytes = message.pack(self._codec)
-        except PACKING_ERRORS:
-            fit(message)
-            frame = message.pack(self._codec)
-        self._codec.seq = (self._codec.seq + 1) % 256
+            kind, payload = message.packing, message.payload
+            message_id, crc_extra = kind.message_id, kind.crc_extra
+        else:
+            kind, payload = message.__class__, payload_of(message)
+            message_id, crc_extra = kind.id, kind.crc_extra  # the message may have a field ``id``
+        source = self._sequence, self._system_id, self._component_id
+        frame = pack_frame(message_id, payload, crc_extra, *source)
+        self._sequence = (self._sequence + 1) % 256
         self.sent += 1
-        return self._outgoing(bytes(frame), message.crc_extra)
-
-    def _frame(self, message_id: int, payload: bytes, crc_extra: int) -> bytes:
-        codec = self._codec
-        frame = pack_frame(message_id, payload, crc_extra, codec.seq, codec.srcSystem, codec.srcComponent)
-        codec.seq = (codec.seq + 1) % 256
-        self.sent += 1
-        return self._outgoing(frame, crc_extra)
+        return frame if self._signing is None else self._signing.outgoing(frame, crc_extra)
 
     def encode_numbered(self, packer: FramePacker, numbers: Sequence[int]) -> list[bytes]:
         """Return the frames of messages of ``packer``, by their numbers, with this link's next sequence numbers."""
-        codec = self._codec
-        frames = packer.frames(numbers, codec.seq, codec.srcSystem, codec.srcComponent)
-        codec.seq = (codec.seq + len(frames)) % 256
+        frames = packer.frames(numbers, self._sequence, self._system_id, self._component_id)
+        self._sequence = (self._sequence + len(frames)) % 256
         self.sent += len(frames)
         if self._signing is None:
             return frames
@@ -92,24 +84,6 @@ class Link:
             self._signing.outgoing(frame, packer.crc_extra(number))
             for frame, number in zip(frames, numbers, strict=True)
         ]
-
-    def _outgoing(self, frame: bytes, crc_extra: int) -> bytes:
-        return frame if self._signing is None else self._signing.outgoing(frame, crc_extra)
-
-    def encode_shared(self, message: Message) -> bytes:
-        """Return the frame of an unchanged message that is sent on several links.
-
-        The first link packs the payload; the others add header and checksum only.
-        """
-        if message.__class__ is PackedMessage:
-            return self.encode(message)
-        payload: bytes | None = message.get_payload()
-        packed = (
-            payload is not None and len(payload) == message.get_header().mlen
-        )  # false for a received message
-        if payload is None or not packed:
-            return self.encode(message)
-        return self._frame(message.get_msgId(), payload, message.crc_extra)  # ``id`` may be a field
 
     def is_authentic(self, message: Message) -> bool:
         """Return True if a decoded message carried the signature that this link requires, if any."""

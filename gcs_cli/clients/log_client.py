@@ -16,7 +16,7 @@ from typing import NamedTuple
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.files import MAX_SIZE, PartialFile
 from flightstack.mavlink.link import Address, Message, is_from
-from flightstack.mavlink.log_messages import BLOCK
+from flightstack.mavlink.log_messages import BLOCK, log_data
 
 RETRY_S = 0.4
 """Time without messages after which missing data is requested again."""
@@ -216,7 +216,7 @@ class LogClient:
     # -- download
 
     def _on_data(self, file: PartialFile, message: Message, now_s: float) -> None:
-        data = bytes(message.data[: min(message.count, BLOCK)])
+        data = log_data(message)
         if not data and message.ofs < file.size:
             self._end(LogFailed("the vehicle cannot read the log, or it became shorter"))
             return

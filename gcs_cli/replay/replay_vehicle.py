@@ -12,8 +12,8 @@ from collections.abc import Callable, Sequence
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.fields import whole
-from flightstack.mavlink.ftp_messages import FtpError, FtpMessage, Opcode, Packet, next_sequence, read_packet
-from flightstack.mavlink.link import Link, Message, is_for
+from flightstack.mavlink.ftp_messages import FtpError, Opcode, Packet, ftp_message, next_sequence, read_packet
+from flightstack.mavlink.link import Link, Message, is_for, sender
 from flightstack.transports.vehicle_ports import Place
 from gcs_cli.replay.logged_plans import item_message
 from gcs_cli.replay.playback import Playback
@@ -183,8 +183,8 @@ class ReplayVehicle:
         result, asks = mavlink.MAV_RESULT_DENIED, message.command == mavlink.MAV_CMD_REQUEST_MESSAGE
         if asks and self._send_requested(whole(message.param1, 0, _MAX_ID), peer):
             result = mavlink.MAV_RESULT_ACCEPTED
-        sender = message.get_srcSystem(), message.get_srcComponent()
-        self._say(peer, mavlink.MAVLink_command_ack_message(message.command, result, 255, 0, *sender))
+        origin = message.get_srcSystem(), message.get_srcComponent()
+        self._say(peer, mavlink.MAVLink_command_ack_message(message.command, result, 255, 0, *origin))
         if message.command not in _QUIET:
             self._refuse(peer)
 
@@ -248,7 +248,7 @@ class ReplayVehicle:
         request = read_packet(message)
         error = bytes([FtpError.FILE_NOT_FOUND])
         answer = Packet(next_sequence(request.sequence), 0, Opcode.NAK, 1, request.opcode, data=error)
-        self._say(peer, FtpMessage(0, message.get_srcSystem(), message.get_srcComponent(), answer.pack()))
+        self._say(peer, ftp_message(sender(message), answer))
 
     def _on_timesync(self, message: Message, peer: Place) -> None:
         if message.tc1 == 0:

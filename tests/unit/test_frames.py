@@ -115,28 +115,3 @@ def test_a_known_message_has_its_frame_as_received() -> None:
         (message,) = Link(1, 1).decode(data)
         assert not is_unknown(message)
         assert bytes(message.get_msgbuf()) == frame
-
-
-MESSAGES = [
-    HEARTBEAT,
-    mavlink.MAVLink_attitude_message(1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    mavlink.MAVLink_system_time_message(0, 0),
-    mavlink.MAVLink_statustext_message(6, b"x" * 50, 0, 0),
-    mavlink.MAVLink_open_drone_id_basic_id_message(1, 1, bytes(20), 1, 1, bytes(20)),
-]
-
-
-@pytest.mark.parametrize("message", MESSAGES, ids=lambda message: message.get_type())
-def test_a_shared_message_has_the_same_bytes_on_each_link(message) -> None:
-    shared, packed = [Link(9, 1) for _ in range(3)], [Link(9, 1) for _ in range(3)]
-    for link, oracle in zip(shared, packed, strict=True):
-        link.encode(HEARTBEAT)
-        oracle.encode(HEARTBEAT)
-        for _ in range(300):  # past the wrap of the sequence number
-            assert link.encode_shared(message) == oracle.encode(message)
-        assert link.sent == oracle.sent
-
-
-def test_a_received_message_can_be_sent_on_as_shared() -> None:
-    (received,) = Link(1, 1).decode(frames(1)[0])
-    assert Link(3, 4).encode_shared(received) == Link(3, 4).encode(received)

@@ -91,11 +91,11 @@ def test_pymavlink_accepts_signed_frames() -> None:
     assert receiver.signing.timestamp == own.timestamp
 
 
-def test_pymavlink_takes_shared_payloads_that_we_sign() -> None:
+def test_pymavlink_takes_one_message_signed_on_two_links() -> None:
     message, receiver = text("to all"), peer()
     first, second = link(signing()), link(signing())
-    first.encode_shared(message)
-    (received,) = receiver.parse_buffer(second.encode_shared(message))
+    first.encode(message)
+    (received,) = receiver.parse_buffer(second.encode(message))
     assert (received.text, received.get_signed()) == ("to all", True)
 
 

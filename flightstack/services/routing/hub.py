@@ -294,7 +294,7 @@ class GroundHub:
             peer.outbox.clear()
         else:
             peer.outbox[:] = _kept_texts(peer)
-        frames = [peer.link.encode_shared(message) for message in due]
+        frames = [peer.link.encode(message) for message in due]
         if is_served and streams:
             frames += telemetry.frames(peer.streams.due(telemetry.time_us * 1e-6, now_s), peer.link)
         return frames

@@ -130,7 +130,7 @@ class Telemetry:
             if is_motion:
                 frames += link.encode_numbered(self._read(), self._numbers(run))
             else:
-                frames += [link.encode_shared(made) for number in run for made in self.messages(number)]
+                frames += [link.encode(made) for number in run for made in self.messages(number)]
         return frames
 
     def _read(self) -> FramePacker:
