@@ -130,7 +130,7 @@ def _system(view: VehicleView, message: Any, _now_s: float) -> Changes:
     return changes
 
 
-def _fence(message: Any) -> Changes:
+def _fence(_view: VehicleView, message: Any) -> Changes:
     return {"fence_breached": bool(message.breach_status)}
 
 
@@ -141,13 +141,13 @@ def _battery(view: VehicleView, message: Any, _now_s: float) -> Changes:
     return {"battery": view.battery._replace(time_remaining_s=message.time_remaining or None)}
 
 
-def _gnss(message: Any) -> Changes:
+def _gnss(_view: VehicleView, message: Any) -> Changes:
     satellites = None if message.satellites_visible == 255 else message.satellites_visible
     hdop = None if message.eph == 65535 else message.eph / 100
     return {"gnss": Gnss(message.fix_type, satellites, hdop, message.h_acc / 1e3 or None)}
 
 
-def _estimator_status(message: Any) -> Changes:
+def _estimator_status(_view: VehicleView, message: Any) -> Changes:
     ratios = (message.vel_ratio, message.pos_horiz_ratio, message.pos_vert_ratio, message.mag_ratio)
     horizontal_m, vertical_m = (
         accuracy if accuracy > 0.0 else None  # the true state has none
@@ -157,7 +157,7 @@ def _estimator_status(message: Any) -> Changes:
     return {"estimator": health}
 
 
-def _ekf_status(message: Any) -> Changes:
+def _ekf_status(_view: VehicleView, message: Any) -> Changes:
     variances = (
         message.velocity_variance,
         message.pos_horiz_variance,
@@ -178,7 +178,7 @@ def _estimator(flags: int, ratios: Iterable[float]) -> Estimator:
     )
 
 
-def _wind(message: Any) -> Changes:
+def _wind(_view: VehicleView, message: Any) -> Changes:
     """ArduPilot's WIND: the direction that the wind comes from, and the speed."""
     if not math.isfinite(message.direction):
         return {"wind_ned_m_s": None}
@@ -187,12 +187,12 @@ def _wind(message: Any) -> Changes:
     return {"wind_ned_m_s": _vector(north, east, message.speed_z)}
 
 
-def _wind_cov(message: Any) -> Changes:
+def _wind_cov(_view: VehicleView, message: Any) -> Changes:
     vertical_m_s = message.wind_z if math.isfinite(message.wind_z) else 0.0  # NaN: unknown
     return {"wind_ned_m_s": _vector(message.wind_x, message.wind_y, vertical_m_s)}
 
 
-def _attitude(message: Any) -> Changes:
+def _attitude(_view: VehicleView, message: Any) -> Changes:
     angles = _vector(message.roll, message.pitch, message.yaw)
     return {
         "attitude": None if angles is None else Euler(*angles),
@@ -200,38 +200,33 @@ def _attitude(message: Any) -> Changes:
     }
 
 
-def _attitude_target(message: Any) -> Changes:
+def _attitude_target(_view: VehicleView, message: Any) -> Changes:
     ignored = message.type_mask & _IGNORE_ATTITUDE
     return {"attitude_target": None if ignored else _euler(message.q)}
 
 
-_read_local_position = field_reader("LOCAL_POSITION_NED", "time_boot_ms", "x", "y", "z", "vx", "vy", "vz")
+_read_local_position = field_reader("LOCAL_POSITION_NED", "x", "y", "z", "vx", "vy", "vz")
 
 
-def _local_position(message: Any) -> Changes:
-    time_ms, x, y, z, vx, vy, vz = _read_local_position(message)
-    return {
-        "position_ned_m": _vector(x, y, z),
-        "velocity_ned_m_s": _vector(vx, vy, vz),
-        "time_s": time_ms / 1e3,
-    }
+def _local_position(_view: VehicleView, message: Any) -> Changes:
+    x, y, z, vx, vy, vz = _read_local_position(message)
+    return {"position_ned_m": _vector(x, y, z), "velocity_ned_m_s": _vector(vx, vy, vz)}
 
 
 _read_global_position = field_reader(
-    "GLOBAL_POSITION_INT", "time_boot_ms", "lat", "lon", "alt", "relative_alt", "vx", "vy", "vz"
+    "GLOBAL_POSITION_INT", "lat", "lon", "alt", "relative_alt", "vx", "vy", "vz"
 )
 
 
-def _global_position(view: VehicleView, message: Any, _now_s: float) -> Changes:
+def _global_position(view: VehicleView, message: Any) -> Changes:
     """Take the position, and the velocity without LOCAL_POSITION_NED; ArduPilot sends zeros until it has them."""
-    time_ms, lat, lon, alt, relative_alt, vx, vy, vz = _read_global_position(message)
+    lat, lon, alt, relative_alt, vx, vy, vz = _read_global_position(message)
     is_known = bool(lat or lon or alt)
     changes: Changes = {
-        "geo": GeoPosition(lat / 1e7, lon / 1e7, alt / 1e3, relative_alt / 1e3) if is_known else None,
-        "time_s": time_ms / 1e3,
+        "geo": GeoPosition(lat / 1e7, lon / 1e7, alt / 1e3, relative_alt / 1e3) if is_known else None
     }
-    if is_known and view.position_ned_m is None:
-        changes["velocity_ned_m_s"] = Vector(vx / 1e2, vy / 1e2, vz / 1e2)
+    if view.position_ned_m is None:
+        changes["velocity_ned_m_s"] = Vector(vx / 1e2, vy / 1e2, vz / 1e2) if is_known else None
     return changes
 
 
@@ -241,16 +236,16 @@ def _home(view: VehicleView, message: Any, _now_s: float) -> Changes:
 
 
 _read_position_target = field_reader(
-    "POSITION_TARGET_LOCAL_NED", "time_boot_ms", "type_mask", "x", "y", "z", "vx", "vy", "vz", "yaw"
+    "POSITION_TARGET_LOCAL_NED", "type_mask", "x", "y", "z", "vx", "vy", "vz", "yaw"
 )
 
 
-def _position_target(message: Any) -> Changes:
-    time_ms, mask, x, y, z, vx, vy, vz, yaw_rad = _read_position_target(message)
+def _position_target(_view: VehicleView, message: Any) -> Changes:
+    mask, x, y, z, vx, vy, vz, yaw_rad = _read_position_target(message)
     position = None if mask & _IGNORE_POSITION else _vector(x, y, z)
     velocity = None if mask & _IGNORE_VELOCITY else _vector(vx, vy, vz)
     yaw = None if mask & _IGNORE_YAW else _number(yaw_rad)
-    return {"setpoint": Setpoint(position, velocity, yaw), "time_s": time_ms / 1e3}
+    return {"setpoint": Setpoint(position, velocity, yaw)}
 
 
 def _global_target(view: VehicleView, message: Any, _now_s: float) -> Changes:
@@ -266,14 +261,14 @@ def _global_target(view: VehicleView, message: Any, _now_s: float) -> Changes:
     frame = LocalFrame(GeoPoint(geo.latitude_deg, geo.longitude_deg, height_m))
     ahead = frame.to_ned(GeoPoint(message.lat_int / 1e7, message.lon_int / 1e7, message.alt))
     place = _vector(now.x + ahead.x, now.y + ahead.y, now.z + ahead.z)
-    return {"setpoint": Setpoint(place, is_global=True), "time_s": message.time_boot_ms / 1e3}
+    return {"setpoint": Setpoint(place, is_global=True)}
 
 
-def _hud(message: Any) -> Changes:
+def _hud(_view: VehicleView, message: Any) -> Changes:
     return {"heading_deg": float(message.heading % 360), "throttle": message.throttle / 100}
 
 
-def _extended_state(message: Any) -> Changes:
+def _extended_state(_view: VehicleView, message: Any) -> Changes:
     return {"landed_state": message.landed_state}
 
 
@@ -303,7 +298,7 @@ def _esc_telemetry(view: VehicleView, message: Any, _now_s: float) -> Changes:
     return _with_rotors(view, first, message.rpm)
 
 
-def _loop_timing(message: Any) -> Changes:
+def _loop_timing(_view: VehicleView, message: Any) -> Changes:
     names = LoopTiming._fields[4:-1]
     measured = (_number(getattr(message, name)) for name in names)
     lockstep = message.clock == 0
@@ -312,45 +307,46 @@ def _loop_timing(message: Any) -> Changes:
     return {"timing": timing}
 
 
-def _version(message: Any) -> Changes:
+def _version(_view: VehicleView, message: Any) -> Changes:
     return {"is_own": list(message.flight_custom_version) == NAME_IN_VERSION}
-
-
-def _system_time(message: Any) -> Changes:
-    return {"time_s": message.time_boot_ms / 1e3}
 
 
 def _mission(fold: Callable[[VehicleView, Any], Mission]) -> Callable[[VehicleView, Any, float], Changes]:
     return lambda view, message, _now_s: {"mission": fold(view, message)}
 
 
-LATEST: dict[str, Callable[[Any], Changes]] = {
+MEASUREMENTS: dict[str, Callable[[VehicleView, Any], Changes]] = {
     "ATTITUDE": _attitude,
     "ATTITUDE_TARGET": _attitude_target,
-    "FENCE_STATUS": _fence,
-    "GPS_RAW_INT": _gnss,
-    "VFR_HUD": _hud,
-}
-"""Messages whose values no other message changes and no fold reads: only the newest one counts."""
-
-TIMES: dict[str, Callable[[Any], int]] = {
-    name: field_reader(name, "time_boot_ms") for name in ("ATTITUDE", "ATTITUDE_TARGET")
-}
-"""The vehicle's clock in messages of ``LATEST`` [ms], of which each one counts."""
-
-MEASUREMENTS: dict[str, Callable[[Any], Changes]] = {
     "AUTOPILOT_VERSION": _version,
     "EKF_STATUS_REPORT": _ekf_status,
     "ESTIMATOR_STATUS": _estimator_status,
     "EXTENDED_SYS_STATE": _extended_state,
+    "FENCE_STATUS": _fence,
     "FS_LOOP_TIMING": _loop_timing,
+    "GLOBAL_POSITION_INT": _global_position,
+    "GPS_RAW_INT": _gnss,
     "LOCAL_POSITION_NED": _local_position,
     "POSITION_TARGET_LOCAL_NED": _position_target,
-    "SYSTEM_TIME": _system_time,
+    "VFR_HUD": _hud,
     "WIND": _wind,
     "WIND_COV": _wind_cov,
 }
-"""Other messages whose effect does not depend on the view before."""
+"""Messages that leave nothing of an earlier one of their type: only the newest one counts."""
+
+TIMES: dict[str, Callable[[Any], int]] = {
+    name: field_reader(name, "time_boot_ms")
+    for name in (
+        "ATTITUDE",
+        "ATTITUDE_TARGET",
+        "GLOBAL_POSITION_INT",
+        "LOCAL_POSITION_NED",
+        "POSITION_TARGET_GLOBAL_INT",
+        "POSITION_TARGET_LOCAL_NED",
+        "SYSTEM_TIME",
+    )
+}
+"""The vehicle's clock in messages [ms], of which each one counts."""
 
 FOLDS: dict[str, Callable[[VehicleView, Any, float], Changes]] = {
     "AVAILABLE_MODES": _available_mode,
@@ -358,7 +354,6 @@ FOLDS: dict[str, Callable[[VehicleView, Any, float], Changes]] = {
     "ESC_STATUS": _rotors,
     "ESC_TELEMETRY_1_TO_4": _esc_telemetry,
     "ESC_TELEMETRY_5_TO_8": _esc_telemetry,
-    "GLOBAL_POSITION_INT": _global_position,
     "HEARTBEAT": _heartbeat,
     "HOME_POSITION": _home,
     "MISSION_COUNT": _mission(mission_fold.after_count),

@@ -6,7 +6,7 @@ from typing import Any
 
 from gcs_cli.vehicle.link_counts import LinkCounter, LinkCounts
 from gcs_cli.vehicle.status_texts import without_stale_piece
-from gcs_cli.vehicle.vehicle_view import FOLDS, LATEST, MEASUREMENTS, TIMES
+from gcs_cli.vehicle.vehicle_view import FOLDS, MEASUREMENTS, TIMES
 from gcs_cli.vehicle.view_types import Changes, Identity, VehicleView, view_with
 
 _NO_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID: a ground station, a camera …
@@ -18,7 +18,8 @@ class ViewBuilder:
     """Folds messages; ``view`` is the state after the last one.
 
     A view has some 40 values. A measurement changes a few of them 50 times a second, and a view is read 10 times a
-    second: measurements are collected, and the other messages folded at once. Only one thread may use a builder.
+    second: the newest measurement of each type is kept until then, or until another message is folded. Only one thread
+    may use a builder.
     """
 
     def __init__(self, view: VehicleView) -> None:
@@ -28,19 +29,16 @@ class ViewBuilder:
         self.time_s = view.time_s
         """The vehicle's clock; None if unknown."""
         self._view = view
-        """The view before the measurements in ``_changes`` and ``_latest``."""
-        self._changes: Changes = {}
-        self._latest: dict[str, Any] = {}
+        """The view before the measurements in ``_newest``."""
+        self._newest: dict[str, Any] = {}
+        """The newest message of each type of measurements, in the order of their arrival."""
         self._counter = LinkCounter(view.link)
 
     @property
     def view(self) -> VehicleView:
         """The state of the vehicle."""
         if self.link is not self._view.link:
-            self._changes["link"] = self.link
-        for name, message in self._latest.items():
-            self._changes.update(LATEST[name](message))
-        self._latest = {}
+            self._change({"link": self.link})
         return self._folded()
 
     @property
@@ -67,18 +65,15 @@ class ViewBuilder:
             return False
         self._counter.count(message.get_seq(), now_s)
         if self._view.partial_text is not None:
-            self._changes.update(without_stale_piece(self._folded(), now_s))
-            self._folded()
+            self._change(without_stale_piece(self._folded(), now_s))
         name = message.get_type()
-        if name in LATEST:
-            self._latest[name] = message
-            if name in TIMES:
-                self._advance(TIMES[name](message) / 1e3)
-        elif name in MEASUREMENTS:
-            self._collect(MEASUREMENTS[name](message))
+        if name in TIMES:
+            self._advance(TIMES[name](message) / 1e3)
+        if name in MEASUREMENTS:
+            self._newest.pop(name, None)
+            self._newest[name] = message
         elif name in FOLDS:
-            self._collect(FOLDS[name](self._folded(), message, now_s))
-            self._folded()
+            self._change(FOLDS[name](self._folded(), message, now_s))
         return True
 
     def _identify(self, message: Any) -> Identity | None:
@@ -90,25 +85,24 @@ class ViewBuilder:
         self._view = self._view._replace(identity=self.identity)
         return self.identity
 
-    def _collect(self, changes: Changes) -> None:
-        time_s = changes.get("time_s")
-        if time_s is not None:
-            self._advance(time_s)
-        self._changes.update(changes)
-
     def _advance(self, time_s: float) -> None:
         """Take the vehicle's clock from a message."""
         before_s, self.time_s = self.time_s, time_s
         if before_s is not None and time_s <= before_s - _RESTART_S:
-            self._changes["restarts"] = self._folded().restarts + 1
-            self._changes["timing"] = None  # of the loops before
+            restarts = self._folded().restarts + 1
+            self._change({"restarts": restarts, "timing": None})  # the timing is of the loops before
+
+    def _change(self, changes: Changes) -> None:
+        if changes:
+            self._view = view_with(self._view, changes)
 
     def _folded(self) -> VehicleView:
-        """Return the view with all measurements but those that no fold reads; its ``link`` may be older."""
+        """Return the view with all measurements; its ``link`` may be older."""
+        newest, self._newest = self._newest, {}
+        for name, message in newest.items():
+            self._change(MEASUREMENTS[name](self._view, message))
         if self.time_s != self._view.time_s:
-            self._changes["time_s"] = self.time_s
-        if self._changes:
-            self._view, self._changes = view_with(self._view, self._changes), {}
+            self._change({"time_s": self.time_s})
         return self._view
 
 

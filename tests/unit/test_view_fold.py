@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from flightstack.mavlink.dialect import NAME_IN_VERSION, EscStatus, FsLoopTiming, ardupilot_dialect, mavlink
 from flightstack.mavlink.link import Link
 from gcs_cli.vehicle.status_texts import PIECE_TIMEOUT_S
-from gcs_cli.vehicle.vehicle_view import FOLDS, LATEST, MEASUREMENTS
+from gcs_cli.vehicle.vehicle_view import FOLDS, MEASUREMENTS, TIMES
 from gcs_cli.vehicle.view_types import TEXTS_KEPT, VehicleView
 from tests.support.folded_vehicle import HOLD_MODE, Vehicle, heartbeat
 
@@ -321,7 +321,7 @@ def test_no_payload_raises(messages: list[tuple[int, bytes]]) -> None:
 
 
 def test_the_list_of_folded_messages_is_whole() -> None:
-    assert {mavlink.mavlink_map[number].msgname for number in FOLDED} == {*FOLDS, *LATEST, *MEASUREMENTS}
+    assert {mavlink.mavlink_map[n].msgname for n in FOLDED} == {*FOLDS, *MEASUREMENTS, *TIMES}
 
 
 def test_unhealthy_sensors_are_named(vehicle: Vehicle) -> None:
