@@ -6,13 +6,15 @@ message. It holds the frame, reads the header from it, and takes all other const
 
 from __future__ import annotations
 
+import re
+import struct
 from collections.abc import Callable
 from operator import itemgetter
 from typing import Any
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.fields import TEXT_FIELDS, clean
-from flightstack.mavlink.frames import CHECKSUM_SIZE, HEADER, HEADER_V1, HEADER_V2, MAGIC_V1
+from flightstack.mavlink.frames import CHECKSUM_SIZE, HEADER, HEADER_V1, HEADER_V2, MAGIC_V1, MAGIC_V2
 
 _Values = tuple[Any, ...]
 
@@ -106,7 +108,27 @@ def field_reader(name: str, *fields: str) -> Callable[[Any], Any]:
     kind = getattr(mavlink, f"MAVLink_{name.lower()}_message")
     places, unpack = _places(kind), _unpacker(kind)
     pick = itemgetter(*(places[field] for field in fields))
-    return lambda message: pick(unpack(message.get_msgbuf()))
+
+    def read(message: Any) -> Any:
+        return pick(unpack(message._msgbuf))
+
+    return _number_reader(kind, *fields, read) if len(fields) == 1 else read
+
+
+def _number_reader(kind: Any, field: str, read_any: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Return a function that reads one number where it stands; ``read_any`` reads it in other frames."""
+    codes = re.findall(r"\d*[a-zA-Z]", kind.unpacker.format)
+    index = kind.ordered_fieldnames.index(field)
+    offset, number = struct.calcsize("<" + "".join(codes[:index])), struct.Struct(f"<{codes[index]}")
+    unpack_from, start, end = number.unpack_from, HEADER_V2 + offset, offset + number.size
+
+    def read(message: Any) -> Any:
+        frame = message._msgbuf
+        if frame[0] == MAGIC_V2 and frame[1] >= end:
+            return unpack_from(frame, start)[0]
+        return read_any(message)
+
+    return read
 
 
 def _envelope(frame: bytes) -> dict[str, Any]:
@@ -163,16 +185,16 @@ def _places(kind: Any) -> dict[str, int | slice]:
 
 def _unpacker(kind: Any) -> Callable[[bytes], _Values]:
     """Return a function that unpacks the payload of a frame; zeros at its end are not sent."""
-    size, unpack = kind.unpacker.size, kind.unpacker.unpack
+    size, unpack, unpack_from = kind.unpacker.size, kind.unpacker.unpack, kind.unpacker.unpack_from
 
     def unpacked(frame: bytes) -> _Values:
         start = HEADER_V1 if frame[0] == MAGIC_V1 else HEADER_V2
         length = frame[1]
-        values: _Values = unpack(
-            frame[start : start + size]
-            if length >= size
-            else frame[start : start + length].ljust(size, b"\0")
-        )
+        values: _Values
+        if length >= size:
+            values = unpack_from(frame, start)
+        else:
+            values = unpack(frame[start : start + length].ljust(size, b"\0"))
         return values
 
     return unpacked

@@ -70,11 +70,12 @@ class Client:
     ) -> None:
         self.name = name
         self.address = address
+        self._peer = address[1:]
         self.link = link
         """The link to the vehicle."""
         kind = mavlink.MAV_TYPE_ONBOARD_CONTROLLER if is_companion else mavlink.MAV_TYPE_GCS
         self.session = Session(
-            address[1:], heartbeat_type=kind, own_system=system_id, counts_vehicle_time=False
+            self._peer, heartbeat_type=kind, own_system=system_id, counts_vehicle_time=False
         )
         self.session.observe = self._take
         self.received: dict[str, Message] = {}
@@ -121,7 +122,7 @@ class Client:
 
     def receive(self, data: bytes, now_s: float) -> None:
         """Process a datagram from the vehicle."""
-        self.session.receive(data, self.address[1:], now_s)
+        self.session.receive(data, self._peer, now_s)
 
     def _take(self, message: Message) -> None:
         kind = message.get_type()

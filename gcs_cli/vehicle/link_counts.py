@@ -98,6 +98,9 @@ class LinkCounter:
         if last is None or begins:
             self._begin(sequence)
             return
+        if sequence == (last + 1) % 256 and stray is None:  # the usual case
+            self._last_sequence, self._missing = sequence, self._missing << 1 & _ALL_LATE
+            return
         late = (last - sequence) % 256
         if late == 0:  # repeated
             return
