@@ -58,16 +58,17 @@ def test_service_is_polled_at_its_deadline_and_after_a_wake() -> None:
     assert schedule.poll(6.0) == [(None, "6"), (None, "6")]
 
 
-def test_mission_item_wakes_only_its_service() -> None:
-    mission, other = Bell(None), Bell(None)
-    mission.handles = frozenset({"MISSION_ITEM_INT"})
-    schedule = Schedule([mission, other])
+@pytest.mark.parametrize("kind", ["HEARTBEAT", "MISSION_ITEM_INT"])
+def test_heartbeat_or_mission_item_wakes_only_its_service(kind: str) -> None:
+    own, other = Bell(None), Bell(None)
+    own.handles, other.handles = frozenset({kind}), frozenset({"COMMAND_LONG"})
+    schedule = Schedule([own, other])
     schedule.poll(0.0)
-    schedule.wake("MISSION_ITEM_INT")
+    schedule.wake(kind)
     schedule.poll(1.0)
     schedule.wake("COMMAND_LONG")
     schedule.poll(2.0)
-    assert (mission.polled_s, other.polled_s) == ([0.0, 1.0, 2.0], [0.0, 2.0])
+    assert (own.polled_s, other.polled_s) == ([0.0, 1.0, 2.0], [0.0, 2.0])
 
 
 def begin_burst(net: Net) -> Station:

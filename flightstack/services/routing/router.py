@@ -161,8 +161,10 @@ class CountsVehicleTime(Protocol):
         ...
 
 
-OWN_MESSAGES = frozenset({"MISSION_ITEM", "MISSION_ITEM_INT", "MISSION_REQUEST", "MISSION_REQUEST_INT"})
-"""Messages that come by the thousand in a transfer, and change no service but their own."""
+OWN_MESSAGES = frozenset(
+    {"HEARTBEAT", "MISSION_ITEM", "MISSION_ITEM_INT", "MISSION_REQUEST", "MISSION_REQUEST_INT"}
+)
+"""Messages that come each second, or by the thousand in a transfer, and change no service but their own."""
 
 
 class Schedule:
