@@ -23,6 +23,7 @@ from flightstack.services.telemetry.streams import GROUND_RATES_HZ, Streams
 from flightstack.services.telemetry.telemetry import Telemetry
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, ActuatorsFrame, PlantStateFrame
 from flightstack.testing import World
+from flightstack.vehicle.status import vehicle_summary
 from sim_bridge.plant.compiled_plant import CompiledPlant
 from sim_bridge.plant.plant import InitialState, PlantOptions
 from sim_bridge.server.endpoint import FlightStackEndpoint
@@ -126,7 +127,9 @@ def _telemetry(world: World) -> tuple[Call, Call, Call, Call]:
     pymavlink; decode a frame.
     """
     stack, link, station = world.engine.stack, Link(1, 1), Link(255, 190)
-    told = Telemetry(stack.status, stack.now, stack.parts.places, stack.status().info, stack.report.message)
+    info = stack.status().info
+    summary = partial(vehicle_summary, info, stack.parts)
+    told = Telemetry(stack.status, summary, stack.now, stack.parts.places, info, stack.report.message)
     polls = _polls()
     frames = [frame for ids in polls for frame in told.frames(ids, link)]
     values = np.ones(1, VALUES)

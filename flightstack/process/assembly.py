@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple, TypeAlias
 
 from flightstack import __version__
@@ -46,7 +47,13 @@ from flightstack.vehicle.parameters import (
     load_parameters,
 )
 from flightstack.vehicle.plans import FlightArea
-from flightstack.vehicle.status import VehicleStatus, vehicle_info, vehicle_status
+from flightstack.vehicle.status import (
+    VehicleInfo,
+    VehicleStatus,
+    vehicle_info,
+    vehicle_status,
+    vehicle_summary,
+)
 
 _KERNELS = (
     "inner_kernel", "outer_kernel", "rest_kernel", "levelling_kernel", "goal_kernel",
@@ -182,18 +189,27 @@ def _join(
     report = TimingReport(timing, loop_rates, config.lockstep)
     generic = params.value(AUTOPILOT) == GENERIC
     vehicle_id = vehicle_info(setup.vehicle, system_id, generic, parts.places.frame)
-
-    def status() -> VehicleStatus:
-        sensed = None if estimation is None else estimation.sensed()
-        return vehicle_status(vehicle_id, parts, simulator.battery, sensed)
-
-    telemetry = Telemetry(status, parts.now, parts.places, vehicle_id, report.message, estimation is not None)
+    status = _status(vehicle_id, parts, simulator, estimation)
+    summary, has_sensors = partial(vehicle_summary, vehicle_id, parts), estimation is not None
+    telemetry = Telemetry(status, summary, parts.now, parts.places, vehicle_id, report.message, has_sensors)
     context = VehicleContext.of(parts, params, simulator, generic, logs, prepare_reboot)
     ground = GroundHub(context, parts, telemetry, vehicle_id)
     return Stack(
         setup.vehicle, loop_rates, simulator, parts, ground, recorder, timing, report, params, loaded, backend, status,
         autopilot, estimation,
     )  # fmt: skip
+
+
+def _status(
+    info: VehicleInfo, parts: VehicleParts, simulator: SimulatorEndpoint, estimation: Estimation | None
+) -> Callable[[], VehicleStatus]:
+    """Return the function that returns the current status."""
+
+    def status() -> VehicleStatus:
+        sensed = None if estimation is None else estimation.sensed()
+        return vehicle_status(info, parts, simulator.battery, sensed)
+
+    return status
 
 
 def _on_sensors(

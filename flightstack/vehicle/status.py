@@ -31,6 +31,16 @@ class VehicleInfo(NamedTuple):
     frame: LocalFrame
 
 
+class VehicleSummary(NamedTuple):
+    """What a heartbeat shows, which is sent so often that it is not taken from the whole status."""
+
+    info: VehicleInfo
+    armed: bool
+    mode: Mode
+    failsafe_action: Action
+    """Action of the active failsafes."""
+
+
 class FlightTimes(NamedTuple):
     """Vehicle times of the present flight; 0 before the event."""
 
@@ -95,6 +105,12 @@ def vehicle_info(vehicle: Vehicle, system_id: int, is_generic: bool, frame: Loca
         top_speed_rad_s=tuple(min(rotor.max_speed_rad_s, 1e6) for rotor in vehicle.rotors),
         frame=frame,
     )
+
+
+def vehicle_summary(info: VehicleInfo, parts: VehicleParts) -> VehicleSummary:
+    """Return the current summary."""
+    shown = parts.now.status
+    return VehicleSummary(info, shown.armed, shown.mode, parts.failsafes.decision.action)
 
 
 SINGLE_LIMIT = 1e18

@@ -20,7 +20,14 @@ from flightstack.params.behaviour import Behaviour
 from flightstack.services.telemetry.telemetry import Telemetry
 from flightstack.simulator_link.endpoint import NO_BATTERY
 from flightstack.vehicle.flight_state import FlightState
-from flightstack.vehicle.status import FlightTimes, PlanIds, VehicleInfo, VehicleStatus, in_single_precision
+from flightstack.vehicle.status import (
+    FlightTimes,
+    PlanIds,
+    VehicleInfo,
+    VehicleStatus,
+    VehicleSummary,
+    in_single_precision,
+)
 
 HOME = GeoPoint(47.397742, 8.545594, 488.0)
 EULER = (0.1, -0.2, 2.5)
@@ -72,4 +79,7 @@ def telemetry(
     now = flight_state(shown) if now is None else now
     places = SafePlaces(shown.home)
     places.frame = shown.info.frame
-    return Telemetry(lambda: shown, now, places, shown.info, timing, shown.sensed is not None)
+    summary = VehicleSummary(shown.info, shown.armed, shown.mode, shown.failsafe_action)
+    return Telemetry(
+        lambda: shown, lambda: summary, now, places, shown.info, timing, shown.sensed is not None
+    )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from itertools import groupby
 
-from flightstack.core.errors import TargetError
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
 from flightstack.mavlink.frame_packer import FramePacker
 from flightstack.mavlink.link import Link, Message
@@ -14,12 +13,11 @@ from flightstack.services.telemetry.fields import wrapped
 from flightstack.services.telemetry.motion_values import Motion, Places
 from flightstack.services.telemetry.sensors import SENSED
 from flightstack.vehicle.flight_state import FlightState
-from flightstack.vehicle.status import VehicleInfo, VehicleStatus
+from flightstack.vehicle.status import VehicleInfo, VehicleStatus, VehicleSummary
 
 M = mavlink
 
 MAKERS: dict[int, Callable[[VehicleStatus], Message]] = {
-    M.MAVLINK_MSG_ID_HEARTBEAT: vehicle.heartbeat,
     M.MAVLINK_MSG_ID_SYS_STATUS: vehicle.sys_status,
     M.MAVLINK_MSG_ID_SYSTEM_TIME: vehicle.system_time,
     M.MAVLINK_MSG_ID_GPS_RAW_INT: motion.gps_raw,
@@ -44,7 +42,7 @@ MAKERS: dict[int, Callable[[VehicleStatus], Message]] = {
 
 MOTION = frozenset(getattr(M, f"MAVLINK_MSG_ID_{name}") for name in motion.CONTENTS)
 """Messages of the values of motion."""
-STREAMED = MOTION | {*MAKERS, FS_LOOP_TIMING_ID}
+STREAMED = MOTION | {*MAKERS, M.MAVLINK_MSG_ID_HEARTBEAT, FS_LOOP_TIMING_ID}
 """Messages that can be sent at a rate."""
 SENSOR_STREAMED = STREAMED | SENSED.keys()
 """The same for a vehicle that flies on its sensors."""
@@ -67,6 +65,7 @@ class Telemetry:
     def __init__(
         self,
         status: Callable[[], VehicleStatus],
+        summary: Callable[[], VehicleSummary],
         now: FlightState,
         places: Places,
         info: VehicleInfo,
@@ -77,11 +76,10 @@ class Telemetry:
         self.has_sensors = has_sensors
         self.streamed = SENSOR_STREAMED if has_sensors else STREAMED
         """Messages that can be sent at a rate."""
-        self._status_of_now = status
+        self._status_of_now, self._summary_of_now = status, summary
         self._now = now
         self._loop_timing = loop_timing
         self._status: VehicleStatus | None = None
-        self._last: VehicleStatus | None = None
         self._made: dict[int, tuple[Message, ...]] = {}
         self._motion = Motion(now, places, info)
         self._packer = FramePacker(self._motion.values, motion.CONTENTS)
@@ -101,7 +99,7 @@ class Telemetry:
     def status(self) -> VehicleStatus:
         """The status in this poll."""
         if self._status is None:
-            self._status = self._last = self._status_of_now()
+            self._status = self._status_of_now()
         return self._status
 
     @property
@@ -165,15 +163,8 @@ class Telemetry:
         return self.messages(message_id)
 
     def farewell(self) -> Message:
-        """Return the final HEARTBEAT with MAV_STATE_POWEROFF, of the last status if the target is lost."""
-        self.begin_poll()
-        try:
-            last = self.status
-        except TargetError:
-            if self._last is None:
-                raise
-            last = self._last
-        return vehicle.heartbeat(last, leaving=True)
+        """Return the final HEARTBEAT with MAV_STATE_POWEROFF."""
+        return vehicle.heartbeat(self._summary_of_now(), leaving=True)
 
     def _make(self, message_id: int) -> tuple[Message, ...]:
         if message_id in self._hidden:
@@ -182,6 +173,8 @@ class Telemetry:
             return (self._read().message(self._packer.index[message_id]),)
         if message_id == FS_LOOP_TIMING_ID:
             return (self._loop_timing(),)
+        if message_id == M.MAVLINK_MSG_ID_HEARTBEAT:
+            return (vehicle.heartbeat(self._summary_of_now()),)
         return _of_status(self.status, message_id)
 
 

@@ -16,7 +16,7 @@ from flightstack.mavlink.link import Message
 from flightstack.params.vehicle import system_type
 from flightstack.services.telemetry.fields import NAN, boot_ms, wrapped
 from flightstack.services.telemetry.sensors import sensor_health
-from flightstack.vehicle.status import VehicleStatus
+from flightstack.vehicle.status import VehicleStatus, VehicleSummary
 
 MAVLINK_2 = 200
 NO_MISSION = 0xFFFF
@@ -24,7 +24,7 @@ NO_MISSION = 0xFFFF
 _OWN_TARGETS = (Mode.TAKEOFF, Mode.MISSION, Mode.HOLD, Mode.RETURN, Mode.LAND)
 
 
-def heartbeat(f: VehicleStatus, leaving: bool = False) -> Message:
+def heartbeat(f: VehicleSummary, leaving: bool = False) -> Message:
     """HEARTBEAT with PX4's custom mode and, in each mode, PX4's base mode flags."""
     base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_HIL_ENABLED
     base |= mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
@@ -43,7 +43,7 @@ def heartbeat(f: VehicleStatus, leaving: bool = False) -> Message:
     )
 
 
-def system_status(f: VehicleStatus) -> int:
+def system_status(f: VehicleSummary) -> int:
     """Return MAV_STATE: critical while a failsafe is active, emergency if its action ends the flight."""
     if f.mode is Mode.TERMINATION:
         return int(mavlink.MAV_STATE_FLIGHT_TERMINATION)
