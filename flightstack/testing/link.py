@@ -86,6 +86,14 @@ class Channel:
         for _ in range(2 if chance() < conditions.duplication else 1):
             self._push(arrival_s, data)
 
+    def passed(self, datagrams: list[bytes]) -> list[bytes]:
+        """Send datagrams on a channel that ``is_instant``; return those that arrive."""
+        self.sent += len(datagrams)
+        if not self.conditions.is_cut:
+            return datagrams
+        self.lost += len(datagrams)
+        return []
+
     def receive(self, now_s: float) -> list[bytes]:
         """Return the datagrams that have arrived by ``now_s``, in the order of their arrival."""
         arrived = []

@@ -109,14 +109,12 @@ class Network:
         return min(hub.idle_s(now_s, motion), *(client.idle_s(now_s) for client in clients))
 
     def exchange_motion(self, hub: GroundHub, now_s: float) -> None:
-        """Pass on streams of the motion as of ``now_s``, at which nothing else was due."""
-        for address, data in hub.poll_motion(now_s):
+        """Pass on streams of the motion as of ``now_s``, at which nothing else was due: the clients are passive."""
+        for address, frames in hub.poll_motion(now_s):
             receiver = self._by_address.get(address)
             if receiver is not None:
-                receiver.link.from_vehicle.send(data, now_s)
-        for client in self.clients.values():
-            for data in client.link.from_vehicle.receive(now_s):
-                client.receive(data, now_s)
+                for data in receiver.link.from_vehicle.passed(frames):
+                    receiver.receive(data, now_s)
 
     def settle(self, hub: GroundHub, now_s: float) -> None:
         """Exchange messages until none is left at this instant."""

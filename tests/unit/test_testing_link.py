@@ -29,6 +29,19 @@ def is_share(found: int, share: float) -> bool:
     return abs(found - COUNT * share) <= 4.0 * math.sqrt(COUNT * share * (1.0 - share))
 
 
+@pytest.mark.parametrize("is_cut", [False, True])
+def test_instant_channel_passes_what_it_would_deliver_at_once(is_cut: bool) -> None:
+    queued, passing = Channel(3), Channel(3)
+    for channel in (queued, passing):
+        channel.set(is_cut=is_cut)
+    for data in DATAGRAMS[:5]:
+        queued.send(data, 1.0)
+    assert passing.is_instant
+    assert passing.passed(DATAGRAMS[:5]) == queued.receive(1.0)
+    assert (passing.sent, passing.lost) == (queued.sent, queued.lost) == (5, 5 * is_cut)
+    assert passing.next_arrival_s == queued.next_arrival_s == math.inf
+
+
 @pytest.mark.parametrize("share", [0.01, 0.3, 0.9])
 def test_loss_drops_its_share_and_keeps_the_order(share: float) -> None:
     channel = sent(loss=share)

@@ -229,15 +229,14 @@ class GroundHub:
             yield from self._forwarded(now_s)
         self._forget_silent(now_s)
 
-    def poll_motion(self, now_s: float) -> Iterator[tuple[PeerAddress, bytes]]:
-        """Yield (address, bytes) of streams that are due, if nothing else is."""
+    def poll_motion(self, now_s: float) -> Iterator[tuple[PeerAddress, list[bytes]]]:
+        """Yield (address, frames) of streams that are due, if nothing else is."""
         telemetry = self._telemetry
         telemetry.begin_poll()
         for address, peer in self._peers.items():
             if peer.is_served(now_s):
                 due = peer.streams.due(telemetry.time_us * 1e-6, now_s)
-                for frame in telemetry.frames(due, peer.link):
-                    yield address, frame
+                yield address, telemetry.frames(due, peer.link)
 
     def motion_idle_s(self, now_s: float) -> float:
         """Return the time for which no stream is due, as ``idle_s``."""
