@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from flightstack.core.compiled import IS_DISABLED, compiled
 from flightstack.flight_log.ulog import DATA_HEADER, DATA_TYPE, HEADER_SIZE, MESSAGE_HEADER, MESSAGE_TYPES
 
 Positions: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
+Words: TypeAlias = np.ndarray[Any, np.dtype[np.uint16]]
 
 _MESSAGE_HEADER, _DATA_HEADER = MESSAGE_HEADER.size, DATA_HEADER.size
 _IS_KNOWN = bytes(kind in MESSAGE_TYPES for kind in range(256))
@@ -19,38 +20,66 @@ _COMPILED_BYTES = 50_000_000
 """Size from which a file is worth the import of Numba, which takes as long as 2 million messages without it [B]."""
 
 
-@compiled
-def scan_kernel(content: Any, is_known: Any, positions: Any, numbers: Any) -> int:
-    """Write the position of each message and that behind the last one to ``positions``; return their number.
+class Messages(NamedTuple):
+    """The messages of a file in its order: n rows of data, and m others."""
 
-    ``numbers`` gets the subscription id of each message of data, −1 for others. ``content`` and ``is_known``, by the
-    type of a message, are bytes or arrays of uint8.
+    rows: Positions
+    """Position of each row, shape (n,)."""
+    sizes: Words
+    """Size of each row behind size and type [B], shape (n,)."""
+    numbers: Words
+    """Subscription id of each row, shape (n,)."""
+    others: Positions
+    """Position of each message that is no row, shape (m,)."""
+    end: int
+    """Position behind the last message: the size of the file if messages of known types fill it to its last byte."""
+
+
+@compiled
+def scan_kernel(
+    content: Any, is_known: Any, rows: Any, sizes: Any, numbers: Any, others: Any
+) -> tuple[int, int, int]:
+    """Fill the arrays of ``Messages``; return the number of rows, that of the others, and ``end``.
+
+    ``content`` and ``is_known``, by the type of a message, are bytes or arrays of uint8.
     """
-    at, end, count = HEADER_SIZE, len(content), 0
+    at, end, count, others_count = HEADER_SIZE, len(content), 0, 0
     while at + _MESSAGE_HEADER <= end:
-        after = at + _MESSAGE_HEADER + (content[at] | content[at + 1] << 8)
+        size = content[at] | content[at + 1] << 8
         kind = content[at + 2]
+        after = at + _MESSAGE_HEADER + size
         if after > end or not is_known[kind] or (kind == DATA_TYPE and after < at + _DATA_HEADER):
             break
-        positions[count] = at
-        numbers[count] = content[at + 3] | content[at + 4] << 8 if kind == DATA_TYPE else -1
-        count += 1
+        if kind == DATA_TYPE:
+            rows[count] = at
+            sizes[count] = size
+            numbers[count] = content[at + 3] | content[at + 4] << 8
+            count += 1
+        else:
+            others[others_count] = at
+            others_count += 1
         at = after
-    positions[count] = at
-    return count + 1
+    return count, others_count, at
 
 
-def scan_messages(content: bytes) -> tuple[Positions, Positions]:
-    """Return the position of each message, and the subscription id of each message of data, −1 for others.
+def scan_messages(content: bytes) -> Messages:
+    """Find all messages up to the first that is cut off or of no known type.
 
-    There is a further position, that behind the last message. It is the size of the file if messages of known types
-    fill it to its last byte. The format has no end mark and no checksums: damage inside a message is not detected.
+    The format has no end mark and no checksums: damage inside a message is not detected.
     """
-    most = len(content) // _MESSAGE_HEADER + 1
-    positions, numbers = np.empty(most, np.int64), np.empty(most, np.int64)
+    most = len(content) // _DATA_HEADER
+    rows, others = np.empty(most, np.int64), np.empty(len(content) // _MESSAGE_HEADER, np.int64)
+    sizes, numbers = np.empty(most, np.uint16), np.empty(most, np.uint16)
+    arrays = (rows, sizes, numbers, others)
     if not IS_DISABLED and ("numba" in sys.modules or len(content) >= _COMPILED_BYTES):
-        count = scan_kernel(np.frombuffer(content, np.uint8), _KNOWN, positions, numbers)
+        count, others_count, end = scan_kernel(np.frombuffer(content, np.uint8), _KNOWN, *arrays)
     else:
         scan = getattr(scan_kernel, "py_func", scan_kernel)
-        count = scan(content, _IS_KNOWN, positions.data, numbers.data)
-    return positions[:count].copy(), numbers[: count - 1].copy()  # most of the memory is not used
+        count, others_count, end = scan(content, _IS_KNOWN, *(array.data for array in arrays))
+    return Messages(  # copies: most of the memory is not used
+        rows[:count].copy(),
+        sizes[:count].copy(),
+        numbers[:count].copy(),
+        others[:others_count].copy(),
+        end,
+    )

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import itertools
 import os
 import struct
 from collections.abc import Callable, Iterator, Mapping
@@ -19,21 +20,21 @@ import numpy as np
 from pyulog import ULog, ULogException
 
 from flightstack.core.errors import ConfigError
-from flightstack.flight_log.ulog import HEADER_SIZE, MESSAGE_HEADER
-from flightstack.flight_log.ulog_scan import scan_messages
+from flightstack.flight_log.ulog import DATA_HEADER, HEADER_SIZE, MESSAGE_HEADER
+from flightstack.flight_log.ulog_scan import Messages, Words, scan_messages
 
 IndexArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
 DAMAGE = (ULogException, struct.error, ValueError, KeyError, IndexError, OverflowError, TypeError)
 """Exceptions for a damaged log, raised by pyulog or by code that reads its result."""
 NO_DATA = "the log has no data"
-_ROW_AT = 5
+_ID_SIZE, _TIME_SIZE = 2, 8
+_ROW_AT = DATA_HEADER.size
 """Offset of the row in a message of data: behind size, type and subscription id."""
-_TIME_SIZE = 8
 _SHORT = 1 << 8
 _SUBSCRIPTION_TYPE, _FLAG_TYPE = ord("A"), ord("B")
-_INCOMPATIBLE_AT = 8
-"""Offset in the flag bits of the incompatible flags, and of the offsets of appended data."""
+_INCOMPATIBLE_AT = 11
+"""Offset in the message of flag bits of the incompatible flags, and of the offsets of appended data."""
 
 
 class ParsedLog(NamedTuple):
@@ -93,9 +94,8 @@ class _Rows:
     def __init__(self, content: bytes, topics: list[str] | None) -> None:
         self._content = content
         self._topics = None if topics is None else {topic.encode() for topic in topics}
-        positions, numbers = scan_messages(content)
-        self._begins, self._ends = positions[:-1], positions[1:]
-        self.fill_file = bool(positions[-1] == len(content))
+        found = scan_messages(content)
+        self.fill_file = found.end == len(content)
         """True if messages of known types fill the file to its last byte.
 
         The format has no end mark and no checksums: damage inside a message is not detected.
@@ -103,39 +103,38 @@ class _Rows:
         self.are_regular = self.fill_file
         """True if also no subscription id is used twice, each row has a time, and no data is appended."""
         if self.are_regular:
-            self._gather(numbers)
+            self._gather(found)
 
-    def _gather(self, numbers: IndexArray) -> None:
-        """Find the wanted rows, and the messages that are not data; ``numbers`` are those of ``scan_messages``."""
-        is_row = numbers >= 0
-        self._rows, self._others = np.flatnonzero(is_row), np.flatnonzero(~is_row)
-        numbers = numbers[is_row].astype(np.uint16)
-        if numbers.size and numbers.max() < _SHORT:  # sorted in half the time
-            numbers = numbers.astype(np.uint8)
-        self._of = _grouped(self._rows, numbers)
-        unwanted = self._unwanted()
+    def _gather(self, found: Messages) -> None:
+        """Sort the wanted rows by subscription."""
+        rows, sizes, numbers, self._others, _ = found
+        unwanted = self._unwanted(found)
         if unwanted:
-            self._rows = self._rows[~np.isin(numbers, list(unwanted))]
-            self._of = {number: rows for number, rows in self._of.items() if number not in unwanted}
-        sizes = self._ends[self._rows] - self._begins[self._rows]
-        self.are_regular &= bool(np.all(sizes >= _ROW_AT + _TIME_SIZE))
+            wanted = ~np.isin(numbers, list(unwanted))
+            rows, sizes, numbers = rows[wanted], sizes[wanted], numbers[wanted]
+        self._rows = rows
+        self._of = _grouped(numbers, rows, sizes)
+        self.are_regular &= not np.any(sizes < _ID_SIZE + _TIME_SIZE)
 
-    def _unwanted(self) -> set[int]:
+    def _unwanted(self, found: Messages) -> set[int]:
         """Return the ids of subscriptions to other topics, and check all messages that are not data."""
         unwanted: set[int] = set()
-        for index in self._others.tolist():
-            at, after = self._begins[index], self._ends[index]
-            _size, kind = MESSAGE_HEADER.unpack_from(self._content, at)
-            message = self._content[at + MESSAGE_HEADER.size : after]
+        for at in found.others.tolist():
+            message = self._message(at)
+            _size, kind = MESSAGE_HEADER.unpack_from(message)
             if kind == _SUBSCRIPTION_TYPE:
-                number = int.from_bytes(message[1:3], "little")
-                has_rows = number in self._of and self._of[number][0] < index
+                number = int.from_bytes(message[4:6], "little")
+                has_rows = number in found.numbers[: np.searchsorted(found.rows, at)]
                 self.are_regular &= number not in unwanted and not has_rows
-                if self._topics is not None and message[3:] not in self._topics:
+                if self._topics is not None and message[6:] not in self._topics:
                     unwanted.add(number)
             elif kind == _FLAG_TYPE:
                 self.are_regular &= not any(message[_INCOMPATIBLE_AT:])
         return unwanted
+
+    def _message(self, at: int) -> bytes:
+        size, _kind = MESSAGE_HEADER.unpack_from(self._content, at)
+        return self._content[at : at + MESSAGE_HEADER.size + size]
 
     def _unaligned(self, kind: Any, at: IndexArray) -> np.ndarray[Any, Any]:
         """Return the values of a type of fixed size at the given positions, which it need not be aligned to."""
@@ -147,16 +146,20 @@ class _Rows:
 
         A change of a parameter has the largest time before it, and so has the end of the log.
         """
-        kept = {*self._others.tolist(), *(int(rows[0]) for rows in self._of.values())}
-        if len(self._rows):
-            times = self._unaligned("<u8", self._begins[self._rows] + _ROW_AT)
-            largest = np.maximum.accumulate(times)
-            before = np.searchsorted(self._rows, [*self._others, len(self._begins)])
-            latest = np.searchsorted(largest, largest[before[before > 0] - 1])
-            kept.update(self._rows[latest].tolist())
-        begins, ends = self._begins, self._ends
-        messages = (self._content[begins[index] : ends[index]] for index in sorted(kept))
-        return self._content[:HEADER_SIZE] + b"".join(messages)
+        firsts = (int(rows[0]) for rows, _ in self._of.values())
+        kept = {*self._others.tolist(), *firsts, *self._latest()}
+        return self._content[:HEADER_SIZE] + b"".join(map(self._message, sorted(kept)))
+
+    def _latest(self) -> Iterator[int]:
+        """Yield the positions of the rows with the largest time before another message, or before the end."""
+        times = self._unaligned("<u8", self._rows + _ROW_AT)
+        ends = np.searchsorted(self._rows, self._others).tolist()
+        largest = -1
+        for first, end in itertools.pairwise(sorted({0, *ends, len(times)})):
+            row = first + int(times[first:end].argmax())
+            if times[row] > largest:
+                largest = int(times[row])
+                yield int(self._rows[row])
 
     def fill(self, log: Any) -> bool:
         """Replace the arrays of ``log`` by those of all rows; return False if pyulog alone must read the log.
@@ -167,11 +170,10 @@ class _Rows:
             return False
         for item in log.data_list:
             row = np.dtype([(name, values.dtype) for name, values in item.data.items()])
-            rows = self._of[item.msg_id]
-            begins = self._begins[rows] + _ROW_AT
-            if np.any(self._ends[rows] - begins != row.itemsize) or item.timestamp_idx != 0:
+            rows, sizes = self._of[item.msg_id]
+            if np.any(sizes != _ID_SIZE + row.itemsize) or item.timestamp_idx != 0:
                 return False
-            item.data = _Columns(partial(self._unaligned, f"V{row.itemsize}", begins), row)
+            item.data = _Columns(partial(self._unaligned, f"V{row.itemsize}", rows + _ROW_AT), row)
         return True
 
 
@@ -200,9 +202,12 @@ class _Columns(Mapping[str, np.ndarray[Any, Any]]):
         return len(self._row.names or ())
 
 
-def _grouped(rows: IndexArray, numbers: np.ndarray[Any, Any]) -> dict[int, IndexArray]:
-    """Return the rows of each number, in their order."""
-    counts = np.bincount(numbers)
+def _grouped(numbers: Words, *values: np.ndarray[Any, Any]) -> dict[int, tuple[np.ndarray[Any, Any], ...]]:
+    """Return the values of each number, in their order."""
+    if numbers.size and numbers.max() < _SHORT:  # sorted in half the time
+        numbers = numbers.astype(np.uint8)
+    order, counts = np.argsort(numbers, kind="stable"), np.bincount(numbers)
     found = np.flatnonzero(counts)
-    groups = np.split(rows[np.argsort(numbers, kind="stable")], np.cumsum(counts[found])[:-1])
+    ends = np.cumsum(counts[found])[:-1]
+    groups = zip(*(np.split(each[order], ends) for each in values), strict=True)
     return dict(zip(found.tolist(), groups, strict=False))  # without rows there is one empty group

@@ -139,14 +139,38 @@ def test_messages_are_found_with_numba_as_without(seed: int, monkeypatch: pytest
         debugged = ulog_scan.scan_messages(content)
     monkeypatch.setattr(ulog_scan, "sys", SimpleNamespace(modules={}))
     plain = ulog_scan.scan_messages(content)
-    for number in range(2):
-        assert plain[number].tolist() == compiled[number].tolist() == debugged[number].tolist()
-    positions, numbers = plain
-    assert positions[0] == HEADER_SIZE
-    messages = [MESSAGE_HEADER.unpack_from(content, at) for at in positions[:-1]]
-    assert np.diff(positions).tolist() == [MESSAGE_HEADER.size + size for size, _kind in messages]
-    ids = [int.from_bytes(content[at + 3 : at + 5], "little") for at in positions[:-1]]
-    kinds = [kind for _size, kind in messages]
-    assert numbers.tolist() == [
-        id_ if kind == DATA_TYPE else -1 for id_, kind in zip(ids, kinds, strict=True)
-    ]
+    for one, another, third in zip(plain, compiled, debugged, strict=True):
+        assert np.array_equal(one, another)
+        assert np.array_equal(one, third)
+    assert_finds_messages(plain, content)
+
+
+def assert_finds_messages(found: ulog_scan.Messages, content: bytes) -> None:
+    """Compare the messages with those that are found one by one."""
+    at, rows, others = HEADER_SIZE, [], []
+    while at < found.end:
+        size, kind = MESSAGE_HEADER.unpack_from(content, at)
+        if kind == DATA_TYPE:
+            rows.append((at, size, int.from_bytes(content[at + 3 : at + 5], "little")))
+        else:
+            others.append(at)
+        at += MESSAGE_HEADER.size + size
+    assert at == found.end
+    assert list(zip(*(array.tolist() for array in found[:3]), strict=True)) == rows
+    assert found.others.tolist() == others
+
+
+@pytest.mark.parametrize("kind", ["D", "O"])
+def test_log_of_the_smallest_messages_is_scanned_to_its_end(kind: str) -> None:
+    """They are more than a log of this size has as a rule."""
+    content = bytes(HEADER_SIZE) + struct.pack("<HBH", 2, ord(kind), 7) * 5000
+    found = ulog_scan.scan_messages(content)
+    assert found.end == len(content)
+    assert_finds_messages(found, content)
+
+
+def test_latest_row_before_a_change_may_be_older_than_others(log: bytes) -> None:
+    """Times need not increase: the largest one before a message counts, not that of the row before it."""
+    row = bytes([*struct.pack("<HBHQ", 26, ord("D"), 0, 5), *bytes(16)])
+    changed = struct.pack("<HBB", 1 + 7 + 4, ord("P"), 7) + b"float x" + bytes(4)
+    assert_equal(log + row + changed + row + changed)
