@@ -96,9 +96,7 @@ class _Run:
         world, scenario = self._world, self._scenario
         limit_s = scenario.limit_s
         if scenario.plan is not None:
-            return fly_plan(
-                world, scenario.setup(world.setup.seed).load_plan(scenario.plan), limit_s, self._step
-            )
+            return fly_plan(world, world.setup.load_plan(scenario.plan), limit_s, self._step)
         end_s = scenario.duration_s or limit_s or _DEFAULT_LIMIT_S
         flew = False
         while world.time_s < end_s and (world.engine.stack.now.status.armed or not flew):

@@ -123,10 +123,12 @@ class Setup:
     def plan_path(self, plan: str | Path) -> Path:
         """Return the file of a plan: in ``folder``, else an example of the installation."""
         folders = (self.folder,) if isinstance(self.folder, Path) else self.folder
-        path = next((path for folder in folders if (path := folder / plan).exists()), folders[0] / plan)
+        for path in (folder / plan for folder in folders):
+            if path.exists():
+                return path
         example = example_plans().get(Path(plan).stem)
         is_name = example is not None and str(plan) in (example.stem, example.name)
-        return example if example is not None and is_name and not path.exists() else path
+        return example if example is not None and is_name else folders[0] / plan
 
     def load_plan(self, plan: str | Path) -> Plan:
         """Read a plan file, as ``plan_path`` finds it; raise ConfigError."""
