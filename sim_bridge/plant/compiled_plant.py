@@ -60,8 +60,10 @@ class CompiledPlant(RecordPlant):
 
     def set_step(self, step_s: float) -> None:
         """Set the fixed integration step [s]."""
+        is_new = step_s != self.memory[0]["step_s"]
         super().set_step(step_s)
-        self._set_contact(contact_model(self._vehicle, step_s, single_point=self._paper))
+        if is_new:
+            self._set_contact(contact_model(self._vehicle, step_s, single_point=self._paper))
 
     def _advance(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
         if command_rad_s is not self._bound:

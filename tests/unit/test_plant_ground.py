@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 
 from flightstack.core.contract import Vector3
-from flightstack.params.vehicle import load_vehicle
+from flightstack.params.vehicle import Vehicle, load_vehicle
 from flightstack.simulator_link.hot_frames import ARMED_FLAG
+from sim_bridge.plant import compiled_plant
 from sim_bridge.plant.compiled_plant import CompiledPlant
-from sim_bridge.plant.contact import FRICTION
+from sim_bridge.plant.contact import FRICTION, ContactModel, contact_model
 from sim_bridge.plant.disturbance import NO_DISTURBANCE, Disturbance
 from sim_bridge.plant.layout import CONTACT
 from sim_bridge.plant.plant import AT_REST, InitialState, PlantOptions
+from sim_bridge.plant.record_plant import DEFAULT_STEP_S
 
 BOTH_PLANTS = pytest.mark.parametrize("plant", ["rigid", "paper"])
 BOTH_VEHICLES = pytest.mark.parametrize("vehicle", ["paper_quad", "x_quad"])
@@ -52,6 +54,21 @@ def test_rests_at_the_origin(vehicle: str, plant: str, step_s: float) -> None:
     ground.wait(20.0)
     assert ground.result == CONTACT
     assert np.abs(ground.state - [0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0]).max() < 1e-14  # measured: 2.1e-16
+
+
+@BOTH_PLANTS
+def test_contact_is_designed_once_for_each_step(plant: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    steps_s: list[float] = []
+
+    def design(vehicle: Vehicle, step_s: float, single_point: bool) -> ContactModel:
+        steps_s.append(step_s)
+        return contact_model(vehicle, step_s, single_point)
+
+    monkeypatch.setattr(compiled_plant, "contact_model", design)
+    ground = OnGround("x_quad", plant, step_s=DEFAULT_STEP_S)
+    assert steps_s == [DEFAULT_STEP_S]
+    ground.plant.set_step(0.01)
+    assert steps_s == [DEFAULT_STEP_S, 0.01]
 
 
 @BOTH_PLANTS
