@@ -251,7 +251,8 @@ def find_file(name_or_path: str, folder: Path, kind: str) -> Path:
 
 def built_in_names(folder: Path) -> list[str]:
     """Return the names of the built-in files in ``folder``."""
-    return sorted(path.stem for path in folder.glob("*.toml"))
+    files = (name for name in os.listdir(folder) if name.endswith(".toml"))
+    return sorted(name.removesuffix(".toml") for name in files)
 
 
 def hidden_file(name_or_path: str, kind: str) -> str | None:
