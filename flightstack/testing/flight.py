@@ -147,13 +147,16 @@ class Flight:
     @property
     def max_error_m(self) -> float:
         """Largest distance between true position and setpoint in flight; NaN without a flight."""
-        error = self.data.actual_error().values
-        return float(error.max()) if len(error) else math.nan
+        return float(self._errors_m.max()) if len(self._errors_m) else math.nan
 
     @property
     def rms_error_m(self) -> float:
         """Root mean square of the distance between true position and setpoint in flight; NaN without a flight."""
-        return rms(self.data.actual_error().values) or math.nan
+        return rms(self._errors_m) or math.nan
+
+    @cached_property
+    def _errors_m(self) -> FloatArray:
+        return self.data.actual_error().values
 
     @property
     def landing_error_m(self) -> float:
