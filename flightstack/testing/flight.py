@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
 from flightstack.core.contract import FloatArray
-from flightstack.core.enums import NAVIGATION_STATE
 from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import LocalFrame
 from flightstack.plan import Command, Plan
 from flightstack.testing import properties
 from flightstack.testing.expression import SIGNALS
+from flightstack.testing.flight_signals import MODES, FlightSignals
 from flightstack.testing.log import Log, LoggedText
 from flightstack.testing.properties import Margin, PropertyViolationError, Signals, parse_window
 from flightstack.testing.setup import Setup
 from gcs_cli.report.flight_data import Flight as FlightData
 from gcs_cli.report.flight_figures import rms
 from gcs_cli.report.flight_outcome import Outcome
-
-IndexArray: TypeAlias = np.ndarray[Any, np.dtype[np.intp]]
-_MODES = {number: mode.name for mode, number in NAVIGATION_STATE.items()}
 
 
 class Event(NamedTuple):
@@ -172,7 +168,7 @@ class Flight:
 
     def _landing_place(self) -> tuple[float, float] | None:
         data = self.data
-        returned = any(_MODES.get(status.nav_state) == "RETURN" for status in data.statuses)
+        returned = any(MODES.get(status.nav_state) == "RETURN" for status in data.statuses)
         lands = [item for item in self.plan.items if item.command == Command.NAV_LAND]
         if lands and not returned and lands[-1].position_deg is not None and data.origin is not None:
             latitude_deg, longitude_deg = lands[-1].position_deg
@@ -196,9 +192,7 @@ class Flight:
     def modes(self) -> tuple[ModeSpan, ...]:
         """The flight modes in order."""
         start_s = self.data.start_s
-        changes = [
-            (start_s + s.time_s, _MODES.get(s.nav_state, str(s.nav_state))) for s in self.data.statuses
-        ]
+        changes = [(start_s + s.time_s, MODES.get(s.nav_state, str(s.nav_state))) for s in self.data.statuses]
         spans: list[ModeSpan] = []
         ends = [*(begin_s for begin_s, _ in changes), start_s + self.data.duration_s][1:]
         for (begin_s, mode), end_s in zip(changes, ends, strict=True):
@@ -302,49 +296,8 @@ def start_ned_m(flight: Flight) -> FloatArray:
 
 def signals_of(flight: Flight) -> Signals:
     """Return the signals of a flight at the times of ``vehicle_local_position``: motion is the true one."""
-    data, log = flight.data, flight.log
-    time_s, position = data.actual_position
-    from_start = position - start_ned_m(flight)
-    velocity, attitude = data.actual_velocity.values, data.actual_attitude
-    angles = np.degrees(attitude.values[_newest(attitude.time_s, time_s)])
-    home = np.array(data.home_ne_m() or (0.0, 0.0))
-    setpoint = data.position_setpoint.values[_newest(data.position_setpoint.time_s, time_s)]
-    statuses, landed, mission = data.statuses, data.landed, data.mission
-    status = _newest([s.time_s for s in statuses], time_s)
-    progress = _newest([p.time_s for p in mission], time_s)
-    values = {
-        "time_s": time_s + data.start_s,
-        "mode": np.array([_MODES.get(s.nav_state, "") for s in statuses])[status],
-        "armed": np.array([s.armed for s in statuses])[status],
-        "landed": np.array([flag for _, flag in landed])[_newest([at_s for at_s, _ in landed], time_s)],
-        "failsafe": np.array([s.failsafe for s in statuses])[status],
-        "item": np.array([p.current if p.total else -1 for p in mission])[progress],
-        "altitude_m": -from_start[:, 2],
-        "north_m": from_start[:, 0],
-        "east_m": from_start[:, 1],
-        "speed_m_s": np.sqrt(velocity[:, 0] ** 2 + velocity[:, 1] ** 2),
-        "climb_m_s": -velocity[:, 2],
-        "roll_deg": angles[:, 0],
-        "pitch_deg": angles[:, 1],
-        "yaw_deg": angles[:, 2],
-        "distance_to_home_m": np.sqrt(np.square(position[:, :2] - home).sum(axis=1)),
-        "error_m": np.where(data.flying(time_s), np.linalg.norm(setpoint - position, axis=1), 0.0),
-        "battery_percent": _battery_percent(log, time_s + data.start_s),
-    }
+    values = FlightSignals(flight.data, flight.log, start_ned_m(flight))
     times: dict[str, list[float]] = {}
     for event in flight.events:
         times.setdefault(event.name, []).append(event.time_s)
     return Signals(values["time_s"], values, times)
-
-
-def _newest(times_s: Sequence[float] | FloatArray, at_s: FloatArray) -> IndexArray:
-    """Return for each time the index of the newest sample, the first one before it."""
-    return np.maximum(np.searchsorted(np.asarray(times_s) - 1e-9, at_s, side="right") - 1, 0)
-
-
-def _battery_percent(log: Log, time_s: FloatArray) -> FloatArray:
-    if "battery_status" not in log:
-        return np.full(len(time_s), math.nan)
-    battery = log["battery_status"]
-    percent: FloatArray = 100.0 * battery["remaining"][_newest(battery.time_s, time_s)].astype(float)
-    return percent

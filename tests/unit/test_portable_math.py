@@ -131,6 +131,7 @@ NOT_FLIGHT = (
     "flightstack/firmware/generator/",  # before a flight
     "flightstack/flight_log/poses_file.py",  # pictures
     "flightstack/testing/flight.py",  # figures of a flown flight
+    "flightstack/testing/flight_signals.py",  # the same
     "flightstack/testing/expectations.py",
     "flightstack/testing/link.py",  # random.Random of lossy links, integers alone
     "flightstack/plan/fence_shape.py",  # whether a plan is accepted

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +18,14 @@ from flightstack.testing import (
     PropertyViolationError,
     Setup,
     State,
+    flight_signals,
 )
+from flightstack.testing.expression import SIGNALS
+from flightstack.testing.flight import signals_of
 from flightstack.testing.log import unit_of
 from gcs_cli.report.analysis import flight_of
 from gcs_cli.report.summary import RunInfo, summarise
+from gcs_cli.scenarios.figures import metrics_of
 from tests.support.truth import World
 
 
@@ -82,6 +87,23 @@ def test_signals_agree_with_the_log(flight: Flight) -> None:
     assert part.time_s[0] >= 5.0
     assert part.time_s[-1] <= 6.0
     assert len(part.values["mode"]) == len(part.time_s)
+
+
+def test_signals_are_made_once_and_only_if_asked_for(flight: Flight, monkeypatch: pytest.MonkeyPatch) -> None:
+    values = signals_of(flight).values
+    assert list(values) == list(SIGNALS)
+    assert {values[name].shape for name in SIGNALS} == {flight.signals.time_s.shape}
+    known = values["roll_deg"]
+    monkeypatch.setattr(flight_signals, "MAKERS", {})
+    assert values["roll_deg"] is known
+    with pytest.raises(KeyError):
+        values["no_signal"]
+
+
+def test_figures_of_a_flight_need_few_signals(flight: Flight, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("mode", "item", "distance_to_home_m", "error_m"):
+        monkeypatch.delitem(flight_signals.MAKERS, name)
+    assert metrics_of(replace(flight))["max_tilt_deg"] > 1.0
 
 
 def test_error_is_that_of_the_flight(world: World) -> None:
