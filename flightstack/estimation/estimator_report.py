@@ -1,4 +1,4 @@
-"""Report of the estimator: flags, accuracies, innovations and resets, read from its memory on demand.
+"""Report of the estimator: flags, accuracies and ratios of innovations to their gates, read from its memory on demand.
 
 Flags have the bits of PX4: ``SolutionFlags`` are ESTIMATOR_STATUS_FLAGS, ``ControlFlags`` and ``RejectionFlags`` those
 of the topic ``estimator_status_flags``.
@@ -7,14 +7,15 @@ of the topic ``estimator_status_flags``.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from enum import IntEnum
 from typing import NamedTuple
 
-import numpy as np
-
-from flightstack.core.contract import Quaternion, Record, Vector3
-from flightstack.estimation.error_state import ATTITUDE, POSITION, WIND, Nominal
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import RecordArray
+from flightstack.estimation.error_state import ATTITUDE, POSITION, WIND, Covariance
 from flightstack.estimation.estimator_params import EstimatorParams
+from flightstack.estimation.health import STUCK_SAMPLES
+from flightstack.estimation.imu_track import IMU_MISSING_S, WINDOW, TrackArray, TrackRecord
 from flightstack.estimation.kalman import (
     BARO,
     GNSS_POSITION,
@@ -24,7 +25,7 @@ from flightstack.estimation.kalman import (
     RANGE,
     REST_VELOCITY,
 )
-from flightstack.estimation.memory import Flags
+from flightstack.estimation.memory import MemoryArray, MemoryRecord
 from flightstack.mavlink.dialect import mavlink
 
 AIDED_S = 1.0
@@ -38,7 +39,7 @@ _WIND_VARIANCE = 0.5
 _DELAY = EstimatorParams._fields.index("delay_s")
 
 
-class SolutionFlags:
+class SolutionFlags(IntEnum):
     """States that are good for flight, ESTIMATOR_STATUS_FLAGS."""
 
     ATTITUDE = mavlink.ESTIMATOR_ATTITUDE
@@ -55,7 +56,7 @@ class SolutionFlags:
     ACCEL_ERROR = mavlink.ESTIMATOR_ACCEL_ERROR
 
 
-class ControlFlags:
+class ControlFlags(IntEnum):
     """Alignment and sensors in use, by the bits of ``control_mode_flags``."""
 
     TILT_ALIGN = 1 << 0
@@ -74,7 +75,7 @@ class ControlFlags:
     GNSS_VELOCITY = 1 << 44
 
 
-class RejectionFlags:
+class RejectionFlags(IntEnum):
     """Newest measurements beyond their gates, by the bits of PX4's innovation faults."""
 
     VELOCITY_HORIZONTAL = 1 << 0
@@ -87,83 +88,31 @@ class RejectionFlags:
     HEIGHT_ABOVE_GROUND = 1 << 10
 
 
-class Observation(NamedTuple):
-    """Newest measurement of one quantity: innovation, its variance, and its ratio to the gate, 1 at the limit."""
-
-    innovation: float
-    variance: float
-    ratio: float
-    fused_s: float
-    """Time of the last accepted one; 0 before it."""
-
-
-class Resets(NamedTuple):
-    """Numbers of resets, and the change of each in the last step of the filter with one."""
-
-    position: int
-    position_change_m: Vector3
-    velocity: int
-    velocity_change_m_s: Vector3
-    yaw: int
-    yaw_change_rad: float
-
-
 class EstimatorReport(NamedTuple):
-    """State and quality of the estimate at one time. Deviations are 1σ."""
+    """Quality of the estimate at one time.
 
-    time_s: float
-    """Time of the output, that of the newest IMU sample."""
-    horizon_s: float
-    """Time of the filter's state, which is late by the longest delay of a sensor."""
+    Deviations are 1σ. Ratios are those of the newest measurement to its gate, 1 at the limit: the largest one of a
+    sensor's axes.
+    """
+
     solution: int
+    """``SolutionFlags``."""
     control: int
+    """``ControlFlags``."""
     rejected: int
-    state: tuple[float, ...]
-    """State at the horizon, 28 numbers in the order of ``Nominal``."""
-    variances: tuple[float, ...]
-    """Variance of each error state, 27."""
-    velocity: tuple[Observation, ...]
-    """Of GNSS, as the next one: north, east, down."""
-    position: tuple[Observation, ...]
-    height: Observation
-    """Of the barometer."""
-    field: tuple[Observation, ...]
-    """Of the magnetometer: forward, right, down."""
-    range: Observation | None
-    """None without a rangefinder."""
+    """``RejectionFlags``."""
     horizontal_accuracy_m: float
     vertical_accuracy_m: float
-    resets: Resets
-
-    @property
-    def velocity_ratio(self) -> float:
-        """Largest ratio of a GNSS velocity to its gate."""
-        return max(o.ratio for o in self.velocity)
-
-    @property
-    def position_ratio(self) -> float:
-        """Largest ratio of a horizontal GNSS position to its gate."""
-        return max(o.ratio for o in self.position[:2])
-
-    @property
-    def height_ratio(self) -> float:
-        """Ratio of the height to its gate: of the barometer, or of GNSS without one."""
-        return self.height.ratio if self.control & ControlFlags.BARO_HEIGHT else self.position[2].ratio
-
-    @property
-    def nominal(self) -> Nominal:
-        """The state at the horizon."""
-        return _nominal(self.state)
-
-    @property
-    def field_ratio(self) -> float:
-        """Largest ratio of the magnetic field to its gate."""
-        return max(o.ratio for o in self.field)
-
-    @property
-    def wind_variances(self) -> tuple[float, float]:
-        """Variances of the wind to north and east [m²/s²]."""
-        return self.variances[WIND], self.variances[WIND + 1]
+    velocity_ratio: float
+    """Of GNSS."""
+    position_ratio: float
+    """Of GNSS, horizontal."""
+    height_ratio: float
+    """Of the barometer, or of GNSS without one."""
+    field_ratio: float
+    """Of the magnetometer."""
+    range_ratio: float
+    """NaN without a rangefinder."""
 
     @property
     def wind_is_observed(self) -> bool:
@@ -171,126 +120,139 @@ class EstimatorReport(NamedTuple):
         return bool(self.control & ControlFlags.WIND)
 
 
-def estimator_report(memory: Record, time_s: float, imu_has_failed: bool) -> EstimatorReport:
-    """Return the report of a record of the estimator's ``MEMORY`` at ``time_s`` of the sensors.
+@compiled
+def imu_has_failed(track: TrackRecord, time_s: float) -> bool:
+    """Return True if the inertial sensor is missing at ``time_s``, or repeats its measurement."""
+    taken = track["taken"]
+    if taken == 0:
+        return True
+    age_s = time_s - track["rows"][(taken - 1) % WINDOW]["time_s"]
+    return bool(age_s > IMU_MISSING_S or track["repeats"] >= STUCK_SAMPLES)
+
+
+@compiled
+def report_kernel(memory: MemoryArray, track: TrackArray, time_s: float) -> EstimatorReport:
+    """Return the report of an estimator's memory at ``time_s`` of the sensors; ``track`` has the inertial samples.
 
     The flags compare with the time at which the horizon is if no sample is late: without samples the horizon stays.
     """
-    observed = memory["observations"].tolist()
-    rows, fused_s = [_observation(*row[:4]) for row in observed[: RANGE + 1]], [row[3] for row in observed]
-    variances = tuple(np.diagonal(memory["covariance"]).tolist())
-    flags = Flags(*memory["flags"].tolist())
-    now_s = time_s - float(memory["params"][_DELAY])
-    velocity, position = rows[GNSS_VELOCITY : GNSS_VELOCITY + 3], rows[GNSS_POSITION : GNSS_POSITION + 3]
-    field, height = rows[MAG : MAG + 3], rows[BARO]
-    range_finder = rows[RANGE] if flags.has_range else None
-    control = _control(now_s, flags, fused_s, variances)
-    rejected = _rejected(velocity, position, height, field, range_finder)
-    solution = _solution(now_s, flags, rows, control, rejected)
+    m = memory[0]
+    o, p, has_range = m["observations"], m["covariance"], m["flags"]["has_range"] != 0
+    now_s = time_s - m["params"][_DELAY]
+    control, rejected = _control(m, now_s), _rejected(o, has_range)
+    solution = _solution(m, now_s, control, rejected)
+    if imu_has_failed(track[0], time_s):
+        solution &= ~SolutionFlags.ATTITUDE
+    has_baro = control & ControlFlags.BARO_HEIGHT != 0
     return EstimatorReport(
-        time_s=float(memory["output"][0]),
-        horizon_s=float(memory["clock"][0]),
-        solution=solution & ~SolutionFlags.ATTITUDE if imu_has_failed else solution,
-        control=control,
-        rejected=rejected,
-        state=tuple(memory["nominal"].tolist()),
-        variances=variances,
-        velocity=tuple(velocity),
-        position=tuple(position),
-        height=height,
-        field=tuple(field),
-        range=range_finder,
-        horizontal_accuracy_m=_root(variances[POSITION] + variances[POSITION + 1]),
-        vertical_accuracy_m=_root(variances[POSITION + 2]),
-        resets=_resets(memory["resets"]),
+        solution,
+        control,
+        rejected,
+        _root(p[POSITION, POSITION] + p[POSITION + 1, POSITION + 1]),
+        _root(p[POSITION + 2, POSITION + 2]),
+        _ratio(o, GNSS_VELOCITY, 3),
+        _ratio(o, GNSS_POSITION, 2),
+        _ratio(o, BARO, 1) if has_baro else _ratio(o, GNSS_POSITION + 2, 1),
+        _ratio(o, MAG, 3),
+        _ratio(o, RANGE, 1) if has_range else math.nan,
     )
 
 
-def _observation(innovation: float, variance: float, test_ratio: float, fused_s: float) -> Observation:
-    """Return an observation of the first four numbers of ``Observed``."""
-    return Observation(innovation, variance, _root(test_ratio), fused_s)
-
-
+@compiled
 def _root(square: float) -> float:
     return math.nan if square < 0.0 else math.sqrt(square)
 
 
-def nominal_of(memory: Record) -> Nominal:
-    """Return the state at the horizon of a record of the estimator's ``MEMORY``."""
-    return _nominal(memory["nominal"].tolist())
+@compiled
+def _ratio(o: RecordArray, first: int, count: int) -> float:
+    """Return the largest ratio of ``count`` quantities."""
+    largest = _root(o[first]["test_ratio"])
+    for i in range(first + 1, first + count):
+        largest = max(largest, _root(o[i]["test_ratio"]))
+    return largest
 
 
-def _nominal(x: Sequence[float]) -> Nominal:
-    return Nominal(
-        Quaternion(*x[0:4]), Vector3(*x[4:7]), Vector3(*x[7:10]), Vector3(*x[10:13]), Vector3(*x[13:16]),
-        Vector3(*x[16:19]), Vector3(*x[19:22]), x[22], x[23], x[24], Vector3(*x[25:28]),
-    )  # fmt: skip
+@compiled
+def _exceeds(o: RecordArray, first: int, count: int) -> bool:
+    """Return True if a measurement of ``count`` quantities is beyond its gate."""
+    for i in range(first, first + count):  # noqa: SIM110  # compiled code has no ``any``
+        if _root(o[i]["test_ratio"]) > 1.0:
+            return True
+    return False
 
 
-def _resets(found: Record) -> Resets:
-    position, velocity, yaw = found["position"], found["velocity"], found["yaw"]
-    return Resets(
-        int(position["number"]), Vector3(*position["change"].tolist()),
-        int(velocity["number"]), Vector3(*velocity["change"].tolist()),
-        int(yaw["number"]), float(yaw["change_rad"]),
-    )  # fmt: skip
+@compiled
+def _fused_s(o: RecordArray, first: int, count: int) -> float:
+    """Return the time of the last accepted measurement of ``count`` quantities; 0 before it."""
+    latest_s = 0.0
+    for i in range(first, first + count):
+        latest_s = max(latest_s, o[i]["fused_s"])
+    return latest_s
 
 
-def _is_recent(fused_s: Sequence[float], now_s: float, limit_s: float) -> bool:
-    latest_s = max(fused_s)
-    return latest_s > 0.0 and now_s - latest_s < limit_s
+@compiled
+def _is_recent(fused_s: float, now_s: float, limit_s: float) -> bool:
+    return fused_s > 0.0 and now_s - fused_s < limit_s
 
 
-def _control(now_s: float, flags: Flags, fused_s: Sequence[float], variances: Sequence[float]) -> int:
-    if not flags.aligned:
+@compiled
+def _is_aided(o: RecordArray, first: int, count: int, now_s: float) -> bool:
+    return _is_recent(_fused_s(o, first, count), now_s, AIDED_S)
+
+
+@compiled
+def _has_tilt(p: Covariance) -> bool:
+    return bool(max(p[ATTITUDE, ATTITUDE], p[ATTITUDE + 1, ATTITUDE + 1]) < _TILT_RAD * _TILT_RAD)
+
+
+@compiled
+def _flag(flag: int, is_set: bool) -> int:
+    return flag if is_set else 0
+
+
+@compiled
+def _control(m: MemoryRecord, now_s: float) -> int:
+    o, p, flags = m["observations"], m["covariance"], m["flags"]
+    if flags["aligned"] == 0:
         return 0
-
-    def fused(at: int, count: int = 1) -> bool:
-        return _is_recent(fused_s[at : at + count], now_s, AIDED_S)
-
-    has_gnss = bool(flags.has_gnss)
-    at_rest = bool(flags.landed) and fused(REST_VELOCITY, 3)
-    has_position, has_velocity = has_gnss and fused(GNSS_POSITION, 2), has_gnss and fused(GNSS_VELOCITY, 2)
-    is_true = (
-        (ControlFlags.TILT_ALIGN, max(variances[ATTITUDE : ATTITUDE + 2]) < _TILT_RAD * _TILT_RAD),
-        (ControlFlags.YAW_ALIGN, variances[ATTITUDE + 2] < _YAW_RAD * _YAW_RAD),
-        (ControlFlags.GNSS_POSITION, has_position),
-        (ControlFlags.MAG_3D, fused(MAG, 3)),
-        (ControlFlags.IN_AIR, not flags.landed),
-        (ControlFlags.WIND, max(variances[WIND : WIND + 2]) < _WIND_VARIANCE),
-        (ControlFlags.BARO_HEIGHT, bool(flags.has_baro) and fused(BARO)),
-        (ControlFlags.RANGE_HEIGHT, bool(flags.has_range) and fused(RANGE)),
-        (ControlFlags.GNSS_HEIGHT, has_gnss and fused(GNSS_POSITION + 2)),
-        (ControlFlags.MAG_FAULT, bool(flags.mag_fault)),
-        (ControlFlags.VEHICLE_AT_REST, at_rest),
-        (ControlFlags.INERTIAL_DEAD_RECKONING, not (has_position or has_velocity or at_rest)),
-        (ControlFlags.FAKE_POSITION, fused(HOLD_POSITION, 2)),
-        (ControlFlags.GNSS_VELOCITY, has_velocity),
+    has_gnss, landed = flags["has_gnss"] != 0, flags["landed"] != 0
+    at_rest = landed and _is_aided(o, REST_VELOCITY, 3, now_s)
+    has_position = has_gnss and _is_aided(o, GNSS_POSITION, 2, now_s)
+    has_velocity = has_gnss and _is_aided(o, GNSS_VELOCITY, 2, now_s)
+    has_baro = flags["has_baro"] != 0 and _is_aided(o, BARO, 1, now_s)
+    has_range = flags["has_range"] != 0 and _is_aided(o, RANGE, 1, now_s)
+    knows_wind = max(p[WIND, WIND], p[WIND + 1, WIND + 1]) < _WIND_VARIANCE
+    return (
+        _flag(ControlFlags.TILT_ALIGN, _has_tilt(p))
+        | _flag(ControlFlags.YAW_ALIGN, p[ATTITUDE + 2, ATTITUDE + 2] < _YAW_RAD * _YAW_RAD)
+        | _flag(ControlFlags.GNSS_POSITION, has_position)
+        | _flag(ControlFlags.MAG_3D, _is_aided(o, MAG, 3, now_s))
+        | _flag(ControlFlags.IN_AIR, not landed)
+        | _flag(ControlFlags.WIND, knows_wind)
+        | _flag(ControlFlags.BARO_HEIGHT, has_baro)
+        | _flag(ControlFlags.RANGE_HEIGHT, has_range)
+        | _flag(ControlFlags.GNSS_HEIGHT, has_gnss and _is_aided(o, GNSS_POSITION + 2, 1, now_s))
+        | _flag(ControlFlags.MAG_FAULT, flags["mag_fault"] != 0)
+        | _flag(ControlFlags.VEHICLE_AT_REST, at_rest)
+        | _flag(ControlFlags.INERTIAL_DEAD_RECKONING, not (has_position or has_velocity or at_rest))
+        | _flag(ControlFlags.FAKE_POSITION, _is_aided(o, HOLD_POSITION, 2, now_s))
+        | _flag(ControlFlags.GNSS_VELOCITY, has_velocity)
     )
-    return sum(flag for flag, value in is_true if value)
 
 
-def _rejected(
-    velocity: Sequence[Observation],
-    position: Sequence[Observation],
-    height: Observation,
-    field: Sequence[Observation],
-    range_finder: Observation | None,
-) -> int:
-    def beyond(rows: Sequence[Observation]) -> bool:
-        return any(row.ratio > 1.0 for row in rows)
-
-    is_true = (
-        (RejectionFlags.VELOCITY_HORIZONTAL, beyond(velocity[:2])),
-        (RejectionFlags.VELOCITY_VERTICAL, beyond(velocity[2:])),
-        (RejectionFlags.POSITION_HORIZONTAL, beyond(position[:2])),
-        (RejectionFlags.POSITION_VERTICAL, beyond([height, *position[2:]])),
-        (RejectionFlags.MAG_X, beyond(field[:1])),
-        (RejectionFlags.MAG_Y, beyond(field[1:2])),
-        (RejectionFlags.MAG_Z, beyond(field[2:])),
-        (RejectionFlags.HEIGHT_ABOVE_GROUND, range_finder is not None and beyond([range_finder])),
+@compiled
+def _rejected(o: RecordArray, has_range: bool) -> int:
+    height = _exceeds(o, BARO, 1) or _exceeds(o, GNSS_POSITION + 2, 1)
+    return (
+        _flag(RejectionFlags.VELOCITY_HORIZONTAL, _exceeds(o, GNSS_VELOCITY, 2))
+        | _flag(RejectionFlags.VELOCITY_VERTICAL, _exceeds(o, GNSS_VELOCITY + 2, 1))
+        | _flag(RejectionFlags.POSITION_HORIZONTAL, _exceeds(o, GNSS_POSITION, 2))
+        | _flag(RejectionFlags.POSITION_VERTICAL, height)
+        | _flag(RejectionFlags.MAG_X, _exceeds(o, MAG, 1))
+        | _flag(RejectionFlags.MAG_Y, _exceeds(o, MAG + 1, 1))
+        | _flag(RejectionFlags.MAG_Z, _exceeds(o, MAG + 2, 1))
+        | _flag(RejectionFlags.HEIGHT_ABOVE_GROUND, has_range and _exceeds(o, RANGE, 1))
     )
-    return sum(flag for flag, value in is_true if value)
 
 
 _GNSS_REJECTIONS = (
@@ -299,39 +261,31 @@ _GNSS_REJECTIONS = (
 _FIELD_REJECTIONS = RejectionFlags.MAG_X | RejectionFlags.MAG_Y | RejectionFlags.MAG_Z
 
 
-def _solution(
-    now_s: float,
-    flags: Flags,
-    rows: Sequence[Observation],
-    control: int,
-    rejected: int,
-) -> int:
-    if not flags.aligned:
+@compiled
+def _solution(m: MemoryRecord, now_s: float, control: int, rejected: int) -> int:
+    o = m["observations"]
+    if m["flags"]["aligned"] == 0:
         return 0
-    has_gnss = bool(flags.has_gnss)
-    gnss = (GNSS_VELOCITY, GNSS_VELOCITY + 1, GNSS_POSITION, GNSS_POSITION + 1)
-    at_rest = bool(control & ControlFlags.VEHICLE_AT_REST)
-    horizontal = has_gnss and (
-        at_rest or _is_recent([rows[at].fused_s for at in gnss], now_s, DEAD_RECKONING_S)
+    at_rest = control & ControlFlags.VEHICLE_AT_REST != 0
+    horizontal_s = max(_fused_s(o, GNSS_VELOCITY, 2), _fused_s(o, GNSS_POSITION, 2))
+    vertical_s = max(o[BARO]["fused_s"], o[GNSS_POSITION + 2]["fused_s"], o[GNSS_VELOCITY + 2]["fused_s"])
+    has_gnss = m["flags"]["has_gnss"] != 0
+    horizontal = has_gnss and (at_rest or _is_recent(horizontal_s, now_s, DEAD_RECKONING_S))
+    vertical = _is_recent(vertical_s, now_s, DEAD_RECKONING_S)
+    fall = o[GNSS_VELOCITY + 2]["innovation"] * -o[BARO]["innovation"]  # of one sign if the IMU is wrong
+    is_wrong = fall > 0.0 and _exceeds(o, GNSS_VELOCITY + 2, 1) and _exceeds(o, BARO, 1)
+    is_glitch = rejected & _GNSS_REJECTIONS != 0 and rejected & _FIELD_REJECTIONS == 0
+    return (
+        _flag(SolutionFlags.ATTITUDE, control & ControlFlags.TILT_ALIGN != 0)
+        | _flag(SolutionFlags.VELOCITY_HORIZONTAL, horizontal)
+        | _flag(SolutionFlags.VELOCITY_VERTICAL, vertical)
+        | _flag(SolutionFlags.POSITION_RELATIVE, horizontal)
+        | _flag(SolutionFlags.POSITION_ABSOLUTE, horizontal)
+        | _flag(SolutionFlags.HEIGHT_ABSOLUTE, vertical)
+        | _flag(SolutionFlags.HEIGHT_ABOVE_GROUND, control & ControlFlags.RANGE_HEIGHT != 0)
+        | _flag(SolutionFlags.CONSTANT_POSITION, not horizontal)
+        | _flag(SolutionFlags.PREDICTED_RELATIVE, horizontal)
+        | _flag(SolutionFlags.PREDICTED_ABSOLUTE, horizontal)
+        | _flag(SolutionFlags.GNSS_GLITCH, is_glitch)
+        | _flag(SolutionFlags.ACCEL_ERROR, is_wrong)
     )
-    heights = (BARO, GNSS_POSITION + 2, GNSS_VELOCITY + 2)
-    vertical = _is_recent([rows[at].fused_s for at in heights], now_s, DEAD_RECKONING_S)
-    fall = rows[GNSS_VELOCITY + 2].innovation * -rows[BARO].innovation  # of one sign if the IMU is wrong
-    is_true = (
-        (SolutionFlags.ATTITUDE, bool(control & ControlFlags.TILT_ALIGN)),
-        (SolutionFlags.VELOCITY_HORIZONTAL, horizontal),
-        (SolutionFlags.VELOCITY_VERTICAL, vertical),
-        (SolutionFlags.POSITION_RELATIVE, horizontal),
-        (SolutionFlags.POSITION_ABSOLUTE, horizontal),
-        (SolutionFlags.HEIGHT_ABSOLUTE, vertical),
-        (SolutionFlags.HEIGHT_ABOVE_GROUND, bool(control & ControlFlags.RANGE_HEIGHT)),
-        (SolutionFlags.CONSTANT_POSITION, not horizontal),
-        (SolutionFlags.PREDICTED_RELATIVE, horizontal),
-        (SolutionFlags.PREDICTED_ABSOLUTE, horizontal),
-        (SolutionFlags.GNSS_GLITCH, bool(rejected & _GNSS_REJECTIONS) and not rejected & _FIELD_REJECTIONS),
-        (
-            SolutionFlags.ACCEL_ERROR,
-            fall > 0.0 and rows[GNSS_VELOCITY + 2].ratio > 1.0 and rows[BARO].ratio > 1.0,
-        ),
-    )
-    return sum(flag for flag, value in is_true if value)

@@ -183,9 +183,3 @@ class ImuTrack:
             return None
         time_s, dt_s, *values = self.ring[(count - 1) % WINDOW].tolist()
         return ImuSample(time_s, dt_s, Vector3(*values[:3]), Vector3(*values[3:]))
-
-    @property
-    def window(self) -> tuple[FloatArray, int]:
-        """The last samples, shape (n, 8), and the index of the oldest one, which the others follow in a ring."""
-        count = self._taken[0]
-        return (self.ring[:count], 0) if count <= WINDOW else (self.ring, count % WINDOW)

@@ -5,38 +5,20 @@ Each record is made when it is first asked for.
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
-from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray, Quaternion, Record, Vector3
-from flightstack.estimation.error_state import Nominal
-from flightstack.estimation.estimator_report import EstimatorReport, estimator_report, nominal_of
-from flightstack.estimation.health import STUCK_SAMPLES
-from flightstack.estimation.imu_track import IMU_MISSING_S
+from flightstack.core.compiled import plain
+from flightstack.core.contract import FloatArray, Quaternion, Record, RecordArray, Vector3
+from flightstack.estimation.error_state import WIND, Nominal
+from flightstack.estimation.estimator_report import EstimatorReport, imu_has_failed, report_kernel
 from flightstack.estimation.motion_covariance import motion_covariance, pose_covariance, twist_covariance
+from flightstack.estimation.resets import count_of_resets
 from flightstack.estimation.selector import LaneReport
 from flightstack.estimation.sensor_feed import NewestSamples
-
-
-class Vibration(NamedTuple):
-    """Vibration of an inertial sensor, by the measures of PX4's topic ``vehicle_imu_status``.
-
-    Means over the window; zero before two samples.
-    """
-
-    coning_rad2: float = 0.0
-    """Size of the cross product of successive delta angles."""
-    gyro_rad_s: float = 0.0
-    """Size of the change of the rates from one sample to the next."""
-    accel_m_s2: float = 0.0
-    """The same of the specific force."""
-
-
-STILL = Vibration()
+from flightstack.estimation.vibration import Vibration, vibration_kernel
 
 
 class Sensed:
@@ -44,13 +26,13 @@ class Sensed:
 
     def __init__(
         self,
-        memory: Record,
+        memory: RecordArray,
         samples: NewestSamples,
         has_origin: bool = True,
         time_s: float | None = None,
         lanes: LaneReport | None = None,
     ) -> None:
-        """``memory`` is the estimator's record; both change with time, so read this before the next sample.
+        """``memory`` is the estimator's; both change with time, so read this before the next sample.
 
         ``has_origin`` is True after the first fix. ``time_s`` is the time of the newest message of sensors, which
         advances without samples; None means the time of the newest sample of the inertial sensor. ``lanes`` is None for
@@ -58,72 +40,60 @@ class Sensed:
         """
         self.lanes = lanes
         self.memory = memory
+        self._record: Record = memory[0]
+        self.track = samples.imu_track.memory
         self.samples = samples
         self.has_origin = has_origin
-        self.time_s = float(memory["output"][0]) if time_s is None else time_s
+        self.time_s = float(memory["output"][0, 0]) if time_s is None else time_s
         """Time of the sensors."""
 
     @cached_property
     def report(self) -> EstimatorReport:
-        """Flags, accuracies, innovations and resets of the estimator."""
-        return estimator_report(self.memory, self.time_s, self.imu_has_failed)
+        """Flags, accuracies and ratios of the estimator."""
+        return report_kernel(self.memory, self.track, self.time_s)
 
     @cached_property
     def imu_has_failed(self) -> bool:
         """True if the inertial sensor is missing, or repeats its measurement."""
-        imu, track = self.samples.imu, self.samples.imu_track
-        return imu is None or self.time_s - imu.time_s > IMU_MISSING_S or track.repeats >= STUCK_SAMPLES
+        return plain(imu_has_failed)(self.track[0], self.time_s)
 
     @cached_property
     def nominal(self) -> Nominal:
         """State at the delayed horizon."""
-        return nominal_of(self.memory)
+        return _nominal(self._record["nominal"].tolist())
+
+    @property
+    def wind_variances(self) -> tuple[float, float]:
+        """Variances of the wind to north and east [m²/s²]."""
+        covariance = self._record["covariance"]
+        return float(covariance[WIND, WIND]), float(covariance[WIND + 1, WIND + 1])
+
+    @property
+    def resets(self) -> int:
+        """Number of resets of the estimate, of any kind."""
+        return int(plain(count_of_resets)(self._record))
 
     @cached_property
     def vibration(self) -> Vibration:
         """Vibration of the inertial sensor."""
-        return vibration_of(*self.samples.imu_track.window)
+        with np.errstate(all="ignore"):  # absurd measurements, uncompiled
+            return vibration_kernel(self.track)
 
     def pose_covariance(self, attitude: Quaternion) -> FloatArray:
         """Return the covariance of position and attitude, shape (6, 6)."""
-        return pose_covariance(self.memory, attitude)
+        return pose_covariance(self._record, attitude)
 
     def twist_covariance(self, attitude: Quaternion, velocity_ned_m_s: Vector3) -> FloatArray:
         """Return the covariance of velocity in body axes and rates, shape (6, 6)."""
-        return twist_covariance(self.memory, attitude, velocity_ned_m_s)
+        return twist_covariance(self._record, attitude, velocity_ned_m_s)
 
     def motion_covariance(self, attitude: Quaternion, force_frd_m_s2: Vector3) -> FloatArray:
         """Return the covariance of position, velocity and acceleration in NED, shape (9, 9)."""
-        return motion_covariance(self.memory, attitude, force_frd_m_s2)
+        return motion_covariance(self._record, attitude, force_frd_m_s2)
 
 
-@compiled
-def _size(x: float, y: float, z: float) -> float:
-    return math.sqrt(x * x + y * y + z * z)
-
-
-@compiled
-def _vibration(rows: FloatArray, first: int, sizes: FloatArray) -> None:
-    """Write the sums of the sizes of ``Vibration`` in the samples of a ring whose oldest row is ``first``."""
-    count = len(rows)
-    sizes[:] = 0.0
-    for k in range(1, count):
-        a, b = rows[(first + k - 1) % count], rows[(first + k) % count]
-        ax, ay, az = a[2] * a[1], a[3] * a[1], a[4] * a[1]
-        bx, by, bz = b[2] * b[1], b[3] * b[1], b[4] * b[1]
-        sizes[0] += _size(ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
-        sizes[1] += _size(b[2] - a[2], b[3] - a[3], b[4] - a[4])
-        sizes[2] += _size(b[5] - a[5], b[6] - a[6], b[7] - a[7])
-
-
-def vibration_of(rows: FloatArray, first: int = 0) -> Vibration:
-    """Return the vibration in successive samples, shape (n, 8): time, duration, rates, specific force.
-
-    They begin with the row ``first``, and go on at the first row after the last one.
-    """
-    if len(rows) < 2:
-        return STILL
-    sizes = np.empty(3)
-    with np.errstate(all="ignore"):  # absurd measurements
-        _vibration(rows, first, sizes)
-        return Vibration(*(sizes / (len(rows) - 1)).tolist())
+def _nominal(x: Sequence[float]) -> Nominal:
+    return Nominal(
+        Quaternion(*x[0:4]), Vector3(*x[4:7]), Vector3(*x[7:10]), Vector3(*x[10:13]), Vector3(*x[13:16]),
+        Vector3(*x[16:19]), Vector3(*x[19:22]), x[22], x[23], x[24], Vector3(*x[25:28]),
+    )  # fmt: skip

@@ -6,12 +6,17 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from flightstack.core.array_items import store
+from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
-from flightstack.estimation.error_state import NOMINAL_SIZE
-from flightstack.estimation.estimator_report import ControlFlags, RejectionFlags
+from flightstack.estimation.error_state import NOMINAL_SIZE, WIND, read_nominal
+from flightstack.estimation.estimator_report import ControlFlags, RejectionFlags, report_kernel
+from flightstack.estimation.imu_track import TrackArray
 from flightstack.estimation.kalman import BARO, GNSS_POSITION, GNSS_VELOCITY, MAG, OBSERVATIONS, RANGE
+from flightstack.estimation.memory import MemoryArray, MemoryRecord
 from flightstack.estimation.selector import SPEED_M_S, TURN_RAD, LaneReport
-from flightstack.estimation.sensed import Sensed
+from flightstack.estimation.vibration import vibration_kernel
+from flightstack.flight_log.local_position import count_of
 from flightstack.flight_log.topics import Bit, Field, Group, Opposite, Topic
 
 _DEVICE = 1
@@ -300,29 +305,43 @@ def fill_selector(row: FloatArray, report: LaneReport) -> None:
         row[at : at + count] = values
 
 
-def fill_wind(row: FloatArray, sensed: Sensed) -> None:
-    """Fill a row of ``WIND_GROUP``."""
-    report, wind = sensed.report, sensed.report.nominal
-    row[:] = _us(report.horizon_s), wind.wind_north_m_s, wind.wind_east_m_s, *report.wind_variances
-
-
 def _us(time_s: float) -> int:
     return max(0, round(time_s * 1e6))
 
 
-def fill_estimator(row: FloatArray, sensed: Sensed) -> None:
-    """Fill a row of ``ESTIMATOR``."""
-    report, resets = sensed.report, sensed.report.resets
-    row[: AT.nominal] = (
+@compiled
+def _horizon_us(m: MemoryRecord) -> int:
+    time_us: int = max(0, round(m["clock"][0] * 1e6))
+    return time_us
+
+
+@compiled
+def store_estimator(
+    memory: MemoryArray, track: TrackArray, time_s: float, row: FloatArray, wind: FloatArray
+) -> int:
+    """Fill a row of ``ESTIMATOR``, and ``wind``, one of ``WIND_GROUP``; return 1 if the wind is observed, else 0.
+
+    ``track`` has the inertial samples, ``time_s`` is the time of the sensors.
+    """
+    report, m = report_kernel(memory, track, time_s), memory[0]
+    vibration, has_range, resets = vibration_kernel(track), m["flags"]["has_range"] != 0, m["resets"]
+    position, velocity, yaw = resets["position"], resets["velocity"], resets["yaw"]
+    store(row, (
         report.solution, report.control, report.rejected,
         report.horizontal_accuracy_m, report.vertical_accuracy_m,
         report.field_ratio, report.velocity_ratio, report.position_ratio, report.height_ratio,
-        0.0 if report.range is None else report.range.ratio,
-        resets.velocity & 0xFF, resets.position & 0xFF, resets.yaw & 0xFF,
-        *sensed.vibration, _us(report.horizon_s),
-    )  # fmt: skip
-    row[AT.nominal : AT.variances] = sensed.memory["nominal"]
-    row[AT.variances : AT.variances + _KNOWN_VARIANCES] = report.variances[:_KNOWN_VARIANCES]
-    observed = sensed.memory["observations"]
-    columns = row[AT.innovations :].reshape(3, OBSERVATIONS)
-    columns[0], columns[1], columns[2] = observed["innovation"], observed["variance"], observed["test_ratio"]
+        report.range_ratio if has_range else 0.0,
+        count_of(velocity["number"]), count_of(position["number"]), count_of(yaw["number"]),
+        vibration.coning_rad2, vibration.gyro_rad_s, vibration.accel_m_s2, _horizon_us(m),
+    ))  # fmt: skip
+    x, p, observed = m["nominal"], m["covariance"], m["observations"]
+    store(row[AT.nominal :], x)
+    for i in range(_KNOWN_VARIANCES):
+        row[AT.variances + i] = p[i, i]
+    for i in range(OBSERVATIONS):
+        row[AT.innovations + i] = observed[i]["innovation"]
+        row[AT.innovations + OBSERVATIONS + i] = observed[i]["variance"]
+        row[AT.innovations + 2 * OBSERVATIONS + i] = observed[i]["test_ratio"]
+    n = read_nominal(x)
+    store(wind, (_horizon_us(m), n.wind_north_m_s, n.wind_east_m_s, p[WIND, WIND], p[WIND + 1, WIND + 1]))
+    return 1 if report.control & ControlFlags.WIND != 0 else 0

@@ -8,10 +8,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from flightstack.core.array_items import store
+from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
 from flightstack.estimation.error_state import ATTITUDE, VELOCITY
-from flightstack.estimation.estimator_report import ControlFlags, SolutionFlags
-from flightstack.estimation.sensed import Sensed
+from flightstack.estimation.estimator_report import ControlFlags, SolutionFlags, report_kernel
+from flightstack.estimation.imu_track import TrackArray
+from flightstack.estimation.memory import MemoryArray
 from flightstack.flight_log.topics import OUTER, OUTER_TOPICS, Field, Group, Topic
 
 
@@ -68,21 +71,42 @@ LOCAL_POSITION = Topic(
 SENSED_OUTER = Group("outer", AT.size, (LOCAL_POSITION, *OUTER_TOPICS[1:]))
 
 
-def fill_local_position(row: FloatArray, sensed: Sensed) -> bool:
-    """Fill the columns of the estimate, shape (23,); return True if the horizontal position is valid."""
-    report, resets, variances = sensed.report, sensed.report.resets, sensed.report.variances
-    solution, has_origin = report.solution, sensed.has_origin
-    horizontal = has_origin and bool(solution & SolutionFlags.POSITION_RELATIVE)
-    vertical = bool(solution & SolutionFlags.HEIGHT_ABSOLUTE)
-    row[:] = (
-        *resets.position_change_m, *resets.velocity_change_m_s, resets.yaw_change_rad,
-        variances[ATTITUDE + 2], report.horizontal_accuracy_m, report.vertical_accuracy_m,
-        math.sqrt(abs(variances[VELOCITY] + variances[VELOCITY + 1])), math.sqrt(abs(variances[VELOCITY + 2])),
-        resets.position & 0xFF, resets.velocity & 0xFF, resets.yaw & 0xFF,
+@compiled
+def count_of(resets: float) -> int:
+    """Return a number of resets as topics have it, modulo 256."""
+    return int(resets) & 0xFF
+
+
+@compiled
+def store_local_position(
+    memory: MemoryArray, track: TrackArray, has_origin: bool, time_s: float, row: FloatArray
+) -> int:
+    """Fill the columns of the estimate in a row of the outer loop, shape (23,), those of ``LocalColumns``.
+
+    ``track`` has the inertial samples, ``time_s`` is the time of the sensors, ``has_origin`` is True after the first
+    fix. Return 1 if the horizontal position is valid, else 0.
+    """
+    report, m = report_kernel(memory, track, time_s), memory[0]
+    p, position, velocity, yaw = (
+        m["covariance"],
+        m["resets"]["position"],
+        m["resets"]["velocity"],
+        m["resets"]["yaw"],
+    )
+    moved_m, moved_m_s = position["change"], velocity["change"]
+    solution, control = report.solution, report.control
+    horizontal = has_origin and solution & SolutionFlags.POSITION_RELATIVE != 0
+    vertical = solution & SolutionFlags.HEIGHT_ABSOLUTE != 0
+    store(row, (
+        moved_m[0], moved_m[1], moved_m[2], moved_m_s[0], moved_m_s[1], moved_m_s[2], yaw["change_rad"],
+        p[ATTITUDE + 2, ATTITUDE + 2], report.horizontal_accuracy_m, report.vertical_accuracy_m,
+        math.sqrt(abs(p[VELOCITY, VELOCITY] + p[VELOCITY + 1, VELOCITY + 1])),
+        math.sqrt(abs(p[VELOCITY + 2, VELOCITY + 2])),
+        count_of(position["number"]), count_of(velocity["number"]), count_of(yaw["number"]),
         horizontal, vertical,
-        bool(solution & SolutionFlags.VELOCITY_HORIZONTAL), bool(solution & SolutionFlags.VELOCITY_VERTICAL),
-        bool(report.control & ControlFlags.YAW_ALIGN),
-        has_origin and bool(solution & SolutionFlags.POSITION_ABSOLUTE), has_origin and vertical,
-        bool(report.control & ControlFlags.INERTIAL_DEAD_RECKONING),
-    )  # fmt: skip
-    return horizontal
+        solution & SolutionFlags.VELOCITY_HORIZONTAL != 0, solution & SolutionFlags.VELOCITY_VERTICAL != 0,
+        control & ControlFlags.YAW_ALIGN != 0,
+        has_origin and solution & SolutionFlags.POSITION_ABSOLUTE != 0, has_origin and vertical,
+        control & ControlFlags.INERTIAL_DEAD_RECKONING != 0,
+    ))  # fmt: skip
+    return 1 if horizontal else 0

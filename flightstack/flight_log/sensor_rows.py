@@ -1,11 +1,34 @@
-"""Rows of the flight log for samples that quiet ticks record as well."""
+"""Rows of the flight log for samples and true states that quiet ticks record as well, and when rows are due."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
 from flightstack.core.portable_math import atan2, distance
+from flightstack.core.record_types import dtype_of
 from flightstack.simulator_link.gps_kernels import FixRow
+
+TRUTH_INTERVAL_US, GLOBAL_INTERVAL_US, ESTIMATOR_INTERVAL_US = 10_000, 100_000, 500_000
+"""Intervals of PX4's logger; the last one is also that of the validity and accuracy of the local position."""
+INVALID_INTERVAL_US = 100_000
+"""That interval while the position is not valid."""
+
+
+class DueTimes(NamedTuple):
+    """Time of the next row of each kind that comes at intervals, ``NEVER_US`` without a log."""
+
+    local_us: int
+    """Of the columns of the estimate in the rows of the outer loop, which are made without a log too."""
+    truth_us: int
+    """Of the true state."""
+    global_us: int
+    """Of its place on the earth, which is recorded with it."""
+    estimator_us: int
+
+
+DUE_TIMES = dtype_of(DueTimes)
 
 _GAS_CONSTANT_DRY_AIR = 287.1
 _KELVIN = 273.15

@@ -60,7 +60,10 @@ _KERNELS = (
     "follow_rotors", "detect", "fence_step", "store_outer_row", "put_rows", "read_motion", "pack_frames",
 )  # fmt: skip
 _LOOP_KERNELS = ("inner_kernel", "outer_kernel")
-_ESTIMATOR_KERNELS = ("imu_kernel", "push_kernel", "field_kernel", "update_health")
+_ESTIMATOR_KERNELS = (
+    "imu_kernel", "push_kernel", "field_kernel", "update_health", "report_kernel", "store_local_position",
+    "store_estimator",
+)  # fmt: skip
 _C_FILTER_KERNELS = ("move_clock_kernel",)
 """Kernels that read the memory of the estimator in C."""
 _REAL_TIME_KERNELS = ("stream_kernel",)

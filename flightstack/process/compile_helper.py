@@ -26,10 +26,13 @@ from flightstack.core.kernels.cache import is_shared
 from flightstack.estimation.agenda import fuse_next
 from flightstack.estimation.delayed_filter import field_kernel, imu_kernel, push_kernel
 from flightstack.estimation.estimator_params import PARAMS_SIZE, EstimatorParams
+from flightstack.estimation.estimator_report import report_kernel
 from flightstack.estimation.health import HealthMonitor
 from flightstack.estimation.imu_track import ImuTrack
 from flightstack.estimation.memory import MEMORY, filter_of, rings_of
 from flightstack.estimation.rings import MAG_RING
+from flightstack.flight_log.estimator_topics import store_estimator
+from flightstack.flight_log.local_position import store_local_position
 from flightstack.flight_log.recorder import FlightRecorder
 from flightstack.guidance.kernels import goal_kernel
 from flightstack.guidance.navigator import Navigator
@@ -145,11 +148,14 @@ def compile_commander() -> None:
 
 def compile_estimator() -> None:
     """Compile the kernels of the estimator besides that of the IMU, which takes longer than all others."""
-    memory = np.zeros(1, MEMORY)
+    memory, track = np.zeros(1, MEMORY), ImuTrack().memory
     watch = HealthMonitor(memory).watch
-    direct(watch_estimate, memory, watch, ImuTrack().memory, np.zeros(1, LIMITS), False, False, 0.0)
+    direct(watch_estimate, memory, watch, track, np.zeros(1, LIMITS), False, False, 0.0)
     direct(push_kernel, memory, MAG_RING, np.zeros(4))
     direct(field_kernel, memory)
+    direct(report_kernel, memory, track, 0.0)
+    direct(store_local_position, memory, track, False, 0.0, np.zeros(0))
+    direct(store_estimator, memory, track, 0.0, np.zeros(0), np.zeros(0))
 
 
 def compile_measurements() -> None:

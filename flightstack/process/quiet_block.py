@@ -91,8 +91,6 @@ class QuietBlock:
         self._interval_us, self._divisor = stack.rates.interval_us, stack.rates.divisor
         self.waited = False
         """True if the last tick of ``run`` waited for Python."""
-        self.has_taken = False
-        """True if the last ``run`` ended with the state of a tick that is not run."""
         self.on_passed: Callable[[PassedTicks], None] | None = None
         """Called after the kernel with its ticks, before anything else follows them."""
         self._passed = PassedTicks(stack.now, self._divisor, self._interval_us)
@@ -102,7 +100,7 @@ class QuietBlock:
         self._no_imu_log = Trace(DEFAULT_CAPACITY, RECORD_SIZE, lambda: None)
         sensing = sensing_of(stack, simulator.wires)
         constant = self._constant(sensing)
-        changing = self._changing(0, False, False, self._no_log, self._no_imu_log)
+        changing = self._changing(0, False, self._no_log, self._no_imu_log)
         self._fly = partial(direct(fly_quiet_ticks, *constant, *changing), *constant)
 
     def _addresses(self, sensing: _Arguments) -> RecordArray:
@@ -113,15 +111,14 @@ class QuietBlock:
             self._simulator.step,
             address_of(loops.kernel, now.state, 1.0, now.rotor_speed, loops.memory, row),
             address_of(follow_rotors, row, faults.rotors, faults.lags),
-            *(0, 0, 0, 0),
+            *(0,) * (len(QuietCalls._fields) - 3),
         )
         if self._estimation is not None:
             track, record = self._estimation.feed.lanes[0].newest.imu_track, self._no_imu_log.rows[0]
             calls = calls._replace(
                 take=address_of(take_wire, track.memory, sensing[0][0], 0.0, 1, record),
                 estimate=address_of(imu_kernel, self._estimation.estimators[0].memory, track.ring[0]),
-                push=self._sensors.push,
-                watch=self._sensors.watch,
+                **self._sensors.calls,
             )
         return np.array([calls], QUIET_CALLS)
 
@@ -138,12 +135,12 @@ class QuietBlock:
             simulator.world, simulator.commands, sensing, self._sensors.constant, control,
         )  # fmt: skip
 
-    def _changing(self, count: int, is_taken: bool, takes_on: bool, log: Trace, imu_log: Trace) -> _Arguments:
+    def _changing(self, count: int, is_taken: bool, log: Trace, imu_log: Trace) -> _Arguments:
         """Return the other arguments of the kernel."""
         now, estimation, link = self._stack.now, self._estimation, self._stack.simulator
         estimate = self._estimates[0 if estimation is None else estimation.feed.selected]
         return (
-            count, is_taken, takes_on, self._autopilot.next_outer, now.time_us, link.stamp_us - link.time_us,
+            count, is_taken, self._autopilot.next_outer, now.time_us, link.stamp_us - link.time_us,
             link.flags(now.status.armed) | VALID_FLAG, self._flies, now.row, estimate, self._sensors.following(),
             self._outer.arguments(), (log.rows, log.times_us, log.n), (imu_log.rows, imu_log.times_us, imu_log.n),
         )  # fmt: skip
@@ -203,36 +200,16 @@ class QuietBlock:
         self.waited |= happened
         return done
 
-    def run_on(self, most: int, takes_on: bool) -> int:
-        """Run the ticks that follow the present one, ``most`` at most, and return their number.
-
-        With ``takes_on`` they go on after a record of the estimate that is due in an outer tick.
-        """
+    def run_on(self, most: int) -> int:
+        """Run the ticks that follow the present one, ``most`` at most, and return their number."""
         count = min(most, self.count(runs_on=True))
-        until_record = self._quiet_intervals(self._stack.now.time_us)
-        is_outer = (count - self._autopilot.next_outer) % self._divisor == 0
-        takes_on &= self._records_next and is_outer
-        takes_on &= count == until_record < min(most, self._room(is_taken=False))
-        if count <= 0 and not takes_on:
-            return 0
-        done = self.run(count, takes_on=takes_on)
-        if not self.has_taken:
-            return done
-        more = self.run_periods(most - done)
-        self.waited = not more or self.waited
-        return done + (more or 1)
+        return self.run(count) if count > 0 else 0
 
-    @property
-    def _records_next(self) -> bool:
-        """True if the quiet intervals end with a record of the estimate."""
-        return self._estimation is not None and self._estimation.records_next
-
-    def run(self, count: int, is_taken: bool = False, takes_on: bool = False) -> int:
+    def run(self, count: int, is_taken: bool = False) -> int:
         """Run ``count`` ticks, or fewer.
 
-        With ``is_taken``, vehicle and estimator have the state of the first one, which is run in any case. With
-        ``takes_on``, they get that of the tick after the last one: then ``has_taken`` is True. Return the number of
-        ticks. Raise what the simulator raises.
+        With ``is_taken``, vehicle and estimator have the state of the first one, which is run in any case. Return the
+        number of ticks. Raise what the simulator raises.
         """
         stack, recorded = self._stack, self._stack.recorder.log
         log, imu_log = self._logs()
@@ -242,7 +219,7 @@ class QuietBlock:
             self._loops.idle(now.state, now.rotor_speed, now.status.armed, self._idle)
         if self.on_passed is not None:
             self._passed.begin()
-        self._fly(*self._changing(count, is_taken, takes_on, log, imu_log))
+        self._fly(*self._changing(count, is_taken, log, imu_log))
         done = QuietCounters(*self._counters[0].item())
         self._loops.fraction = float(self._fraction[0])
         rows = log.rows[log.n :]
@@ -258,8 +235,8 @@ class QuietBlock:
         ``rows`` are those of the ticks. A tick waits after a reset of the estimate, or for an event of the outer loop.
         """
         stack, interval_us, began_us = self._stack, self._interval_us, self._stack.now.time_us
-        ticks, flown, result, sensed, waits, taken = done
-        self.waited, self.has_taken = waits > 0, taken > 0
+        ticks, flown, result, sensed, waits = done
+        self.waited = waits > 0
         if self.on_passed is not None and ticks:
             self._passed.end(rows[:ticks], self._outer.rows, self._autopilot.next_outer)
             self.on_passed(self._passed)
@@ -271,7 +248,7 @@ class QuietBlock:
             boot_us = stack.simulator.stamp_us - stack.simulator.time_us
             last_us = began_us + interval_us * (0 if last_outer is None else last_outer + 1)
             self._outer.take_reports([(at_us - boot_us, report) for at_us, report in reports], last_us)
-        if waits or taken or last_outer != ticks - 1:
+        if waits or last_outer != ticks - 1:
             stack.simulator.has_arrived = True
         if ticks:
             self._autopilot.pass_by(ticks, began_us + ticks * interval_us, rows[ticks - 1])
@@ -279,7 +256,7 @@ class QuietBlock:
         if flown:
             self._simulator.pass_by(flown, result)
         if sensed:
-            self._sensors.pass_by(began_us + (ticks + waits + taken) * interval_us, interval_us)
+            self._sensors.pass_by(began_us + (ticks + waits) * interval_us, interval_us)
         if waits:
             self._simulator.commands[:] = self._autopilot.tick(began_us + (ticks + 1) * interval_us)
         return int(ticks + waits)

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from flightstack.commander.estimate_checks import LIMITS, watch_estimate
-from flightstack.core.contract import STATE_SIZE, ByteArray, RecordArray, SingleArray, Vector3
+from flightstack.core.contract import STATE_SIZE, ByteArray, FloatArray, RecordArray, SingleArray, Vector3
 from flightstack.core.kernels.calls import address_of, as_bytes
 from flightstack.core.periods import NEVER_US
 from flightstack.estimation.delayed_filter import push_kernel
@@ -19,8 +19,10 @@ from flightstack.estimation.imu_track import RECORD_SIZE
 from flightstack.estimation.rings import MAG_RING
 from flightstack.estimation.sensor_feed import SlowSamples, fix_row, fix_sample
 from flightstack.estimation.sensor_samples import BaroSample, GnssSample, MagSample
+from flightstack.flight_log.estimator_topics import ESTIMATOR, WIND_GROUP, store_estimator
 from flightstack.flight_log.flight_log import DEFAULT_CAPACITY, FlightLog, Trace
-from flightstack.flight_log.sensor_recorder import GLOBAL_INTERVAL_US, TRUTH_INTERVAL_US
+from flightstack.flight_log.local_position import store_local_position
+from flightstack.flight_log.sensor_rows import DUE_TIMES, DueTimes
 from flightstack.flight_log.sensor_topics import (
     BARO_GROUP,
     GNSS_GROUP,
@@ -36,8 +38,9 @@ from flightstack.vehicle.slow_kernel import SLOW_MARKS, SlowMarks
 
 _Arguments: TypeAlias = tuple[Any, ...]
 """Arguments of the kernel for one part."""
-_GROUPS = (MAG_GROUP, BARO_GROUP, GNSS_GROUP, TRUTH_GROUP, TRUTH_GLOBAL_GROUP)
+_GROUPS = (MAG_GROUP, BARO_GROUP, GNSS_GROUP, TRUTH_GROUP, TRUTH_GLOBAL_GROUP, ESTIMATOR, WIND_GROUP)
 """In the order of the kernel's counters of new rows."""
+_ROWS = tuple(name for name in SlowMarks._fields if name.endswith("_rows"))
 
 
 def estimators_of(stack: Stack) -> tuple[Estimator, ...]:
@@ -73,8 +76,21 @@ def estimates_of(stack: Stack) -> list[_Arguments]:
     return found or [(0, np.zeros(STATE_SIZE), np.zeros(1, np.int64), no_resets)]
 
 
+def _calls(estimation: Estimation, columns: FloatArray) -> dict[str, int]:
+    """Return the addresses of the kernels; ``columns`` are those of the estimate in the rows of the outer loop."""
+    memory, track = estimation.estimators[0].memory, estimation.feed.lanes[0].newest.imu_track.memory
+    watch, limits = estimation.watch, estimation.limits
+    row, wind = np.zeros(ESTIMATOR.columns), np.zeros(WIND_GROUP.columns)
+    return {
+        "push": address_of(push_kernel, memory, MAG_RING, np.zeros(4)),
+        "watch": address_of(watch_estimate, memory, watch, track, limits, False, False, 0.0),
+        "local_position": address_of(store_local_position, memory, track, False, 0.0, columns),
+        "estimator": address_of(store_estimator, memory, track, 0.0, row, wind),
+    }
+
+
 class QuietSensors:
-    """The sensors that are not inertial, health, and the log of the truth, of a vehicle that flies on its sensors.
+    """The sensors that are not inertial, health, and the logs of estimate and truth, of a vehicle on its sensors.
 
     Of one that flies on the true state: nothing is due.
     """
@@ -92,29 +108,22 @@ class QuietSensors:
         """The sample that is noted in the marks."""
         self._place = np.zeros(5)
         """Origin of the estimate, as ``GnssReceiver`` has that of the simulator."""
-        self._marks["truth_us"] = self._marks["global_us"] = self._marks["health_us"] = NEVER_US
-        self.push = self.watch = 0
-        """Addresses of the kernels that give a filter a measurement, and update the health."""
+        self._marks["health_us"] = NEVER_US
+        due = np.array([DueTimes(NEVER_US, NEVER_US, NEVER_US, NEVER_US)], DUE_TIMES)
+        columns = stack.recorder.estimate
+        self.calls = {} if estimation is None else _calls(estimation, columns)
+        """Addresses of the kernels, by their names in ``QuietCalls``."""
         offset_m, place, watch, limits = np.zeros(3), np.zeros(5), np.zeros(1, WATCH), np.zeros(1, LIMITS)
         if estimation is not None:
-            memory, track = estimation.estimators[0].memory, estimation.feed.lanes[0].newest.imu_track
-            watch, limits = estimation.watch, estimation.limits
-            self.push = address_of(push_kernel, memory, MAG_RING, np.zeros(4))
-            self.watch = address_of(watch_estimate, memory, watch, track.memory, limits, False, False, 0.0)
-            offset_m, place = estimation.recorder.offset_m, estimation.recorder.place
+            recorder, watch, limits = estimation.recorder, estimation.watch, estimation.limits
+            offset_m, place, due = recorder.offset_m, recorder.place, recorder.due
         scratch = np.zeros(4), np.zeros(4), np.zeros(2), np.zeros(2)
         gnss = gps, self._place, np.zeros(FIX_SIZE), np.zeros(GNSS_SIZE), np.zeros(GNSS_SIZE)
-        truth = stack.simulator.truth, offset_m, place, TRUTH_INTERVAL_US, GLOBAL_INTERVAL_US
+        truth = stack.simulator.truth, offset_m, place
         health = watch, limits, HEALTH_US
         self.constant: tuple[Any, ...] = (
-            self._marks,
-            news,
-            values.view(HIL_VALUES),
-            scratch,
-            truth,
-            health,
-            gnss,
-        )
+            self._marks, news, values.view(HIL_VALUES), scratch, truth, health, gnss, due, columns,
+        )  # fmt: skip
         """Argument ``slow`` of the kernel."""
 
     def room(self) -> int:
@@ -129,7 +138,6 @@ class QuietSensors:
             params = estimation.estimators[0].params
             delays_s = float(params.mag_delay_s), float(params.baro_delay_s), float(params.gnss_delay_s)
             self._begin(estimation)
-            marks["truth_us"], marks["global_us"] = estimation.recorder.truth_due_us
             marks["health_us"], conditions = estimation.begin_watch()
         logs = tuple((trace.rows, trace.times_us, trace.n) for trace in self._open_traces())
         return delays_s, logs, conditions
@@ -138,7 +146,7 @@ class QuietSensors:
         """Note the newest fix and the origin of the estimate; nothing is new."""
         marks, frame, newest = self._marks, estimation.estimators[0].frame, estimation.samples.gnss
         marks["mag_us"] = marks["baro_us"] = marks["gnss_us"] = 0
-        for name in ("mag_rows", "baro_rows", "gnss_rows", "truth_rows", "global_rows"):
+        for name in _ROWS:
             marks[name] = 0
         if newest is not self._fix and newest is not None:
             self._fix, marks["fix"][0] = newest, fix_row(newest)
@@ -155,11 +163,18 @@ class QuietSensors:
 
     def count_rows(self) -> None:
         """Count the new rows of the log."""
-        marks = SlowMarks(*self._marks[0].item())
-        if self._estimation is None or marks.truth_us == NEVER_US:
+        if self._estimation is None or self._log is None:
             return
-        self._estimation.recorder.pass_by((marks.truth_us, marks.global_us))
-        rows = marks.mag_rows, marks.baro_rows, marks.gnss_rows, marks.truth_rows, marks.global_rows
+        m = SlowMarks(*self._marks[0].item())
+        rows = (
+            m.mag_rows,
+            m.baro_rows,
+            m.gnss_rows,
+            m.truth_rows,
+            m.global_rows,
+            m.estimator_rows,
+            m.wind_rows,
+        )
         for trace, new in zip(self._open_traces(), rows, strict=True):
             trace.n += new
 

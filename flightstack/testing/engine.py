@@ -256,7 +256,7 @@ class Engine:
         if not (self.step_is_pending and self._endpoint.answers_exactly):
             return 0
         self.step_is_pending = False
-        done = self._quiet.run_on(self._simulator, self.actuators, most, self.is_aligned)
+        done = self._quiet.run_on(self._simulator, self.actuators, most)
         if done:
             self.is_idle = self.is_idle and self._quiet.is_idle
             self._count(done, done)

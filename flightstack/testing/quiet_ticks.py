@@ -102,19 +102,18 @@ class QuietTicks:
         self._answer(simulator, actuators, done - 1)
         return done or 1
 
-    def run_on(self, simulator: Simulator, actuators: ActuatorsFrame, most: int, is_aligned: bool) -> int:
+    def run_on(self, simulator: Simulator, actuators: ActuatorsFrame, most: int) -> int:
         """Step the simulator, and run the next tick and those that follow while nothing happens, ``most`` at most.
 
-        Periods of the outer loop and of messages are the same if it ``is_aligned``. Return the number of ticks; 0, with
-        nothing done, if the first one is not quiet or not compiled, or if the newest answer is that of a vehicle whose
-        status has changed since.
+        Return the number of ticks; 0, with nothing done, if the first one is not quiet or not compiled, or if the
+        newest answer is that of a vehicle whose status has changed since.
         """
         block = self._fitting(simulator, actuators)
         if block is None or not (self._is_in_step(simulator) and self._lockstep.is_quiet):
             return 0
         if actuators.flags != self._link.flags(self._now.status.armed) | VALID_FLAG:
             return 0
-        done = block.run_on(min(most, self._quiet_intervals(simulator)), takes_on=is_aligned)
+        done = block.run_on(min(most, self._quiet_intervals(simulator)))
         if done:
             self.is_idle = not block.waited
             self._answer(simulator, actuators, done)

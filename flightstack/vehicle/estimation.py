@@ -27,6 +27,7 @@ from flightstack.core.periods import NEVER_US, next_due
 from flightstack.core.portable_math import distance
 from flightstack.estimation.estimator import Estimator
 from flightstack.estimation.estimator_params import EstimatorParams, GnssLimits, tuning_of
+from flightstack.estimation.estimator_report import report_kernel
 from flightstack.estimation.filter_core import FilterCore
 from flightstack.estimation.health import NO_HEALTH
 from flightstack.estimation.lanes import Lanes, sum_of_resets
@@ -160,7 +161,7 @@ class Estimation:
     def sensed(self) -> Sensed:
         """Return what the estimator and its sensors know now; valid until the next update."""
         self.estimator.refresh()
-        now_s, memory = self._time_us * 1e-6, self.estimator.memory[0]
+        now_s, memory = self._time_us * 1e-6, self.estimator.memory
         return Sensed(memory, self._feed.newest, self._now.has_state, now_s, self._lanes.report)
 
     def _on_parameter(self, name: str, value: float) -> None:
@@ -169,12 +170,15 @@ class Estimation:
                 estimator.set_params(*_tuning({**self._params.values(), name: value}))
 
     def warm_up(self) -> None:
-        """Compile the kernels of the estimator, or load them from the cache."""
+        """Compile the kernels of the estimator and of its rows in the log, or load them from the cache."""
         unknown = Vector3(math.nan, math.nan, math.nan)
         estimator = Estimator()
         estimator.imu(ImuSample(0.0, 0.0, unknown, unknown))
         estimator.baro(BaroSample(0.0, math.nan, math.nan, math.nan))
         estimator.set_earth_field(_ZERO)
+        track = NewestSamples().imu_track.memory
+        report_kernel(estimator.memory, track, 0.0)
+        self.recorder.warm_up(estimator.memory, track)
 
     def _snapshot(self) -> bytes:
         self.estimator.refresh()
@@ -208,22 +212,23 @@ class Estimation:
     def quiet_until_us(self, measures: bool) -> int:
         """Return the time from which a tick has more to do than ``update_imus``; 0 if the next one has.
 
-        With ``measures``, kernels also take magnetometer and barometer, record the true state, and update the health of
-        a single inertial sensor.
+        With ``measures``, kernels also take magnetometer and barometer and record the true state; those of a single
+        inertial sensor also record the estimate and update its health.
         """
         now = self._now
         if self._reset_counts() != self._counts:  # another sensor was selected after the last check
             return 0
         finds_origin = not now.has_state and self.estimator.frame is not None
-        if finds_origin or now.landed is not self._landed or not self._sensors.is_quiet:
+        if (
+            finds_origin
+            or now.landed is not self._landed
+            or not self._sensors.is_quiet
+            or self.recorder.is_new
+        ):
             return 0
-        recorder_us = self.recorder.due_us(with_truth=not measures)
-        return recorder_us if measures and self._lanes.is_alone else min(self._health_due_us, recorder_us)
-
-    @property
-    def records_next(self) -> bool:
-        """True if nothing but a record is due at the time of ``quiet_until_us`` with ``measures``, in flight."""
-        return self._lanes.is_alone and self._now.has_state
+        if measures and self._lanes.is_alone:
+            return NEVER_US
+        return min(self._health_due_us, self.recorder.due_us(with_truth=not measures))
 
     @property
     def health_due_us(self) -> int:

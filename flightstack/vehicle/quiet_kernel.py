@@ -16,7 +16,7 @@ from flightstack.core.contract import FloatArray, LoopRow
 from flightstack.core.kernels.calls import call_kernel, call_kernel_int
 from flightstack.core.record_types import dtype_of
 from flightstack.vehicle.outer_kernel import guide, note_outer
-from flightstack.vehicle.slow_kernel import log_truth, take_fix, take_slow, watch_health
+from flightstack.vehicle.slow_kernel import log_estimate, log_truth, take_fix, take_slow, watch_health
 
 _REFERENCE, _COMMAND, _SPEED = (
     columns.start for columns in (LoopRow.REFERENCE_ATTITUDE, LoopRow.ROTOR_COMMAND, LoopRow.ROTOR_SPEED)
@@ -34,6 +34,8 @@ class QuietCalls(NamedTuple):
     estimate: int
     push: int
     watch: int
+    local_position: int
+    estimator: int
 
 
 class QuietCounters(NamedTuple):
@@ -49,8 +51,6 @@ class QuietCounters(NamedTuple):
     """Samples of the inertial sensors."""
     waits: int
     """1 if a tick is begun that must be run in Python."""
-    taken: int
-    """1 if the state of the next tick is taken, which is not begun."""
 
 
 LARGEST_RESULT = 1
@@ -140,35 +140,33 @@ def _advance(
         if is_known[0] != 0:
             copy_all(known, state)
         log_truth(slow, time_us, following)
-        if _total(resets) != resets_before or not watch_health(
-            calls["watch"], slow, time_us, sensing[3][0], sensing[1][0], following
-        ):
-            counters["waits"] = 1
-            return False
+        first = sensing[3][0], sensing[1][0]
+        log_estimate(calls, slow, time_us, first, following)
+        has_reset = _total(resets) != resets_before
+        pauses = has_reset or not watch_health(calls["watch"], slow, time_us, first, following) or pauses
     if pauses:
         counters["waits"] = 1
-        return False
-    return True
+    return not pauses
 
 
 @compiled
 def _begin(counters: Any, marks: Any) -> None:
-    counters["ticks"], counters["flown"], counters["result"], counters["sensed"] = 0, 0, 0, 0
-    counters["waits"], counters["taken"] = 0, 0
+    counters["ticks"], counters["flown"], counters["result"] = 0, 0, 0
+    counters["sensed"], counters["waits"] = 0, 0
     marks["outers"], marks["fell_us"], marks["changed_us"] = 0, 0, 0
 
 
 @compiled
 def fly_quiet_ticks(
     calls_of: Any, counters_array: Any, interval_us: int, divisor: int, world: Any, commands: FloatArray,
-    sensing: Any, slow: Any, control: Any, count: int, is_taken: bool, takes_on: bool, outer_in: int,
-    time_us: int, boot_us: int, flags: int, flies: bool, last_row: FloatArray, estimate: Any, following: Any,
-    outer: Any, log: Any, imu_log: Any,
+    sensing: Any, slow: Any, control: Any, count: int, is_taken: bool, outer_in: int, time_us: int,
+    boot_us: int, flags: int, flies: bool, last_row: FloatArray, estimate: Any, following: Any, outer: Any,
+    log: Any, imu_log: Any,
 ) -> None:  # fmt: skip
     """Run ``count`` ticks, or fewer: what was done is in ``counters_array``, ``marks`` and ``slow``.
 
     The state of the first tick ``is_taken``, or the simulator advances to it with ``commands``; its time is that of
-    the vehicle and ``boot_us``. If it ``takes_on``, the simulator also advances to the state of the tick after them.
+    the vehicle and ``boot_us``.
     The first outer tick is that after ``outer_in`` ticks. It stops without a step of the simulator, when its result is
     above ``LARGEST_RESULT``, and when the tick waits: see ``_advance`` and ``guide``; for ``sensing`` ``_sense``.
     """
@@ -176,15 +174,12 @@ def fly_quiet_ticks(
     calls, outer_calls = calls_of[0][0], calls_of[1][0]
     state, row, counters, marks = control[0], last_row, counters_array[0], outer[0][0]
     _begin(counters, marks)
-    for i in range(count + 1 if takes_on else count):
+    for i in range(count):
         time_us += interval_us
         if (i > 0 or not is_taken) and not _advance(
             calls, counters, interval_us, world, sensing, slow, state, time_us, boot_us, flags, estimate, following,
             imu_log,
         ):  # fmt: skip
-            return
-        if i == count:
-            counters["taken"] = 1
             return
         outer_due = (i - outer_in) % divisor == 0
         if outer_due:

@@ -1,4 +1,4 @@
-"""Sensors besides the inertial ones, the health of the estimate and the log of the truth in quiet ticks, compiled.
+"""Sensors besides the inertial ones, health and log of the estimate, and the log of the truth in quiet ticks, compiled.
 
 It calls the kernels that the estimator runs in any other tick, on the same arrays and in the same order.
 """
@@ -18,6 +18,10 @@ from flightstack.core.record_types import dtype_of
 from flightstack.estimation.rings import BARO_RING, GNSS_RING, MAG_RING
 from flightstack.estimation.sensor_samples import GnssFix
 from flightstack.flight_log.sensor_rows import (
+    ESTIMATOR_INTERVAL_US,
+    GLOBAL_INTERVAL_US,
+    INVALID_INTERVAL_US,
+    TRUTH_INTERVAL_US,
     store_baro,
     store_global,
     store_gnss,
@@ -45,14 +49,13 @@ class SlowMarks(NamedTuple):
     fix: Annotated[FloatArray, FIX_SIZE]
     """The newest one, ``FixRow``, also if it came before; NaN without one."""
     mag_rows: int
-    """New rows of the log; the next four too."""
+    """New rows of the log; the next six too."""
     baro_rows: int
     gnss_rows: int
     truth_rows: int
     global_rows: int
-    truth_us: int
-    """Time from which the log of the true state takes a row; the next one of its place on the earth."""
-    global_us: int
+    estimator_rows: int
+    wind_rows: int
     health_us: int
     """Time from which the health of the estimate is updated."""
     conditions: int
@@ -113,9 +116,9 @@ def take_slow(push: int, slow: Any, time_us: int, filters: Any, following: Any) 
     Those that are not finite are none. ``push`` is the address of the kernel. ``following`` has delays, logs, and what
     the health is given.
     """
-    marks_array, news_array, parts, rows, _truth, _health, _gnss = slow
-    marks, news, values = marks_array[0], news_array[0], parts[0]
-    delays_s, (mag_log, baro_log, _gnss_log, _truth_log, _global_log), _conditions = following
+    marks, news, values, rows = slow[0][0], slow[1][0], slow[2][0], slow[3]
+    delays_s, logs, _conditions = following
+    mag_log, baro_log = logs[0], logs[1]
     mag_sample, mag_copy, baro_sample, baro_copy = rows
     mag_delay_s, baro_delay_s, _gnss_delay_s = delays_s
     if news["has_mag"] != 0:
@@ -154,26 +157,48 @@ def _new_row(log: Any, count: int, time_us: int) -> int:
 @compiled
 def log_truth(slow: Any, time_us: int, following: Any) -> None:
     """Record the true state, and with it its place on the earth, if they are due."""
-    marks, logs = slow[0][0], following[1]
-    if time_us < marks["truth_us"]:
+    marks, due, logs = slow[0][0], slow[7][0], following[1]
+    if time_us < due["truth_us"]:
         return
-    state, offset_m, place, interval_us, global_interval_us = slow[4]
-    marks["truth_us"] = (time_us // interval_us + 1) * interval_us
+    state, offset_m, place = slow[4]
+    due["truth_us"] = (time_us // TRUTH_INTERVAL_US + 1) * TRUTH_INTERVAL_US
     store_truth(logs[3][0][_new_row(logs[3], marks["truth_rows"], time_us)], state, offset_m)
     marks["truth_rows"] += 1
-    if time_us >= marks["global_us"]:
-        marks["global_us"] = (time_us // global_interval_us + 1) * global_interval_us
+    if time_us >= due["global_us"]:
+        due["global_us"] = (time_us // GLOBAL_INTERVAL_US + 1) * GLOBAL_INTERVAL_US
         store_global(logs[4][0][_new_row(logs[4], marks["global_rows"], time_us)], state, place)
         marks["global_rows"] += 1
 
 
 @compiled
-def watch_health(watch: int, slow: Any, time_us: int, memory: Any, track: Any, following: Any) -> bool:
+def log_estimate(calls: Any, slow: Any, time_us: int, lane: Any, following: Any) -> None:
+    """Record the estimate in the columns of the rows of the outer loop, and in its own row, if they are due.
+
+    ``lane`` has the memories of estimator and inertial sensor.
+    """
+    marks, due, columns, logs, has_origin = slow[0][0], slow[7][0], slow[8], following[1], following[2][1]
+    if time_us >= due["local_us"]:
+        arguments = lane[0], lane[1], has_origin, time_us * 1e-6, columns
+        is_valid = call_kernel_int(calls["local_position"], arguments) != 0
+        interval_us = ESTIMATOR_INTERVAL_US if is_valid else INVALID_INTERVAL_US
+        due["local_us"] = (time_us // interval_us + 1) * interval_us
+    if time_us >= due["estimator_us"]:
+        due["estimator_us"] = (time_us // ESTIMATOR_INTERVAL_US + 1) * ESTIMATOR_INTERVAL_US
+        row = logs[5][0][_new_row(logs[5], marks["estimator_rows"], time_us)]
+        wind = logs[6][0][_new_row(logs[6], marks["wind_rows"], time_us)]
+        marks["estimator_rows"] += 1
+        marks["wind_rows"] += call_kernel_int(
+            calls["estimator"], (lane[0], lane[1], time_us * 1e-6, row, wind)
+        )
+
+
+@compiled
+def watch_health(watch: int, slow: Any, time_us: int, lane: Any, following: Any) -> bool:
     """Update the health if it is due; return False if its conditions have changed: the tick is then run in Python.
 
-    ``watch`` is the address of the kernel; ``memory`` and ``track`` are those of the estimator.
+    ``watch`` is the address of the kernel; ``lane`` has the memories of estimator and inertial sensor.
     """
-    marks = slow[0][0]
+    marks, (memory, track) = slow[0][0], lane
     if time_us < marks["health_us"]:
         return True
     health, limits, interval_us = slow[5]

@@ -164,8 +164,10 @@ def test_a_battery_that_becomes_low_in_flight_acts_at_the_same_tick() -> None:
     assert_flies_equally(fly, state="truth", vehicle="x_quad", battery_percent=25.0, battery_drain=20.0)
 
 
-def test_one_call_flies_many_periods(monkeypatch: pytest.MonkeyPatch) -> None:
-    with World(state="truth") as world:
+@pytest.mark.parametrize("state", ["truth", "estimated"])
+def test_one_call_flies_many_periods(state: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    with World(state=state) as world:
+        world.wait_until_ready()
         world.takeoff(2.0)
         world.run_for(4.0)
         calls = _calls_of_a_second(world, monkeypatch)
@@ -198,8 +200,8 @@ def _calls_of_a_second(world: World, monkeypatch: pytest.MonkeyPatch) -> list[in
     calls: list[int] = []
     run = QuietBlock.run
 
-    def counted(block: QuietBlock, count: int, is_taken: bool = False, takes_on: bool = False) -> int:
-        calls.append(run(block, count, is_taken, takes_on))
+    def counted(block: QuietBlock, count: int, is_taken: bool = False) -> int:
+        calls.append(run(block, count, is_taken))
         return calls[-1]
 
     monkeypatch.setattr(QuietBlock, "run", counted)

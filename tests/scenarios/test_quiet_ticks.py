@@ -82,8 +82,8 @@ def test_a_reset_of_the_estimate_ends_a_compiled_call(monkeypatch: pytest.Monkey
     resets: list[int] = []
     run = QuietBlock.run
 
-    def counted(block: QuietBlock, count: int, is_taken: bool = False, takes_on: bool = False) -> int:
-        done = run(block, count, is_taken, takes_on)
+    def counted(block: QuietBlock, count: int, is_taken: bool = False) -> int:
+        done = run(block, count, is_taken)
         texts = world.engine.stack.journal.texts
         if block.waited and texts and texts[-1].text.startswith("Estimate reset"):
             resets.append(texts[-1].time_us)
@@ -115,9 +115,9 @@ def test_other_facts_of_the_estimate_end_a_compiled_call(monkeypatch: pytest.Mon
     found: list[frozenset[Failsafe]] = []
     run = QuietBlock.run
 
-    def counted(block: QuietBlock, count: int, is_taken: bool = False, takes_on: bool = False) -> int:
+    def counted(block: QuietBlock, count: int, is_taken: bool = False) -> int:
         before = world.engine.stack.estimation.health
-        done = run(block, count, is_taken, takes_on)
+        done = run(block, count, is_taken)
         health, behaviour = world.engine.stack.estimation.health, world.engine.stack.now.behaviour
         facts = estimate_failsafes(health, behaviour)
         if block.waited and facts != estimate_failsafes(before, behaviour):

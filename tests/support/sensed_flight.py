@@ -31,4 +31,4 @@ def sensed_after(seconds: float, faults: Faults = NO_FAULTS) -> tuple[Sensed, Es
             samples.baro = sample
         else:
             samples.gnss = sample
-    return Sensed(estimator.memory[0], samples), estimator
+    return Sensed(estimator.memory, samples), estimator

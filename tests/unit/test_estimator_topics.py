@@ -19,7 +19,7 @@ from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples
 from flightstack.estimation.sensor_samples import BaroSample, RangeSample
 from flightstack.estimation.snapshot import snapshot
-from flightstack.flight_log.estimator_topics import ESTIMATOR, fill_estimator
+from flightstack.flight_log.estimator_topics import ESTIMATOR, WIND_GROUP, store_estimator
 from flightstack.flight_log.flight_log import FlightLog
 from flightstack.flight_log.recorder import FlightRecorder
 from flightstack.flight_log.sensor_recorder import SENSOR_GROUPS, SensorRecorder
@@ -39,7 +39,8 @@ def topics(sensed: Sensed) -> dict[str, Any]:
     file = io.BytesIO()
     log = FlightLog(file, 4)
     log.start(0, {}, {}, flown.HOME, (ESTIMATOR,))
-    fill_estimator(log.sampled[ESTIMATOR.name].append(1), sensed)
+    row, wind = log.sampled[ESTIMATOR.name].append(1), np.zeros(WIND_GROUP.columns)
+    store_estimator(sensed.memory, sensed.track, sensed.time_s, row, wind)
     log.flush()
     return {data.name: data.data for data in ULog(io.BytesIO(file.getvalue())).data_list}
 
@@ -48,7 +49,7 @@ def topics(sensed: Sensed) -> dict[str, Any]:
 def test_fault_of_the_magnetometer_is_a_flag_in_the_log(fault: int) -> None:
     memory = sensed_after(SECONDS)[1].memory.copy()
     memory["flags"][0]["mag_fault"] = fault
-    found = topics(Sensed(memory[0], sensed_after(SECONDS)[0].samples))
+    found = topics(Sensed(memory, sensed_after(SECONDS)[0].samples))
     assert found["estimator_status_flags"]["cs_mag_fault"][0] == fault
     assert int(found["estimator_status"]["control_mode_flags"][0]) >> 18 & 1 == fault  # PX4's bit
 
@@ -101,11 +102,11 @@ def test_logged_innovations_have_the_signs_of_px4() -> None:
             estimator.range(sample)
         else:
             flown.feed(estimator, sample)
-    innovations = topics(Sensed(estimator.memory[0], NewestSamples()))["estimator_innovations"]
+    innovations = topics(Sensed(estimator.memory, NewestSamples()))["estimator_innovations"]
     expected = {
         "gps_hpos[0]": -30.0, "gps_vvel": -3.0, "mag_field[0]": -0.4, "baro_vpos": 5.0, "rng_vpos": 5.0, "hagl": -5.0,
     }  # fmt: skip
     found = {name: float(innovations[name][0]) for name in expected}
     assert found == pytest.approx(expected, rel=0.3)
-    ratios = topics(Sensed(estimator.memory[0], NewestSamples()))["estimator_innovation_test_ratios"]
+    ratios = topics(Sensed(estimator.memory, NewestSamples()))["estimator_innovation_test_ratios"]
     assert all(ratios[name][0] > 0.0 for name in expected)

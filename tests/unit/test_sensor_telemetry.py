@@ -17,7 +17,7 @@ from flightstack.estimation.estimator_report import ControlFlags, RejectionFlags
 from flightstack.estimation.health import STUCK_SAMPLES
 from flightstack.estimation.imu_track import ImuTrack
 from flightstack.estimation.motion_covariance import motion_covariance, pose_covariance, twist_covariance
-from flightstack.estimation.sensed import Sensed, vibration_of
+from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples
 from flightstack.estimation.sensor_samples import BaroSample, GnssFix, GnssSample, MagSample
 from flightstack.mavlink.dialect import mavlink
@@ -37,7 +37,7 @@ GOOD = (
 
 
 def flown_status(sensed: Sensed):
-    return status(time_us=round(sensed.report.time_s * 1e6), sensed=sensed)
+    return status(time_us=round(sensed.time_s * 1e6), sensed=sensed)
 
 
 def sent(message_id: int, sensed: Sensed | None = None):
@@ -61,7 +61,8 @@ def the(message_id: int, sensed: Sensed | None = None):
 
 
 def test_report_of_a_good_flight_has_good_flags() -> None:
-    report = sensed_after(SECONDS)[0].report
+    sensed = sensed_after(SECONDS)[0]
+    report = sensed.report
     assert report.solution == GOOD
     in_use = (
         ControlFlags.GNSS_POSITION | ControlFlags.GNSS_VELOCITY | ControlFlags.BARO_HEIGHT | ControlFlags.MAG_3D
@@ -69,13 +70,13 @@ def test_report_of_a_good_flight_has_good_flags() -> None:
     )  # fmt: skip
     assert report.control == in_use
     assert report.rejected == 0
-    assert report.range is None
+    assert math.isnan(report.range_ratio)
     assert 0.0 < report.velocity_ratio < 1.0
-    assert report.resets.position == report.resets.velocity == 0
+    assert sensed.resets == 0
 
 
 def test_report_before_alignment_has_no_flags() -> None:
-    report = Sensed(Estimator().memory[0], NewestSamples()).report
+    report = Sensed(Estimator().memory, NewestSamples()).report
     assert report.solution == 0
     assert report.control == 0
 
@@ -163,7 +164,7 @@ def test_local_position_covariance_has_45_elements_and_the_acceleration() -> Non
     assert all(m.covariance[at] > 0.0 for at in (39, 42, 44))
     s = flown_status(sensed_after(SECONDS)[0]).state
     force = np.array(sensed_after(SECONDS)[0].samples.imu.accel_frd_m_s2)
-    force -= sensed_after(SECONDS)[0].report.nominal.accel_bias_m_s2
+    force -= sensed_after(SECONDS)[0].nominal.accel_bias_m_s2
     up = rotate(Quaternion(*s[6:10]), Vector3(*force))
     assert (m.ax, m.ay, m.az) == pytest.approx((up.x, up.y, up.z + 9.80665), abs=1e-5)
 
@@ -184,7 +185,7 @@ def test_estimator_status_has_ratios_and_accuracies() -> None:
 
 def test_highres_imu_is_corrected_for_the_estimated_biases() -> None:
     sensed = sensed_after(SECONDS)[0]
-    m, imu, bias = the(mavlink.MAVLINK_MSG_ID_HIGHRES_IMU), sensed.samples.imu, sensed.report.nominal
+    m, imu, bias = the(mavlink.MAVLINK_MSG_ID_HIGHRES_IMU), sensed.samples.imu, sensed.nominal
     assert m.time_usec == 20_000_000
     assert (m.xacc, m.yacc, m.zacc) == pytest.approx(np.subtract(imu.accel_frd_m_s2, bias.accel_bias_m_s2))
     assert (m.xgyro, m.ygyro, m.zgyro) == pytest.approx(np.subtract(imu.gyro_frd_rad_s, bias.gyro_bias_rad_s))
@@ -197,7 +198,7 @@ def test_highres_imu_is_corrected_for_the_estimated_biases() -> None:
 def test_highres_imu_marks_silent_sensors() -> None:
     sensed = sensed_after(SECONDS)[0]
     old = sensed.samples.mag._replace(time_s=SECONDS - 0.2)
-    shown = Sensed(sensed_after(SECONDS)[1].memory[0], NewestSamples(sensed.samples.imu_track, mag=old))
+    shown = Sensed(sensed_after(SECONDS)[1].memory, NewestSamples(sensed.samples.imu_track, mag=old))
     assert the(mavlink.MAVLINK_MSG_ID_HIGHRES_IMU, shown).fields_updated == 0b111111
 
 
@@ -243,7 +244,7 @@ def test_sys_status_has_the_health_of_each_sensor() -> None:
     assert lost.onboard_control_sensors_health & mag
     sensed, estimator = sensed_after(SECONDS)
     unfixed = sensed.samples.gnss._replace(fix_type=GnssFix.NO_FIX)
-    without_fix = Sensed(estimator.memory[0], NewestSamples(sensed.samples.imu_track, gnss=unfixed))
+    without_fix = Sensed(estimator.memory, NewestSamples(sensed.samples.imu_track, gnss=unfixed))
     m = the(mavlink.MAVLINK_MSG_ID_SYS_STATUS, without_fix)
     assert not m.onboard_control_sensors_health & gps
     assert not m.onboard_control_sensors_present & mag
@@ -252,7 +253,7 @@ def test_sys_status_has_the_health_of_each_sensor() -> None:
 def silent_after(silent_s: float) -> Sensed:
     """Return what the vehicle knows ``silent_s`` after the last sample of any sensor."""
     sensed, estimator = sensed_after(SECONDS)
-    return Sensed(estimator.memory[0], sensed.samples, time_s=SECONDS + silent_s)
+    return Sensed(estimator.memory, sensed.samples, time_s=SECONDS + silent_s)
 
 
 def test_health_of_sensors_is_bad_after_the_imu_dies() -> None:
@@ -271,7 +272,7 @@ def test_health_of_sensors_is_bad_while_the_imu_is_frozen() -> None:
     frozen = NewestSamples(ImuTrack(), *(getattr(sensed.samples, name) for name in ("mag", "baro", "gnss")))
     for _ in range(STUCK_SAMPLES + 1):
         frozen.imu_track.take(*sensed.samples.imu)
-    shown = Sensed(estimator.memory[0], frozen)
+    shown = Sensed(estimator.memory, frozen)
     healthy = the(mavlink.MAVLINK_MSG_ID_SYS_STATUS, shown).onboard_control_sensors_health
     assert not healthy & (IMU | mavlink.MAV_SYS_STATUS_AHRS)
     assert healthy & BARO
@@ -290,11 +291,15 @@ def test_highres_imu_of_a_dead_imu_marks_no_measurement() -> None:
 
 def test_vibration_measures_change_from_sample_to_sample() -> None:
     size = 0.3
-    rows = np.array([(0.004 * i, 0.004, 0.0, 0.0, 0.0, 0.0, size * (-1) ** i, -9.81) for i in range(100)])
-    found = vibration_of(rows)
+    track = ImuTrack()
+    for i in range(250):  # the last 100 count
+        track.take(0.004 * i, 0.004, (0.0, 0.0, 0.0), (size * (-1) ** i if i >= 150 else 0.0, 0.0, -9.81))
+    found = Sensed(Estimator().memory, NewestSamples(track)).vibration
     assert found.accel_m_s2 == pytest.approx(2.0 * size)
     assert found.gyro_rad_s == found.coning_rad2 == 0.0
-    assert vibration_of(rows[:1]) == (0.0, 0.0, 0.0)
+    single = ImuTrack()
+    single.take(0.0, 0.004, (0.1, 0.0, 0.0), (0.0, 0.0, -9.81))
+    assert Sensed(Estimator().memory, NewestSamples(single)).vibration == (0.0, 0.0, 0.0)
     m = the(mavlink.MAVLINK_MSG_ID_VIBRATION)
     assert m.vibration_z == pytest.approx(0.05 * math.sqrt(2.0) * 1.6, rel=0.2)  # noise of three axes
     assert (m.clipping_0, m.clipping_1, m.clipping_2) == (0, 0, 0)
@@ -303,16 +308,16 @@ def test_vibration_measures_change_from_sample_to_sample() -> None:
 def test_wind_is_sent_only_if_it_is_observed() -> None:
     assert sent(mavlink.MAVLINK_MSG_ID_WIND_COV) == []
     _, estimator = sensed_after(SECONDS)
-    known = {name: estimator.memory[0][name].copy() for name in estimator.memory.dtype.names}
-    known["nominal"][22:24] = 3.0, -4.0
-    known["covariance"][21, 21] = known["covariance"][22, 22] = 0.04
+    known = estimator.memory.copy()
+    known["nominal"][0, 22:24] = 3.0, -4.0
+    known["covariance"][0, 21, 21] = known["covariance"][0, 22, 22] = 0.04
     m = the(mavlink.MAVLINK_MSG_ID_WIND_COV, Sensed(known, sensed_after(SECONDS)[0].samples))
     assert (m.wind_x, m.wind_y) == (3.0, -4.0)
     assert (m.var_horiz, m.horiz_accuracy) == pytest.approx((0.08, math.sqrt(0.08)))
 
 
 def test_nothing_is_sent_of_sensors_before_their_first_sample() -> None:
-    empty = Sensed(Estimator().memory[0], NewestSamples())
+    empty = Sensed(Estimator().memory, NewestSamples())
     for message_id in (
         mavlink.MAVLINK_MSG_ID_HIGHRES_IMU,
         mavlink.MAVLINK_MSG_ID_SCALED_IMU,
@@ -328,11 +333,11 @@ def test_nothing_is_sent_of_sensors_before_their_first_sample() -> None:
 @given(values=st.lists(st.floats(), min_size=13, max_size=13))
 def test_messages_of_absurd_measurements_are_sent(values: list[float]) -> None:
     _, estimator = sensed_after(SECONDS)
-    memory = {name: estimator.memory[0][name].copy() for name in estimator.memory.dtype.names}
-    memory["covariance"][:] = np.resize(values, (27, 27))
+    memory = estimator.memory.copy()
+    memory["covariance"][0] = np.resize(values, (27, 27))
     for at, name in enumerate(("innovation", "variance", "test_ratio")):
-        memory["observations"][name] = np.resize(np.roll(values, -at), len(memory["observations"]))
-    memory["nominal"][:] = np.resize(values, 28)
+        memory["observations"][0][name] = np.resize(np.roll(values, -at), len(memory["observations"][0]))
+    memory["nominal"][0] = np.resize(values, 28)
     a, b = Vector3(*values[:3]), Vector3(*values[3:6])
     samples = NewestSamples(
         ImuTrack(), MagSample(20.0, a), BaroSample(20.0, *values[:3]),
@@ -348,7 +353,7 @@ def test_messages_of_absurd_measurements_are_sent(values: list[float]) -> None:
 
 
 def test_places_on_earth_are_not_sent_before_the_first_fix() -> None:
-    memory, samples = sensed_after(SECONDS)[1].memory[0], sensed_after(SECONDS)[0].samples
+    memory, samples = sensed_after(SECONDS)[1].memory, sensed_after(SECONDS)[0].samples
     for message_id in (
         mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
         mavlink.MAVLINK_MSG_ID_HOME_POSITION,

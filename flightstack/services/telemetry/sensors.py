@@ -154,10 +154,9 @@ def vibration(f: VehicleStatus, sensed: Sensed) -> tuple[Message, ...]:
 
 def wind_cov(f: VehicleStatus, sensed: Sensed) -> tuple[Message, ...]:
     """WIND_COV; none while the wind is not observed."""
-    report = sensed.report
-    if not report.wind_is_observed:
+    if not sensed.report.wind_is_observed:
         return ()
-    wind, variance = report.nominal, sum(report.wind_variances)
+    wind, variance = sensed.nominal, sum(sensed.wind_variances)
     return (
         mavlink.MAVLink_wind_cov_message(
             f.time_us, wind.wind_north_m_s, wind.wind_east_m_s, NAN, variance, NAN, NAN,
@@ -172,7 +171,7 @@ def estimator_status(f: VehicleStatus, sensed: Sensed) -> tuple[Message, ...]:
     return (
         mavlink.MAVLink_estimator_status_message(
             f.time_us, int(report.solution), report.velocity_ratio, report.position_ratio,
-            report.height_ratio, report.field_ratio, NAN if report.range is None else report.range.ratio, NAN,
+            report.height_ratio, report.field_ratio, report.range_ratio, NAN,
             report.horizontal_accuracy_m, report.vertical_accuracy_m,
         ),
     )  # fmt: skip
@@ -187,8 +186,7 @@ def pose_and_twist_covariance(f: VehicleStatus, sensed: Sensed) -> tuple[float, 
 
 def reset_counter(sensed: Sensed) -> int:
     """Return the number of resets of the estimate, which ODOMETRY counts modulo 256."""
-    resets = sensed.report.resets
-    return resets.position + resets.velocity + resets.yaw & 0xFF
+    return sensed.resets & 0xFF
 
 
 def local_position_cov(f: VehicleStatus, sensed: Sensed) -> tuple[Message, ...]:
