@@ -14,7 +14,8 @@ from flightstack.core.contract import FloatArray, Record
 from flightstack.core.portable_math import exp
 from sim_bridge.plant.turbulence import normal_deviates
 
-_ROWS = 256
+_ROWS = 512
+"""As many as the inertial sensors draw: steps of a call."""
 _FIRST_STREAM = 16
 """Jumps of the generator before the first stream; gusts have the first two."""
 _STREAMS = {"imu": 0, "mag": 8, "baro": 16, "gnss": 24, "range": 32, "flow": 40}
@@ -52,7 +53,7 @@ class NormalStream:
         return self._each[at]
 
     def ready(self) -> int:
-        """Return how many rows ``block`` has ready, at least 256; draw more if there are fewer."""
+        """Return how many rows ``block`` has ready, at least 512; draw more if there are fewer."""
         left = len(self._each) - self._cursor[0]
         while left < _ROWS:
             start = len(self._each) - _ROWS
