@@ -25,6 +25,11 @@ def sin_cos(angle_rad: float) -> tuple[float, float]:
     """Return sine and cosine, within 1.4 ulp within one turn; both NaN beyond ``LARGEST_ANGLE_RAD``."""
     if not abs(angle_rad) <= LARGEST_ANGLE_RAD:
         return math.nan, math.nan
+    return bounded_sin_cos(angle_rad)
+
+
+def bounded_sin_cos(angle_rad: float) -> tuple[float, float]:
+    """Return ``sin_cos`` of an angle up to ``LARGEST_ANGLE_RAD``: without the check, loops are vectorised."""
     turns = angle_rad * 0.6366197723675814  # 2/π
     turns = turns - 0.5 if turns < 0.0 else turns + 0.5
     quadrant = int(turns)
@@ -53,14 +58,9 @@ def sin_cos(angle_rad: float) -> tuple[float, float]:
     series = series * square - 1.0 / 720.0
     series = series * square + 1.0 / 24.0
     cosine = 1.0 - (0.5 * square - square * (square * series))
-    quadrant &= 3
-    if quadrant == 0:
-        return sine, cosine
-    if quadrant == 1:
-        return cosine, -sine
-    if quadrant == 2:
-        return -sine, -cosine
-    return -cosine, sine
+    if quadrant & 1:
+        sine, cosine = cosine, sine
+    return -sine if quadrant & 2 else sine, -cosine if quadrant + 1 & 2 else cosine
 
 
 def tan(angle_rad: float) -> float:
@@ -196,7 +196,7 @@ def euler_angles(w: float, x: float, y: float, z: float) -> tuple[float, float, 
 
 
 FUNCTIONS = (
-    sin_cos, tan, arc_tangent_series, atan2, asin, acos, exp, log, distance, whole_within,
+    sin_cos, bounded_sin_cos, tan, arc_tangent_series, atan2, asin, acos, exp, log, distance, whole_within,
     roll_angle, pitch_angle, yaw_angle, euler_angles,
 )  # fmt: skip
 """Functions available to compiled code."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Record
-from flightstack.core.portable_math import exp, log, sin_cos
+from flightstack.core.portable_math import bounded_sin_cos, exp, log
 from sim_bridge.plant.disturbance import (
     GUST_DOWN_RATIO,
     GUST_TIME_S,
@@ -32,11 +32,16 @@ _UNUSED_BITS = np.uint64(11)
 
 @compiled
 def _box_muller(integers: Any, deviates: FloatArray) -> None:
-    """Write a pair of independent normal deviates for each pair of random integers of 64 bits."""
+    """Write a pair of independent normal deviates for each pair of random integers of 64 bits.
+
+    The second loop is apart since it is vectorised.
+    """
     for i in range(0, len(integers), 2):
-        radius = math.sqrt(-2.0 * log(1.0 - (integers[i] >> _UNUSED_BITS) / 2.0**53))
-        sine, cosine = sin_cos(2.0 * math.pi * ((integers[i + 1] >> _UNUSED_BITS) / 2.0**53))
-        deviates[i], deviates[i + 1] = radius * cosine, radius * sine
+        deviates[i] = math.sqrt(-2.0 * log(1.0 - (integers[i] >> _UNUSED_BITS) / 2.0**53))
+        deviates[i + 1] = 2.0 * math.pi * ((integers[i + 1] >> _UNUSED_BITS) / 2.0**53)
+    for pair in range(len(integers) // 2):
+        radius, (sine, cosine) = deviates[2 * pair], bounded_sin_cos(deviates[2 * pair + 1])
+        deviates[2 * pair], deviates[2 * pair + 1] = radius * cosine, radius * sine
 
 
 def normal_deviates(bits: np.random.PCG64, count: int) -> FloatArray:

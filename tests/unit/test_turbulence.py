@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from flightstack.core.portable_math import log, sin_cos
 from sim_bridge.plant.turbulence import normal_deviates
 
 COUNT = 1_000_000
@@ -48,3 +49,13 @@ def test_normal_deviates_are_those_of_the_seed() -> None:
 def test_odd_number_of_deviates_leaves_out_the_last_one() -> None:
     odd, even = normal_deviates(np.random.PCG64(4), 3), normal_deviates(np.random.PCG64(4), 4)
     assert odd.tolist() == even[:3].tolist()
+
+
+def test_normal_deviates_are_those_of_single_pairs() -> None:
+    integers = np.random.PCG64(7).random_raw(2000).tolist()
+    expected = []
+    for first, second in zip(integers[::2], integers[1::2], strict=True):
+        radius = math.sqrt(-2.0 * log(1.0 - (first >> 11) / 2.0**53))
+        sine, cosine = sin_cos(2.0 * math.pi * ((second >> 11) / 2.0**53))
+        expected += [radius * cosine, radius * sine]
+    assert normal_deviates(np.random.PCG64(7), 2000).tolist() == expected
