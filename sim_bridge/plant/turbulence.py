@@ -34,11 +34,11 @@ _UNUSED_BITS = np.uint64(11)
 def _box_muller(integers: Any, deviates: FloatArray) -> None:
     """Write a pair of independent normal deviates for each pair of random integers of 64 bits.
 
-    The second loop is apart since it is vectorised.
+    The loops are vectorised; as one they are not.
     """
-    for i in range(0, len(integers), 2):
-        deviates[i] = math.sqrt(-2.0 * log(1.0 - (integers[i] >> _UNUSED_BITS) / 2.0**53))
-        deviates[i + 1] = 2.0 * math.pi * ((integers[i + 1] >> _UNUSED_BITS) / 2.0**53)
+    for pair in range(len(integers) // 2):
+        deviates[2 * pair] = math.sqrt(-2.0 * log(1.0 - (integers[2 * pair] >> _UNUSED_BITS) / 2.0**53))
+        deviates[2 * pair + 1] = 2.0 * math.pi * ((integers[2 * pair + 1] >> _UNUSED_BITS) / 2.0**53)
     for pair in range(len(integers) // 2):
         radius, (sine, cosine) = deviates[2 * pair], bounded_sin_cos(deviates[2 * pair + 1])
         deviates[2 * pair], deviates[2 * pair + 1] = radius * cosine, radius * sine

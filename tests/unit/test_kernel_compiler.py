@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import math
 import os
 import subprocess
 import sys
@@ -169,3 +170,19 @@ def test_a_kernel_of_the_cache_is_read_without_the_compiler(tmp_path: Path) -> N
 
     assert printed() == "False -1.0 True\n"  # compiled
     assert printed() == "False -1.0 False\n"
+
+
+@compiled
+def _taken_apart(number: float) -> tuple[float, int]:
+    return math.frexp(number)
+
+
+def test_frexp_in_a_kernel_has_the_bits_of_python() -> None:
+    bits = np.random.default_rng(5).integers(0, 2**64, 2000, np.uint64)
+    subnormal = bits >> np.uint64(12)
+    ends = [0.0, 0.5, 1.0, 5e-324, 2.2250738585072014e-308, 1.7976931348623157e308, math.inf, math.nan]
+    numbers = [*bits.view(float).tolist(), *subnormal.view(float).tolist(), *ends]
+    for number in (*numbers, *(-each for each in numbers)):
+        mantissa, power = _taken_apart(number)
+        expected, expected_power = math.frexp(number)
+        assert (np.float64(mantissa).tobytes(), power) == (np.float64(expected).tobytes(), expected_power)

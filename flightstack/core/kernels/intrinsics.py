@@ -1,7 +1,8 @@
 """Functions that Numba compiles in a way of their own: portable math, and copies between arrays, tuples and bytes.
 
 Compiled from Python, each pair of types of a copy would be a function of its own for Numba, 5 % of the compilation in
-all. Kernels that are read from the cache do without this module.
+all. A call of C, as Numba makes for ``frexp``, keeps LLVM from computing several numbers at once. Kernels that are read
+from the cache do without this module.
 """
 # mypy: disable-error-code="untyped-decorator"
 
@@ -43,6 +44,30 @@ def _import_without_scipy() -> None:
         importlib.import_module("numba.np.arraymath")
     finally:
         linalg.ensure_blas = search
+
+
+@lower_builtin(math.frexp, numba.types.float64)
+def _lower_frexp(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    """Take a number apart by its bits; zero, infinities and NaN stay, with exponent 0."""
+    number, word = args[0], ir.IntType(64)
+    exponent_mask, bias = word(0x7FF), word(1022)  # with this exponent a number is in [0.5, 1)
+
+    def stored_exponent(of: Any) -> Any:
+        return builder.and_(builder.lshr(builder.bitcast(of, word), word(52)), exponent_mask)
+
+    is_subnormal = builder.icmp_unsigned("==", stored_exponent(number), word(0))
+    normal = builder.select(is_subnormal, builder.fmul(number, number.type(2.0**54)), number)
+    exponent = builder.sub(stored_exponent(normal), bias)
+    exponent = builder.select(is_subnormal, builder.sub(exponent, word(54)), exponent)
+    fraction = builder.and_(builder.bitcast(normal, word), word(~(0x7FF << 52)))
+    mantissa = builder.bitcast(builder.or_(fraction, word(1022 << 52)), number.type)
+    stays = builder.or_(
+        builder.icmp_unsigned("==", stored_exponent(number), exponent_mask),
+        builder.fcmp_ordered("==", number, number.type(0.0)),
+    )
+    exponent = context.cast(builder, exponent, numba.types.int64, sig.return_type[1])
+    parts = builder.select(stays, number, mantissa), builder.select(stays, exponent.type(0), exponent)
+    return context.make_tuple(builder, sig.return_type, parts)
 
 
 def _is_vector(kind: Any) -> bool:
