@@ -20,7 +20,7 @@ from flightstack.core.compiled import compiled
 from flightstack.core.contract import Quaternion
 from flightstack.core.geometry import quaternion_product
 from flightstack.core.kernels import compiler as kernel_compiler
-from flightstack.core.portable_math import tan
+from flightstack.core.portable_math import euler_angles, tan
 
 JIT = pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
 
@@ -186,3 +186,16 @@ def test_frexp_in_a_kernel_has_the_bits_of_python() -> None:
         mantissa, power = _taken_apart(number)
         expected, expected_power = math.frexp(number)
         assert (np.float64(mantissa).tobytes(), power) == (np.float64(expected).tobytes(), expected_power)
+
+
+@JIT
+def test_parts_of_a_kernel_are_internal_to_it() -> None:
+    @compiled
+    def turns(w: float, x: float) -> float:
+        return euler_angles(w, x, 0.0, 0.0)[0] + euler_angles(x, w, 0.0, 0.0)[0]
+
+    assert turns(1.0, 0.0) == pytest.approx(math.pi)
+    (kernel,) = turns.dispatcher.overloads.values()
+    functions = [line for line in kernel.library.get_llvm_str().splitlines() if line.startswith("define")]
+    assert any(line.startswith("define internal") for line in functions)
+    assert not any(line.startswith("define linkonce_odr") for line in functions)

@@ -14,7 +14,7 @@ from types import FunctionType, SimpleNamespace
 from typing import Any
 
 import numba
-from llvmlite.binding import parse_assembly, parse_bitcode
+from llvmlite.binding import Linkage, parse_assembly, parse_bitcode
 from numba.core import caching, errors, types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.codegen import JITCodeLibrary
@@ -147,6 +147,13 @@ class KernelCompiler(_Compiler):
             result.library.codegen.set_env(environment.env_name, environment)
         return result._replace(referenced_envs=environments)  # keeps them alive
 
+    def define_pipelines(self) -> Any:
+        """Return Numba's passes, which fill the library given here."""
+        library = _KernelLibrary(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+        library.enable_object_caching()
+        self.state.library = library
+        return super().define_pipelines()
+
 
 class PartCompiler(_Compiler):
     """Compiles a function that compiled functions call."""
@@ -178,6 +185,20 @@ class PartDispatcher(CPUDispatcher):  # type: ignore[misc]
             )
         except errors.TypingError:
             return super().get_call_template(args, kws)
+
+
+class _KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """Machine code of a function that Python calls, and of the parts that it includes.
+
+    A part takes each array as seven arguments: a call with many arrays writes hundreds of numbers to the stack. Parts
+    are internal, so that LLVM sees all calls: it drops arguments without use, and inlines what is called once.
+    """
+
+    def _optimize_final_module(self) -> None:
+        for function in self._final_module.functions:
+            if function.linkage == Linkage.linkonce_odr:
+                function.linkage = Linkage.internal
+        super()._optimize_final_module()
 
 
 class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
