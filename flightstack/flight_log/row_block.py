@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flightstack.core.compiled import direct
+from flightstack.core.compiled import IS_DISABLED, direct
 from flightstack.core.contract import FloatArray
 from flightstack.flight_log import ulog
 from flightstack.flight_log.row_kernel import (
@@ -32,6 +32,8 @@ _TIME_SIZE = 8
 _FLOATS = {"f": SINGLE, "d": DOUBLE}
 _RUNS = (SINGLE, OPPOSITE, DOUBLE, WHOLE)
 """Kinds that may have several numbers."""
+_put_rows = np.errstate(over="ignore")(put_rows) if IS_DISABLED else put_rows
+"""Compiled code does not warn of a number that is infinite in float32."""
 _LARGEST_WHOLE = 2.0**53
 """Above it a float64 does not hold every whole number: 285 years in microseconds."""
 
@@ -128,7 +130,7 @@ class RowBlock:
         self.row_size = len(row)
         self._row, self._parts = np.frombuffer(row, np.uint8), np.array(parts, PART)
         self._bytes = self._row.copy()
-        self._put = direct(put_rows, self._bytes, 0, self._parts, np.zeros(0, np.uint64), np.zeros((0, 1)))
+        self._put = direct(_put_rows, self._bytes, 0, self._parts, np.zeros(0, np.uint64), np.zeros((0, 1)))
 
     def encode(self, times_us: TimeArray, rows: FloatArray) -> memoryview:
         """Return the messages of ``rows``, shape (n, columns); valid until the next call.
@@ -138,6 +140,5 @@ class RowBlock:
         size = len(rows) * self.row_size
         if size > len(self._bytes):
             self._bytes = np.tile(self._row, len(rows))
-        with np.errstate(over="ignore"):
-            self._put(self._bytes, self.row_size, self._parts, times_us, rows)
+        self._put(self._bytes, self.row_size, self._parts, times_us, rows)
         return self._bytes.data[:size]
