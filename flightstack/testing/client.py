@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from flightstack.core.enums import CUSTOM_MODE, Mode
 from flightstack.mavlink.dialect import mavlink
@@ -122,7 +122,11 @@ class Client:
 
     def receive(self, data: bytes, now_s: float) -> None:
         """Process a datagram from the vehicle."""
-        self.session.receive(data, self._peer, now_s)
+        self.receive_all((data,), now_s)
+
+    def receive_all(self, datagrams: Iterable[bytes], now_s: float) -> None:
+        """Process datagrams from the vehicle that have arrived together."""
+        self.session.receive_all(datagrams, self._peer, now_s)
 
     def _take(self, message: Message) -> None:
         kind = message.get_type()

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from typing import NamedTuple
 
 from flightstack.core.port_numbers import API, GROUND
 from flightstack.mavlink.dialect import mavlink
@@ -35,6 +36,14 @@ _SLOW_RATES_HZ: dict[int, float] = {
 """Telemetry without ``telemetry=True``: a ground station in the same process takes a third of a flight at 4 Hz."""
 RATES_HZ: dict[bool | None, dict[int, float] | None] = {True: None, False: _SLOW_RATES_HZ, None: {}}
 """Streams by the ``telemetry`` of a world. Nobody reads those of a scenario: heartbeats, texts and answers suffice."""
+
+
+class Arrival(NamedTuple):
+    """Datagrams that arrive at a client together."""
+
+    client: Client
+    datagrams: list[bytes]
+    time_s: float
 
 
 class Network:
@@ -94,27 +103,26 @@ class Network:
             if receiver is not None:  # a test may add peers of its own
                 receiver.link.from_vehicle.send(data, now_s)
         for client in self.clients.values():
-            for data in client.link.from_vehicle.receive(now_s):
-                client.receive(data, now_s)
+            if datagrams := client.link.from_vehicle.receive(now_s):
+                client.receive_all(datagrams, now_s)
                 arrived = True
         return arrived
 
     def idle_s(self, hub: GroundHub, now_s: float, motion: bool = True) -> float:
         """Return the time for which ``exchange`` does nothing, unless the vehicle has an event [s].
 
-        Without ``motion``, nothing but what ``exchange_motion`` does afterwards.
+        Without ``motion``, nothing but what ``motion`` yields afterwards.
         """
         clients = self.clients.values()
         motion = motion or not all(map(_is_passive, clients))
         return min(hub.idle_s(now_s, motion), *(client.idle_s(now_s) for client in clients))
 
-    def exchange_motion(self, hub: GroundHub, now_s: float) -> None:
-        """Pass on streams of the motion as of ``now_s``, at which nothing else was due: the clients are passive."""
+    def motion(self, hub: GroundHub, now_s: float) -> Iterator[Arrival]:
+        """Yield streams of the motion as of ``now_s``, at which nothing else was due: the clients are passive."""
         for address, frames in hub.poll_motion(now_s):
             receiver = self._by_address.get(address)
             if receiver is not None:
-                for data in receiver.link.from_vehicle.passed(frames):
-                    receiver.receive(data, now_s)
+                yield Arrival(receiver, receiver.link.from_vehicle.passed(frames), now_s)
 
     def settle(self, hub: GroundHub, now_s: float) -> None:
         """Exchange messages until none is left at this instant."""
@@ -209,11 +217,14 @@ class EngineRunner:
         due_s = engine.time_s + hub.motion_idle_s(engine.time_s)
         if not engine.is_idle or due_s >= self._until_s - MARGIN_S:
             return
+        arrivals: list[Arrival] = []
         for time_us in ticks.from_time(math.floor((due_s - engine.time_at_s(0) - MARGIN_S) * 1e6)):
             now_s = engine.time_at_s(time_us)
             if due_s - MARGIN_S <= now_s < self._until_s - MARGIN_S:
-                self._network.exchange_motion(hub, now_s)
+                arrivals += self._network.motion(hub, now_s)
                 due_s = now_s + hub.motion_idle_s(now_s)
+        for client, datagrams, at_s in arrivals:  # after all were made, which is faster than in turn
+            client.receive_all(datagrams, at_s)
 
     def _idle_until_s(self) -> float:
         """Return the time from which messages, a watch, a timer or readiness are due; −inf if it may be now."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Protocol
 
 from flightstack.mavlink.dialect import mavlink
@@ -169,10 +169,18 @@ class Session:
 
     def receive(self, data: bytes, peer: Address, now_s: float) -> None:
         """Process a datagram."""
+        self.receive_all((data,), peer, now_s)
+
+    def receive_all(self, datagrams: Iterable[bytes], peer: Address, now_s: float) -> None:
+        """Process datagrams that have arrived together."""
         if self._only_peer not in (None, peer) or (peer != self.peer and self.is_heard(now_s)):
             return
-        for message in self.wire.decode(data, peer):
-            self.take(message, peer, now_s)
+        is_known = peer == self.peer and self.is_heard(now_s)  # no message ends that
+        for message in self.wire.decode_all(datagrams, peer):
+            if is_known:
+                self._process(message, now_s)
+            else:
+                self.take(message, peer, now_s)
 
     def take(self, message: Message, peer: Address, now_s: float) -> None:
         """Process a decoded message of the vehicle, or of another system on its link."""
@@ -181,6 +189,10 @@ class Session:
                 return
         elif not self._is_vehicle(message, peer, now_s):
             return
+        self._process(message, now_s)
+
+    def _process(self, message: Message, now_s: float) -> None:
+        """Fold a message of the vehicle's peer into the view, and give it to observer and services."""
         is_own = self._builder.add(message, now_s)
         if self.observe is not None:
             self.observe(message)

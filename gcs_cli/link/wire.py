@@ -5,7 +5,7 @@ A module of its own: one wire serves the sessions of all vehicles.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from flightstack.mavlink.link import Address, Link, Message, is_unknown
 from flightstack.mavlink.signing import LinkSigning, without_signature
@@ -44,9 +44,17 @@ class Wire:
 
     def decode(self, data: bytes, peer: Peer) -> Iterator[Message]:
         """Yield the authentic messages in a datagram, those unknown to the dialect too."""
+        return self.decode_all((data,), peer)
+
+    def decode_all(self, datagrams: Iterable[bytes], peer: Peer) -> Iterator[Message]:
+        """Yield those in successive datagrams of one peer."""
         link = self._decoders.get(peer) or self._new_decoder(peer)
-        messages = link.decode(data)
-        return messages if self._signing is None and self.record is None else self._recorded(messages, link)
+        for data in datagrams:
+            messages = link.decode(data)
+            if self._signing is None and self.record is None:
+                yield from messages
+            else:
+                yield from self._recorded(messages, link)
 
     def _new_decoder(self, peer: Peer) -> Link:
         if len(self._decoders) > _MOST_PEERS:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import pytest
@@ -16,13 +16,14 @@ from tests.support.bytes_engine import BytesEngine
 def _heard(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, bytes]]:
     """Times and bytes of what clients receive from now on."""
     found: list[tuple[float, bytes]] = []
-    receive = Client.receive
+    receive_all = Client.receive_all
 
-    def received(client: Client, data: bytes, now_s: float) -> None:
-        found.append((now_s, data))
-        receive(client, data, now_s)
+    def received(client: Client, datagrams: Iterable[bytes], now_s: float) -> None:
+        arrived = list(datagrams)
+        found.extend((now_s, data) for data in arrived)
+        receive_all(client, arrived, now_s)
 
-    monkeypatch.setattr(Client, "receive", received)
+    monkeypatch.setattr(Client, "receive_all", received)
     return found
 
 

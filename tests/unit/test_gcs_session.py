@@ -214,3 +214,35 @@ def test_silence_is_told_from_refusal() -> None:
     answer = complete(session, vehicle, calls.command(session, *calls.ARM, 0.0))
     assert answer.silent
     assert "COMPONENT_ARM_DISARM" in answer.reason
+
+
+def _batches() -> list[tuple[list[bytes], tuple[str, int], float]]:
+    """Datagrams that arrive together, with peer and time: the vehicle is met within one, lost, and met elsewhere."""
+    link, other = Link(1, 1), Link(2, 1)
+    beat = mavlink.MAVLink_heartbeat_message(2, 12, 1, 0, 3, 3)
+
+    def turned(link: Link, boot_ms: int) -> bytes:
+        return link.encode(mavlink.MAVLink_attitude_message(boot_ms, 0.1, 0.0, 1e-3 * boot_ms, 0.0, 0.0, 0.0))
+
+    return [
+        ([turned(link, 10), link.encode(beat), b"noise", turned(link, 20) + turned(link, 30)], HERE, 0.0),
+        ([other.encode(beat), turned(other, 40)], THERE, 1.0),
+        ([other.encode(beat), turned(link, 50)], HERE, 1.5),
+        ([turned(link, 60), link.encode(beat), turned(link, 70)], HERE, 9.0),
+        ([turned(other, 80), other.encode(beat), turned(other, 90)], THERE, 20.0),
+    ]
+
+
+def test_datagrams_that_arrive_together_are_processed_as_one_by_one() -> None:
+    alone, together, heard = Session(), Session(), ([], [])
+    for session, found in zip((alone, together), heard, strict=True):
+        session.observe = lambda message, found=found: found.append(bytes(message.get_msgbuf()))
+    for datagrams, peer, now_s in _batches():
+        for data in datagrams:
+            alone.receive(data, peer, now_s)
+        together.receive_all(datagrams, peer, now_s)
+        assert together.view == alone.view
+        assert (together.peer, together.bad) == (alone.peer, alone.bad)
+    assert heard[0] == heard[1]
+    assert len(heard[0]) > 8
+    assert together.target == (2, 1)
