@@ -149,6 +149,8 @@ class EngineRunner:
         self._timers: list[tuple[float, Callable[[], None]]] = []
         self._messages_wait = True
         """True if messages may wait that were sent since the last exchange."""
+        self._due_s = math.inf
+        """Time from which messages are due, as of the begin of the period."""
         self._until_s = -math.inf  # up to which the motion is passed on after compiled calls
 
     def watch(self, callback: Callable[[], None], each_tick: Callable[[], bool]) -> None:
@@ -200,7 +202,10 @@ class EngineRunner:
     def _may_exchange(self) -> bool:
         """Return True if messages may be due."""
         waits, self._messages_wait = self._messages_wait, False
-        return waits or self._network.idle_s(self._engine.stack.ground, self._engine.time_s) <= MARGIN_S
+        now_s = self._engine.time_s
+        if waits or now_s >= self._due_s - MARGIN_S:
+            return True
+        return self._network.idle_s(self._engine.stack.ground, now_s) <= MARGIN_S
 
     @property
     def _is_streamed(self) -> bool:
@@ -228,13 +233,14 @@ class EngineRunner:
 
     def _idle_until_s(self) -> float:
         """Return the time from which messages, a watch, a timer or readiness are due; −inf if it may be now."""
-        engine = self._engine
+        engine, self._due_s = self._engine, math.inf
         self._messages_wait, self._network.has_settled = self._network.has_settled, False
         if self._messages_wait or any(each_tick() for _, each_tick in self._watches):
             return -math.inf
         now_s = engine.time_s
         idle_s = self._network.idle_s(engine.stack.ground, now_s, motion=not engine.is_aligned)
-        until_s = min(now_s + idle_s, engine.ready_from_s)
+        self._due_s = now_s + idle_s
+        until_s = min(self._due_s, engine.ready_from_s)
         return min(until_s, *(at_s for at_s, _ in self._timers)) if self._timers else until_s
 
     def _call_due(self) -> None:

@@ -120,3 +120,25 @@ def test_a_client_reacts_to_telemetry_in_its_period(monkeypatch: pytest.MonkeyPa
     with World(state="truth", telemetry=True) as world:
         assert landed(world) == quiet
     assert "Landing detected" in quiet[1]
+
+
+def test_messages_are_exchanged_at_a_known_time_without_asking_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = {"idle_s": 0, "exchange": 0}
+
+    def counted(name: str) -> None:
+        plain = getattr(Network, name)
+
+        def call(*args: Any, **kwargs: Any) -> Any:
+            calls[name] += 1
+            return plain(*args, **kwargs)
+
+        monkeypatch.setattr(Network, name, call)
+
+    with World(state="truth", telemetry=None) as world:
+        world.takeoff(2.0)
+        world.run_for(2.0)
+        counted("idle_s")
+        counted("exchange")
+        world.run_for(10.0)
+    assert 10 <= calls["exchange"] <= 20  # heartbeats
+    assert calls["idle_s"] <= calls["exchange"] + 2
