@@ -240,9 +240,11 @@ class GroundHub:
 
     def motion_idle_s(self, now_s: float) -> float:
         """Return the time for which no stream is due, as ``idle_s``."""
-        vehicle_s = self._now.time_us * 1e-6
-        served = (peer for peer in self._peers.values() if peer.is_served(now_s))
-        return min((peer.streams.idle_s(vehicle_s) for peer in served), default=math.inf)
+        vehicle_s, idle_s = self._now.time_us * 1e-6, math.inf
+        for peer in self._peers.values():
+            if peer.is_served(now_s):
+                idle_s = min(idle_s, peer.streams.idle_s(vehicle_s))
+        return idle_s
 
     def idle_s(self, now_s: float, motion: bool = True) -> float:
         """Return the time for which ``poll`` sends nothing, unless a message arrives or an event happens [s].
