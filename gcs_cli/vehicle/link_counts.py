@@ -87,20 +87,20 @@ class LinkCounter:
             # messages read at one time belong to one window
             self._rate_hz = (self._window_count - 1) / (last_s - start_s)
             self._window_start_s, self._window_count = last_s, 1
-        self._follow(sequence, last_s is None or now_s - last_s > _SILENCE_S)
+        last = self._last_sequence
+        if last is None or last_s is None or now_s - last_s > _SILENCE_S:
+            self._begin(sequence)
+        elif sequence == (last + 1) % 256 and self._stray is None:  # the usual case
+            self._last_sequence, self._missing = sequence, self._missing << 1 & _ALL_LATE
+        else:
+            self._follow(sequence, last)
         self._received += 1
         self._last_received_s = now_s
         self._counts = None
 
-    def _follow(self, sequence: int, begins: bool) -> None:
-        """Count the losses before a message; ``begins``: the first one, also after a silence."""
-        last, stray = self._last_sequence, self._stray
-        if last is None or begins:
-            self._begin(sequence)
-            return
-        if sequence == (last + 1) % 256 and stray is None:  # the usual case
-            self._last_sequence, self._missing = sequence, self._missing << 1 & _ALL_LATE
-            return
+    def _follow(self, sequence: int, last: int) -> None:
+        """Count the losses between the messages ``last`` and ``sequence``."""
+        stray = self._stray
         late = (last - sequence) % 256
         if late == 0:  # repeated
             return

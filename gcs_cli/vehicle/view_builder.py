@@ -61,7 +61,9 @@ class ViewBuilder:
         The first heartbeat of an autopilot selects the vehicle.
         """
         identity = self.identity or self._identify(message)
-        if identity is None or (message.get_srcSystem(), message.get_srcComponent()) != identity[:2]:
+        if identity is None or message.get_srcSystem() != identity.system_id:
+            return False
+        if message.get_srcComponent() != identity.component_id:
             return False
         self._counter.count(message.get_seq(), now_s)
         if self._view.partial_text is not None:
