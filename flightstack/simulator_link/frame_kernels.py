@@ -19,15 +19,25 @@ VALUES_AT, FIELDS_AT, NUMBER_AT = 8, 60, 64
 """Places in the payload of HIL_SENSOR: measurements, bits of the new ones, and number of the sensor."""
 
 
-def _table() -> np.ndarray[Any, np.dtype[np.int64]]:
-    """Return the checksums (CRC-16/MCRF4XX) of single bytes."""
-    checksums = np.arange(256)
+_STRIDE = 8
+"""Bytes that go into a checksum at once: one by one, each waits for the result of the last."""
+
+
+def _tables() -> np.ndarray[Any, np.dtype[np.int32]]:
+    """Return the checksums (CRC-16/MCRF4XX) of single bytes that k zeros follow, in row k, shape (8, 256).
+
+    That of several bytes is the exclusive or of theirs.
+    """
+    first = np.arange(256, dtype=np.int32)
     for _ in range(8):
-        checksums = (checksums >> 1) ^ np.where(checksums & 1, 0x8408, 0)
-    return checksums
+        first = (first >> 1) ^ np.where(first & 1, np.int32(0x8408), np.int32(0))
+    rows = [first]
+    while len(rows) < _STRIDE:
+        rows.append((rows[-1] >> 8) ^ first[rows[-1] & 0xFF])
+    return np.array(rows)
 
 
-_CHECKSUMS = _table()
+_CHECKSUMS = _tables()
 
 
 class SensorNews(NamedTuple):
@@ -60,10 +70,16 @@ SHAPE = dtype_of(Shape)
 @compiled
 def checksum_of(data: Any, begin: int, end: int, extra: int) -> int:
     """Return the checksum of the bytes from ``begin`` to before ``end``, and of ``extra``."""
-    total = 0xFFFF
-    for i in range(begin, end):
-        total = (total >> 8) ^ _CHECKSUMS[(total ^ data[i]) & 0xFF]
-    return int((total >> 8) ^ _CHECKSUMS[(total ^ extra) & 0xFF])
+    total, at = 0xFFFF, begin
+    while at + _STRIDE <= end:
+        first, second = (total ^ data[at]) & 0xFF, ((total >> 8) ^ data[at + 1]) & 0xFF
+        total = int(_CHECKSUMS[_STRIDE - 1, first] ^ _CHECKSUMS[_STRIDE - 2, second])
+        for i in range(2, _STRIDE):
+            total ^= int(_CHECKSUMS[_STRIDE - 1 - i, data[at + i]])
+        at += _STRIDE
+    for i in range(at, end):
+        total = (total >> 8) ^ int(_CHECKSUMS[0, (total ^ data[i]) & 0xFF])
+    return (total >> 8) ^ int(_CHECKSUMS[0, (total ^ extra) & 0xFF])
 
 
 @compiled

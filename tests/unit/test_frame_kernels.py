@@ -29,9 +29,12 @@ def as_array(data: bytes | memoryview) -> np.ndarray:
 
 
 @properties
-@given(st.binary(min_size=1, max_size=300), st.integers(0, 255))
-def test_checksum_is_that_of_fastcrc(data: bytes, extra: int) -> None:
-    assert checksum_of(as_array(data), 0, len(data), extra) == crc16.mcrf4xx(data + bytes([extra]))
+@given(st.binary(min_size=1, max_size=300), st.integers(0, 255), st.data())
+def test_checksum_is_that_of_fastcrc(data: bytes, extra: int, places: st.DataObject) -> None:
+    begin = places.draw(st.integers(0, len(data)))
+    end = places.draw(st.integers(begin, len(data)))
+    expected = crc16.mcrf4xx(data[begin:end] + bytes([extra]))
+    assert checksum_of(as_array(data), begin, end, extra) == expected
 
 
 @properties
