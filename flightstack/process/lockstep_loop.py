@@ -93,7 +93,8 @@ class QuietLockstep:
         else:
             steps.commands[:] = self._lockstep.tick(now_ns)
             ticks = 1
-        if steps.socket.sent < 0 and self._lockstep.is_quiet:
+        is_over = self._autopilot.next_outer == 0 and time.monotonic_ns() >= deadline_ns
+        if not is_over and steps.socket.sent < 0 and self._lockstep.is_quiet:
             count = min(block.count(runs_on=True), most(ticks))
             if count > 0:
                 ticks += block.run(count)

@@ -10,6 +10,7 @@ import pytest
 
 from flightstack.core.compiled import IS_DISABLED
 from flightstack.process.lockstep_loop import LockstepLoop
+from flightstack.process.quiet_block import QuietBlock
 from flightstack.testing import World
 from flightstack.transports.compiled_socket import IS_AVAILABLE
 from flightstack.transports.tcp import LinkClosedError
@@ -59,6 +60,33 @@ def test_ticks_in_lockstep_run_on_up_to_the_deadline(sockets: Any) -> None:
         other.run_for(0.04)
         assert other.engine.stack.now.time_us == stack.now.time_us
         assert other.engine.stack.now.row.tolist() == stack.now.row.tolist()
+
+
+def test_the_deadline_ends_ticks_after_one_call_of_the_kernel(
+    sockets: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ours, others = sockets
+    ran: list[int] = []
+    run = QuietBlock.run
+
+    def counted(block: QuietBlock, count: int, is_taken: bool = False) -> int:
+        ran.append(run(block, count, is_taken))
+        return ran[-1]
+
+    monkeypatch.setattr(QuietBlock, "run", counted)
+    with World(make_engine=BytesEngine, state="truth") as world:
+        stack, simulator, engine = world.engine.stack, world.engine.simulator, world.engine
+        loop = LockstepLoop(stack, Peer(ours))
+        for _ in range(3):
+            for _ in range(4):
+                simulator.apply(engine.actuators)
+                others.send(bytes(simulator.outgoing()))
+            assert loop.run(0, 10**9, may_run_on=True) is None  # within a period ticks run on
+            assert loop.ends_period
+            messages(others)
+            simulator.apply(engine.actuators)
+            assert stack.simulator.receive(memoryview(bytes(simulator.outgoing())))
+    assert ran == [4, 5, 5]  # the first tick of all is run in Python
 
 
 def test_a_tick_alone_is_run_where_more_may_not(sockets: Any) -> None:
