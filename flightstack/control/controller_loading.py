@@ -123,17 +123,12 @@ def _law_problem(role: str, law: object) -> str | None:
 def _inputs_problem(role: str, law: ControlLaw) -> str | None:
     if isinstance(law.step, CStep):
         return None
-    form, signature = STEP_FORMS[role], _signature(law.step)
+    form, signature = STEP_FORMS[role], inspect.signature(law.step)
     try:
         signature.bind(*form.inputs)
     except TypeError:
         return f"has a step({', '.join(signature.parameters)}), which must take ({', '.join(form.inputs)})"
     return None
-
-
-@functools.lru_cache(maxsize=32)
-def _signature(step: Callable[..., Any]) -> inspect.Signature:
-    return inspect.signature(step)
 
 
 def _tunables_problem(law: ControlLaw) -> str | None:

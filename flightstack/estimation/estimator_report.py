@@ -7,7 +7,6 @@ of the topic ``estimator_status_flags``.
 from __future__ import annotations
 
 import math
-from enum import IntEnum
 from typing import NamedTuple
 
 from flightstack.core.compiled import compiled
@@ -39,53 +38,56 @@ _WIND_VARIANCE = 0.5
 _DELAY = EstimatorParams._fields.index("delay_s")
 
 
-class SolutionFlags(IntEnum):
+class SolutionFlags(NamedTuple):
     """States that are good for flight, ESTIMATOR_STATUS_FLAGS."""
 
-    ATTITUDE = mavlink.ESTIMATOR_ATTITUDE
-    VELOCITY_HORIZONTAL = mavlink.ESTIMATOR_VELOCITY_HORIZ
-    VELOCITY_VERTICAL = mavlink.ESTIMATOR_VELOCITY_VERT
-    POSITION_RELATIVE = mavlink.ESTIMATOR_POS_HORIZ_REL
-    POSITION_ABSOLUTE = mavlink.ESTIMATOR_POS_HORIZ_ABS
-    HEIGHT_ABSOLUTE = mavlink.ESTIMATOR_POS_VERT_ABS
-    HEIGHT_ABOVE_GROUND = mavlink.ESTIMATOR_POS_VERT_AGL
-    CONSTANT_POSITION = mavlink.ESTIMATOR_CONST_POS_MODE
-    PREDICTED_RELATIVE = mavlink.ESTIMATOR_PRED_POS_HORIZ_REL
-    PREDICTED_ABSOLUTE = mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS
-    GNSS_GLITCH = mavlink.ESTIMATOR_GPS_GLITCH
-    ACCEL_ERROR = mavlink.ESTIMATOR_ACCEL_ERROR
+    ATTITUDE: int = mavlink.ESTIMATOR_ATTITUDE
+    VELOCITY_HORIZONTAL: int = mavlink.ESTIMATOR_VELOCITY_HORIZ
+    VELOCITY_VERTICAL: int = mavlink.ESTIMATOR_VELOCITY_VERT
+    POSITION_RELATIVE: int = mavlink.ESTIMATOR_POS_HORIZ_REL
+    POSITION_ABSOLUTE: int = mavlink.ESTIMATOR_POS_HORIZ_ABS
+    HEIGHT_ABSOLUTE: int = mavlink.ESTIMATOR_POS_VERT_ABS
+    HEIGHT_ABOVE_GROUND: int = mavlink.ESTIMATOR_POS_VERT_AGL
+    CONSTANT_POSITION: int = mavlink.ESTIMATOR_CONST_POS_MODE
+    PREDICTED_RELATIVE: int = mavlink.ESTIMATOR_PRED_POS_HORIZ_REL
+    PREDICTED_ABSOLUTE: int = mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS
+    GNSS_GLITCH: int = mavlink.ESTIMATOR_GPS_GLITCH
+    ACCEL_ERROR: int = mavlink.ESTIMATOR_ACCEL_ERROR
 
 
-class ControlFlags(IntEnum):
+class ControlFlags(NamedTuple):
     """Alignment and sensors in use, by the bits of ``control_mode_flags``."""
 
-    TILT_ALIGN = 1 << 0
-    YAW_ALIGN = 1 << 1
-    GNSS_POSITION = 1 << 2
-    MAG_3D = 1 << 5
-    IN_AIR = 1 << 7
-    WIND = 1 << 8
-    BARO_HEIGHT = 1 << 9
-    RANGE_HEIGHT = 1 << 10
-    GNSS_HEIGHT = 1 << 11
-    MAG_FAULT = 1 << 18
-    VEHICLE_AT_REST = 1 << 26
-    INERTIAL_DEAD_RECKONING = 1 << 29
-    FAKE_POSITION = 1 << 32
-    GNSS_VELOCITY = 1 << 44
+    TILT_ALIGN: int = 1 << 0
+    YAW_ALIGN: int = 1 << 1
+    GNSS_POSITION: int = 1 << 2
+    MAG_3D: int = 1 << 5
+    IN_AIR: int = 1 << 7
+    WIND: int = 1 << 8
+    BARO_HEIGHT: int = 1 << 9
+    RANGE_HEIGHT: int = 1 << 10
+    GNSS_HEIGHT: int = 1 << 11
+    MAG_FAULT: int = 1 << 18
+    VEHICLE_AT_REST: int = 1 << 26
+    INERTIAL_DEAD_RECKONING: int = 1 << 29
+    FAKE_POSITION: int = 1 << 32
+    GNSS_VELOCITY: int = 1 << 44
 
 
-class RejectionFlags(IntEnum):
+class RejectionFlags(NamedTuple):
     """Newest measurements beyond their gates, by the bits of PX4's innovation faults."""
 
-    VELOCITY_HORIZONTAL = 1 << 0
-    VELOCITY_VERTICAL = 1 << 1
-    POSITION_HORIZONTAL = 1 << 2
-    POSITION_VERTICAL = 1 << 3
-    MAG_X = 1 << 4
-    MAG_Y = 1 << 5
-    MAG_Z = 1 << 6
-    HEIGHT_ABOVE_GROUND = 1 << 10
+    VELOCITY_HORIZONTAL: int = 1 << 0
+    VELOCITY_VERTICAL: int = 1 << 1
+    POSITION_HORIZONTAL: int = 1 << 2
+    POSITION_VERTICAL: int = 1 << 3
+    MAG_X: int = 1 << 4
+    MAG_Y: int = 1 << 5
+    MAG_Z: int = 1 << 6
+    HEIGHT_ABOVE_GROUND: int = 1 << 10
+
+
+SOLUTION, CONTROL, REJECTION = SolutionFlags(), ControlFlags(), RejectionFlags()
 
 
 class EstimatorReport(NamedTuple):
@@ -117,7 +119,7 @@ class EstimatorReport(NamedTuple):
     @property
     def wind_is_observed(self) -> bool:
         """True if measurements limit the uncertainty of the wind."""
-        return bool(self.control & ControlFlags.WIND)
+        return bool(self.control & CONTROL.WIND)
 
 
 @compiled
@@ -142,8 +144,8 @@ def report_kernel(memory: MemoryArray, track: TrackArray, time_s: float) -> Esti
     control, rejected = _control(m, now_s), _rejected(o, has_range)
     solution = _solution(m, now_s, control, rejected)
     if imu_has_failed(track[0], time_s):
-        solution &= ~SolutionFlags.ATTITUDE
-    has_baro = control & ControlFlags.BARO_HEIGHT != 0
+        solution &= ~SOLUTION.ATTITUDE
+    has_baro = control & CONTROL.BARO_HEIGHT != 0
     return EstimatorReport(
         solution,
         control,
@@ -223,20 +225,20 @@ def _control(m: MemoryRecord, now_s: float) -> int:
     has_range = flags["has_range"] != 0 and _is_aided(o, RANGE, 1, now_s)
     knows_wind = max(p[WIND, WIND], p[WIND + 1, WIND + 1]) < _WIND_VARIANCE
     return (
-        _flag(ControlFlags.TILT_ALIGN, _has_tilt(p))
-        | _flag(ControlFlags.YAW_ALIGN, p[ATTITUDE + 2, ATTITUDE + 2] < _YAW_RAD * _YAW_RAD)
-        | _flag(ControlFlags.GNSS_POSITION, has_position)
-        | _flag(ControlFlags.MAG_3D, _is_aided(o, MAG, 3, now_s))
-        | _flag(ControlFlags.IN_AIR, not landed)
-        | _flag(ControlFlags.WIND, knows_wind)
-        | _flag(ControlFlags.BARO_HEIGHT, has_baro)
-        | _flag(ControlFlags.RANGE_HEIGHT, has_range)
-        | _flag(ControlFlags.GNSS_HEIGHT, has_gnss and _is_aided(o, GNSS_POSITION + 2, 1, now_s))
-        | _flag(ControlFlags.MAG_FAULT, flags["mag_fault"] != 0)
-        | _flag(ControlFlags.VEHICLE_AT_REST, at_rest)
-        | _flag(ControlFlags.INERTIAL_DEAD_RECKONING, not (has_position or has_velocity or at_rest))
-        | _flag(ControlFlags.FAKE_POSITION, _is_aided(o, HOLD_POSITION, 2, now_s))
-        | _flag(ControlFlags.GNSS_VELOCITY, has_velocity)
+        _flag(CONTROL.TILT_ALIGN, _has_tilt(p))
+        | _flag(CONTROL.YAW_ALIGN, p[ATTITUDE + 2, ATTITUDE + 2] < _YAW_RAD * _YAW_RAD)
+        | _flag(CONTROL.GNSS_POSITION, has_position)
+        | _flag(CONTROL.MAG_3D, _is_aided(o, MAG, 3, now_s))
+        | _flag(CONTROL.IN_AIR, not landed)
+        | _flag(CONTROL.WIND, knows_wind)
+        | _flag(CONTROL.BARO_HEIGHT, has_baro)
+        | _flag(CONTROL.RANGE_HEIGHT, has_range)
+        | _flag(CONTROL.GNSS_HEIGHT, has_gnss and _is_aided(o, GNSS_POSITION + 2, 1, now_s))
+        | _flag(CONTROL.MAG_FAULT, flags["mag_fault"] != 0)
+        | _flag(CONTROL.VEHICLE_AT_REST, at_rest)
+        | _flag(CONTROL.INERTIAL_DEAD_RECKONING, not (has_position or has_velocity or at_rest))
+        | _flag(CONTROL.FAKE_POSITION, _is_aided(o, HOLD_POSITION, 2, now_s))
+        | _flag(CONTROL.GNSS_VELOCITY, has_velocity)
     )
 
 
@@ -244,21 +246,19 @@ def _control(m: MemoryRecord, now_s: float) -> int:
 def _rejected(o: RecordArray, has_range: bool) -> int:
     height = _exceeds(o, BARO, 1) or _exceeds(o, GNSS_POSITION + 2, 1)
     return (
-        _flag(RejectionFlags.VELOCITY_HORIZONTAL, _exceeds(o, GNSS_VELOCITY, 2))
-        | _flag(RejectionFlags.VELOCITY_VERTICAL, _exceeds(o, GNSS_VELOCITY + 2, 1))
-        | _flag(RejectionFlags.POSITION_HORIZONTAL, _exceeds(o, GNSS_POSITION, 2))
-        | _flag(RejectionFlags.POSITION_VERTICAL, height)
-        | _flag(RejectionFlags.MAG_X, _exceeds(o, MAG, 1))
-        | _flag(RejectionFlags.MAG_Y, _exceeds(o, MAG + 1, 1))
-        | _flag(RejectionFlags.MAG_Z, _exceeds(o, MAG + 2, 1))
-        | _flag(RejectionFlags.HEIGHT_ABOVE_GROUND, has_range and _exceeds(o, RANGE, 1))
+        _flag(REJECTION.VELOCITY_HORIZONTAL, _exceeds(o, GNSS_VELOCITY, 2))
+        | _flag(REJECTION.VELOCITY_VERTICAL, _exceeds(o, GNSS_VELOCITY + 2, 1))
+        | _flag(REJECTION.POSITION_HORIZONTAL, _exceeds(o, GNSS_POSITION, 2))
+        | _flag(REJECTION.POSITION_VERTICAL, height)
+        | _flag(REJECTION.MAG_X, _exceeds(o, MAG, 1))
+        | _flag(REJECTION.MAG_Y, _exceeds(o, MAG + 1, 1))
+        | _flag(REJECTION.MAG_Z, _exceeds(o, MAG + 2, 1))
+        | _flag(REJECTION.HEIGHT_ABOVE_GROUND, has_range and _exceeds(o, RANGE, 1))
     )
 
 
-_GNSS_REJECTIONS = (
-    RejectionFlags.VELOCITY_HORIZONTAL | RejectionFlags.VELOCITY_VERTICAL | RejectionFlags.POSITION_HORIZONTAL
-)
-_FIELD_REJECTIONS = RejectionFlags.MAG_X | RejectionFlags.MAG_Y | RejectionFlags.MAG_Z
+_GNSS_REJECTIONS = REJECTION.VELOCITY_HORIZONTAL | REJECTION.VELOCITY_VERTICAL | REJECTION.POSITION_HORIZONTAL
+_FIELD_REJECTIONS = REJECTION.MAG_X | REJECTION.MAG_Y | REJECTION.MAG_Z
 
 
 @compiled
@@ -266,7 +266,7 @@ def _solution(m: MemoryRecord, now_s: float, control: int, rejected: int) -> int
     o = m["observations"]
     if m["flags"]["aligned"] == 0:
         return 0
-    at_rest = control & ControlFlags.VEHICLE_AT_REST != 0
+    at_rest = control & CONTROL.VEHICLE_AT_REST != 0
     horizontal_s = max(_fused_s(o, GNSS_VELOCITY, 2), _fused_s(o, GNSS_POSITION, 2))
     vertical_s = max(o[BARO]["fused_s"], o[GNSS_POSITION + 2]["fused_s"], o[GNSS_VELOCITY + 2]["fused_s"])
     has_gnss = m["flags"]["has_gnss"] != 0
@@ -276,16 +276,16 @@ def _solution(m: MemoryRecord, now_s: float, control: int, rejected: int) -> int
     is_wrong = fall > 0.0 and _exceeds(o, GNSS_VELOCITY + 2, 1) and _exceeds(o, BARO, 1)
     is_glitch = rejected & _GNSS_REJECTIONS != 0 and rejected & _FIELD_REJECTIONS == 0
     return (
-        _flag(SolutionFlags.ATTITUDE, control & ControlFlags.TILT_ALIGN != 0)
-        | _flag(SolutionFlags.VELOCITY_HORIZONTAL, horizontal)
-        | _flag(SolutionFlags.VELOCITY_VERTICAL, vertical)
-        | _flag(SolutionFlags.POSITION_RELATIVE, horizontal)
-        | _flag(SolutionFlags.POSITION_ABSOLUTE, horizontal)
-        | _flag(SolutionFlags.HEIGHT_ABSOLUTE, vertical)
-        | _flag(SolutionFlags.HEIGHT_ABOVE_GROUND, control & ControlFlags.RANGE_HEIGHT != 0)
-        | _flag(SolutionFlags.CONSTANT_POSITION, not horizontal)
-        | _flag(SolutionFlags.PREDICTED_RELATIVE, horizontal)
-        | _flag(SolutionFlags.PREDICTED_ABSOLUTE, horizontal)
-        | _flag(SolutionFlags.GNSS_GLITCH, is_glitch)
-        | _flag(SolutionFlags.ACCEL_ERROR, is_wrong)
+        _flag(SOLUTION.ATTITUDE, control & CONTROL.TILT_ALIGN != 0)
+        | _flag(SOLUTION.VELOCITY_HORIZONTAL, horizontal)
+        | _flag(SOLUTION.VELOCITY_VERTICAL, vertical)
+        | _flag(SOLUTION.POSITION_RELATIVE, horizontal)
+        | _flag(SOLUTION.POSITION_ABSOLUTE, horizontal)
+        | _flag(SOLUTION.HEIGHT_ABSOLUTE, vertical)
+        | _flag(SOLUTION.HEIGHT_ABOVE_GROUND, control & CONTROL.RANGE_HEIGHT != 0)
+        | _flag(SOLUTION.CONSTANT_POSITION, not horizontal)
+        | _flag(SOLUTION.PREDICTED_RELATIVE, horizontal)
+        | _flag(SOLUTION.PREDICTED_ABSOLUTE, horizontal)
+        | _flag(SOLUTION.GNSS_GLITCH, is_glitch)
+        | _flag(SOLUTION.ACCEL_ERROR, is_wrong)
     )

@@ -10,7 +10,7 @@ from flightstack.core.array_items import store
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
 from flightstack.estimation.error_state import NOMINAL_SIZE, WIND, read_nominal
-from flightstack.estimation.estimator_report import ControlFlags, RejectionFlags, report_kernel
+from flightstack.estimation.estimator_report import CONTROL, REJECTION, report_kernel
 from flightstack.estimation.imu_track import TrackArray
 from flightstack.estimation.kalman import BARO, GNSS_POSITION, GNSS_VELOCITY, MAG, OBSERVATIONS, RANGE
 from flightstack.estimation.memory import MemoryArray, MemoryRecord
@@ -48,26 +48,26 @@ _KNOWN_VARIANCES = 23
 
 
 _CONTROL: dict[str, int | None] = {
-    "cs_tilt_align": ControlFlags.TILT_ALIGN,
-    "cs_yaw_align": ControlFlags.YAW_ALIGN,
-    "cs_gps": ControlFlags.GNSS_POSITION,
+    "cs_tilt_align": CONTROL.TILT_ALIGN,
+    "cs_yaw_align": CONTROL.YAW_ALIGN,
+    "cs_gps": CONTROL.GNSS_POSITION,
     "cs_opt_flow": None,
     "cs_mag_hdg": None,
-    "cs_mag_3d": ControlFlags.MAG_3D,
+    "cs_mag_3d": CONTROL.MAG_3D,
     "cs_mag_dec": None,
-    "cs_in_air": ControlFlags.IN_AIR,
-    "cs_wind": ControlFlags.WIND,
-    "cs_baro_hgt": ControlFlags.BARO_HEIGHT,
-    "cs_rng_hgt": ControlFlags.RANGE_HEIGHT,
-    "cs_gps_hgt": ControlFlags.GNSS_HEIGHT,
+    "cs_in_air": CONTROL.IN_AIR,
+    "cs_wind": CONTROL.WIND,
+    "cs_baro_hgt": CONTROL.BARO_HEIGHT,
+    "cs_rng_hgt": CONTROL.RANGE_HEIGHT,
+    "cs_gps_hgt": CONTROL.GNSS_HEIGHT,
     "cs_ev_pos": None,
     "cs_ev_yaw": None,
     "cs_ev_hgt": None,
-    "cs_mag_fault": ControlFlags.MAG_FAULT,
-    "cs_vehicle_at_rest": ControlFlags.VEHICLE_AT_REST,
-    "cs_inertial_dead_reckoning": ControlFlags.INERTIAL_DEAD_RECKONING,
-    "cs_fake_pos": ControlFlags.FAKE_POSITION,
-    "cs_gnss_vel": ControlFlags.GNSS_VELOCITY,
+    "cs_mag_fault": CONTROL.MAG_FAULT,
+    "cs_vehicle_at_rest": CONTROL.VEHICLE_AT_REST,
+    "cs_inertial_dead_reckoning": CONTROL.INERTIAL_DEAD_RECKONING,
+    "cs_fake_pos": CONTROL.FAKE_POSITION,
+    "cs_gnss_vel": CONTROL.GNSS_VELOCITY,
 }
 """Fields of ``estimator_status_flags``; a sensor that the filter does not have is never in use."""
 _FAULTS = (
@@ -76,14 +76,14 @@ _FAULTS = (
     "fs_bad_acc_clipping",
 )  # fmt: skip
 _REJECTED: dict[str, int | None] = {
-    "reject_hor_vel": RejectionFlags.VELOCITY_HORIZONTAL,
-    "reject_ver_vel": RejectionFlags.VELOCITY_VERTICAL,
-    "reject_hor_pos": RejectionFlags.POSITION_HORIZONTAL,
-    "reject_ver_pos": RejectionFlags.POSITION_VERTICAL,
+    "reject_hor_vel": REJECTION.VELOCITY_HORIZONTAL,
+    "reject_ver_vel": REJECTION.VELOCITY_VERTICAL,
+    "reject_hor_pos": REJECTION.POSITION_HORIZONTAL,
+    "reject_ver_pos": REJECTION.POSITION_VERTICAL,
     "reject_yaw": None,
     "reject_airspeed": None,
     "reject_sideslip": None,
-    "reject_hagl": RejectionFlags.HEIGHT_ABOVE_GROUND,
+    "reject_hagl": REJECTION.HEIGHT_ABOVE_GROUND,
     "reject_optflow_x": None,
     "reject_optflow_y": None,
 }
@@ -344,4 +344,4 @@ def store_estimator(
         row[AT.innovations + 2 * OBSERVATIONS + i] = observed[i]["test_ratio"]
     n = read_nominal(x)
     store(wind, (_horizon_us(m), n.wind_north_m_s, n.wind_east_m_s, p[WIND, WIND], p[WIND + 1, WIND + 1]))
-    return 1 if report.control & ControlFlags.WIND != 0 else 0
+    return 1 if report.control & CONTROL.WIND != 0 else 0

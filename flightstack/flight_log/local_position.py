@@ -12,7 +12,7 @@ from flightstack.core.array_items import store
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
 from flightstack.estimation.error_state import ATTITUDE, VELOCITY
-from flightstack.estimation.estimator_report import ControlFlags, SolutionFlags, report_kernel
+from flightstack.estimation.estimator_report import CONTROL, SOLUTION, report_kernel
 from flightstack.estimation.imu_track import TrackArray
 from flightstack.estimation.memory import MemoryArray
 from flightstack.flight_log.topics import OUTER, OUTER_TOPICS, Field, Group, Topic
@@ -95,8 +95,8 @@ def store_local_position(
     )
     moved_m, moved_m_s = position["change"], velocity["change"]
     solution, control = report.solution, report.control
-    horizontal = has_origin and solution & SolutionFlags.POSITION_RELATIVE != 0
-    vertical = solution & SolutionFlags.HEIGHT_ABSOLUTE != 0
+    horizontal = has_origin and solution & SOLUTION.POSITION_RELATIVE != 0
+    vertical = solution & SOLUTION.HEIGHT_ABSOLUTE != 0
     store(row, (
         moved_m[0], moved_m[1], moved_m[2], moved_m_s[0], moved_m_s[1], moved_m_s[2], yaw["change_rad"],
         p[ATTITUDE + 2, ATTITUDE + 2], report.horizontal_accuracy_m, report.vertical_accuracy_m,
@@ -104,9 +104,9 @@ def store_local_position(
         math.sqrt(abs(p[VELOCITY + 2, VELOCITY + 2])),
         count_of(position["number"]), count_of(velocity["number"]), count_of(yaw["number"]),
         horizontal, vertical,
-        solution & SolutionFlags.VELOCITY_HORIZONTAL != 0, solution & SolutionFlags.VELOCITY_VERTICAL != 0,
-        control & ControlFlags.YAW_ALIGN != 0,
-        has_origin and solution & SolutionFlags.POSITION_ABSOLUTE != 0, has_origin and vertical,
-        control & ControlFlags.INERTIAL_DEAD_RECKONING != 0,
+        solution & SOLUTION.VELOCITY_HORIZONTAL != 0, solution & SOLUTION.VELOCITY_VERTICAL != 0,
+        control & CONTROL.YAW_ALIGN != 0,
+        has_origin and solution & SOLUTION.POSITION_ABSOLUTE != 0, has_origin and vertical,
+        control & CONTROL.INERTIAL_DEAD_RECKONING != 0,
     ))  # fmt: skip
     return 1 if horizontal else 0

@@ -51,11 +51,13 @@ _FORMATS = _Formats()
 
 
 def _spread(code: str, length: int) -> _Spread:
-    """Return the function that spreads an array; one of bytes is packed as a single value."""
+    """Return the function that spreads an array; enough bytes are packed as a single value."""
     if code != "B":
         return itemgetter(slice(length))
     pack = struct.Struct(f"<{length}B").pack
-    return lambda array: (array if array.__class__ is bytes else pack(*array[:length]),)
+    return lambda array: (
+        array if array.__class__ is bytes and len(array) >= length else pack(*array[:length]),
+    )
 
 
 def payload_of(message: Any) -> bytes:

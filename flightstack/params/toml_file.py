@@ -251,7 +251,8 @@ def find_file(name_or_path: str, folder: Path, kind: str) -> Path:
 
 def built_in_names(folder: Path) -> list[str]:
     """Return the names of the built-in files in ``folder``."""
-    files = (name for name in os.listdir(folder) if name.endswith(".toml"))
+    names = os.listdir(folder) if folder.is_dir() else []
+    files = (name for name in names if name.endswith(".toml"))
     return sorted(name.removesuffix(".toml") for name in files)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from pathlib import Path
 
 from flightstack.core.atomic_file import write_text_atomically
@@ -23,13 +22,7 @@ def load_plan(path: str | Path) -> Plan:
     Raise ConfigError with file, item, field, value and allowed range.
     """
     path = Path(path)
-    return _loaded(read_text(path), path)
-
-
-@lru_cache(maxsize=4)
-def _loaded(text: str, path: Path) -> Plan:
-    """Return the plan of a file with this text: each flight of a campaign reads the same file."""
-    return plan_of_text(text, path)
+    return plan_of_text(read_text(path), path)
 
 
 def read_text(path: Path) -> str:

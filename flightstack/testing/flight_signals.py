@@ -39,6 +39,9 @@ class FlightSignals(Mapping[str, Any]):
     def __len__(self) -> int:
         return len(SIGNALS)
 
+    def __reduce__(self) -> Any:
+        return dict, (dict(self),)  # a copy, also in another process, does without the log
+
     @property
     def times_s(self) -> FloatArray:
         """Times since the start of the log, shape (n,)."""

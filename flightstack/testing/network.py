@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from typing import NamedTuple
+from collections.abc import Callable, Mapping
 
 from flightstack.core.port_numbers import API, GROUND
 from flightstack.mavlink.dialect import mavlink
@@ -36,14 +35,6 @@ _SLOW_RATES_HZ: dict[int, float] = {
 """Telemetry without ``telemetry=True``: a ground station in the same process takes a third of a flight at 4 Hz."""
 RATES_HZ: dict[bool | None, dict[int, float] | None] = {True: None, False: _SLOW_RATES_HZ, None: {}}
 """Streams by the ``telemetry`` of a world. Nobody reads those of a scenario: heartbeats, texts and answers suffice."""
-
-
-class Arrival(NamedTuple):
-    """Datagrams that arrive at a client together."""
-
-    client: Client
-    datagrams: list[bytes]
-    time_s: float
 
 
 class Network:
@@ -111,18 +102,18 @@ class Network:
     def idle_s(self, hub: GroundHub, now_s: float, motion: bool = True) -> float:
         """Return the time for which ``exchange`` does nothing, unless the vehicle has an event [s].
 
-        Without ``motion``, nothing but what ``motion`` yields afterwards.
+        Without ``motion``, nothing but what ``exchange_motion`` does afterwards.
         """
         clients = self.clients.values()
         motion = motion or not all(map(_is_passive, clients))
         return min(hub.idle_s(now_s, motion), *(client.idle_s(now_s) for client in clients))
 
-    def motion(self, hub: GroundHub, now_s: float) -> Iterator[Arrival]:
-        """Yield streams of the motion as of ``now_s``, at which nothing else was due: the clients are passive."""
+    def exchange_motion(self, hub: GroundHub, now_s: float) -> None:
+        """Pass on streams of the motion as of ``now_s``, at which nothing else was due: the clients are passive."""
         for address, frames in hub.poll_motion(now_s):
             receiver = self._by_address.get(address)
             if receiver is not None:
-                yield Arrival(receiver, receiver.link.from_vehicle.passed(frames), now_s)
+                receiver.receive_all(receiver.link.from_vehicle.passed(frames), now_s)
 
     def settle(self, hub: GroundHub, now_s: float) -> None:
         """Exchange messages until none is left at this instant."""
@@ -222,14 +213,11 @@ class EngineRunner:
         due_s = engine.time_s + hub.motion_idle_s(engine.time_s)
         if not engine.is_idle or due_s >= self._until_s - MARGIN_S:
             return
-        arrivals: list[Arrival] = []
         for time_us in ticks.from_time(math.floor((due_s - engine.time_at_s(0) - MARGIN_S) * 1e6)):
             now_s = engine.time_at_s(time_us)
             if due_s - MARGIN_S <= now_s < self._until_s - MARGIN_S:
-                arrivals += self._network.motion(hub, now_s)
+                self._network.exchange_motion(hub, now_s)
                 due_s = now_s + hub.motion_idle_s(now_s)
-        for client, datagrams, at_s in arrivals:  # after all were made, which is faster than in turn
-            client.receive_all(datagrams, at_s)
 
     def _idle_until_s(self) -> float:
         """Return the time from which messages, a watch, a timer or readiness are due; −inf if it may be now."""

@@ -21,7 +21,7 @@ from flightstack.params.vehicle import load_vehicle
 from flightstack.process.command_line import own_program
 from flightstack.testing.instances import ServerError, free_instance
 from flightstack.testing.setup import Setup
-from gcs_cli.fly.fly_flags import TO_STACK, FlyOptions, passed
+from gcs_cli.fly.fly_flags import LONGEST_S, TO_STACK, FlyOptions, passed
 from gcs_cli.fly.fly_options import home_text, outer_rate_hz, simulator_arguments
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
@@ -144,7 +144,8 @@ class Server:
 
     def _start(self, speed: float, timeout_s: float) -> subprocess.Popen[bytes]:
         options = fly_options(self.setup, self.instance, speed)
-        options = replace(options, faults=self._faults, timeout_s=timeout_s)
+        waits_s = max(options.timeout_s, min(timeout_s, LONGEST_S))
+        options = replace(options, faults=self._faults, timeout_s=waits_s)
         home = self.setup.home
         simulator = simulator_arguments(options, home)
         stack = [

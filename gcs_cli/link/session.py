@@ -175,9 +175,9 @@ class Session:
         """Process datagrams that have arrived together."""
         if self._only_peer not in (None, peer) or (peer != self.peer and self.is_heard(now_s)):
             return
-        is_known = peer == self.peer and self.is_heard(now_s)  # no message ends that
+        is_known = peer == self.peer and self.is_heard(now_s)
         for message in self.wire.decode_all(datagrams, peer):
-            if is_known:
+            if is_known and peer == self.peer:  # an observer may disconnect
                 self._process(message, now_s)
             else:
                 self.take(message, peer, now_s)

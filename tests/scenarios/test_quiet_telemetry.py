@@ -8,8 +8,11 @@ from typing import Any
 import pytest
 
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Link
 from flightstack.testing import Client, World
+from flightstack.testing.artifacts import Flown
 from flightstack.testing.network import Network
+from gcs_cli.link.tlog import decode_records
 from tests.support.bytes_engine import BytesEngine
 
 
@@ -142,3 +145,19 @@ def test_messages_are_exchanged_at_a_known_time_without_asking_again(monkeypatch
         world.run_for(10.0)
     assert 10 <= calls["exchange"] <= 20  # heartbeats
     assert calls["idle_s"] <= calls["exchange"] + 2
+
+
+def test_telemetry_of_compiled_ticks_is_recorded_at_its_time() -> None:
+    with World(telemetry=True) as world:
+        flown = Flown(world)
+        world.takeoff(2.0)
+        world.run_for(3.0)
+        records = decode_records(flown.evidence().tlog)
+    times = [
+        (record.time_us / 1e6, message.time_boot_ms / 1e3)
+        for record in records
+        for message in Link(1, 1).decode(record.frame)
+        if message.get_type() == "ATTITUDE"
+    ]
+    assert len(times) > 100
+    assert all(recorded_s == pytest.approx(boot_s, abs=2e-3) for recorded_s, boot_s in times)

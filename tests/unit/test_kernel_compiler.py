@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import gc
+import importlib
 import math
 import os
 import subprocess
 import sys
+from enum import Enum, EnumMeta
 from pathlib import Path
 
 import numba
@@ -16,10 +18,11 @@ from numba.core import event
 
 from flightstack.core import compiled as module
 from flightstack.core import geometry
-from flightstack.core.compiled import compiled
+from flightstack.core.compiled import Kernel, compiled
 from flightstack.core.contract import Quaternion
 from flightstack.core.geometry import quaternion_product
 from flightstack.core.kernels import compiler as kernel_compiler
+from flightstack.core.kernels.cache import is_own
 from flightstack.core.portable_math import euler_angles, tan
 
 JIT = pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
@@ -199,3 +202,16 @@ def test_parts_of_a_kernel_are_internal_to_it() -> None:
     functions = [line for line in kernel.library.get_llvm_str().splitlines() if line.startswith("define")]
     assert any(line.startswith("define internal") for line in functions)
     assert not any(line.startswith("define linkonce_odr") for line in functions)
+
+
+def test_kernels_use_no_enumerations() -> None:
+    """Numba before 0.62 cannot pass their members to a function, and takes microseconds for each from Python."""
+    importlib.import_module("flightstack.testing")
+    modules = [module for name, module in list(sys.modules.items()) if is_own(name)]
+    kernels = {each for module in modules for each in vars(module).values() if isinstance(each, Kernel)}
+    assert len(kernels) > 100
+    for kernel in kernels:
+        function = kernel.py_func
+        used = [function.__globals__.get(name) for name in function.__code__.co_names]
+        found = [each for each in used if isinstance(each, (Enum, EnumMeta))]
+        assert not found, f"{function.__module__}.{function.__qualname__}"

@@ -70,7 +70,10 @@ def test_values_out_of_range_are_fitted_in_the_message() -> None:
     assert item.seq == plain.seq == 65_535
 
 
-def test_array_that_is_too_short_is_refused() -> None:
-    message = mavlink.MAVLink_battery_status_message(0, 0, 0, 0, [1] * 9, 0, 0, 0, 0)
+@pytest.mark.parametrize("octets", [[1] * 250, b"\1" * 250], ids=["list", "bytes"])
+def test_array_that_is_too_short_is_refused(octets: Any) -> None:
+    numbers = mavlink.MAVLink_battery_status_message(0, 0, 0, 0, [1] * 9, 0, 0, 0, 0)
     with pytest.raises(Exception, match="26 items"):
-        payload_of(message)
+        payload_of(numbers)
+    with pytest.raises(Exception, match="251 items"):
+        payload_of(mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, octets))

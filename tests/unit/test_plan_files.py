@@ -320,16 +320,6 @@ def test_files_that_cannot_be_read_or_are_no_text(tmp_path: Path) -> None:
         load_plan(tmp_path / "huge.plan")
 
 
-def test_plan_is_parsed_again_only_if_its_text_changed(tmp_path: Path) -> None:
-    path = tmp_path / "x.plan"
-    item = MissionItem(Command.NAV_TAKEOFF, Frame.GLOBAL_RELATIVE_ALT, z=5.0)
-    save_plan(path, Plan((item,)))
-    first = load_plan(path)
-    assert load_plan(path) is first
-    save_plan(path, Plan((replace(item, z=6.0),)))
-    assert [load_plan(path).items[0].z, first.items[0].z] == [6.0, 5.0]
-
-
 def test_a_byte_order_mark_and_windows_line_ends_are_read(tmp_path: Path) -> None:
     (tmp_path / "a.waypoints").write_bytes(b"\xef\xbb\xbf" + waypoints(ROW).replace("\n", "\r\n").encode())
     assert len(load_plan(tmp_path / "a.waypoints").items) == 1

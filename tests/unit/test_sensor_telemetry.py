@@ -13,7 +13,7 @@ from flightstack.core.contract import Quaternion, Vector3
 from flightstack.core.geometry import conjugate, quaternion_product, rotate, rotation_vector
 from flightstack.estimation.error_state import ATTITUDE, POSITION, VELOCITY, read_nominal, turned
 from flightstack.estimation.estimator import Estimator
-from flightstack.estimation.estimator_report import ControlFlags, RejectionFlags, SolutionFlags
+from flightstack.estimation.estimator_report import CONTROL, REJECTION, SOLUTION
 from flightstack.estimation.health import STUCK_SAMPLES
 from flightstack.estimation.imu_track import ImuTrack
 from flightstack.estimation.motion_covariance import motion_covariance, pose_covariance, twist_covariance
@@ -30,9 +30,9 @@ from tests.support.telemetry_status import status, telemetry
 
 SECONDS = 20.0
 GOOD = (
-    SolutionFlags.ATTITUDE | SolutionFlags.VELOCITY_HORIZONTAL | SolutionFlags.VELOCITY_VERTICAL
-    | SolutionFlags.POSITION_RELATIVE | SolutionFlags.POSITION_ABSOLUTE | SolutionFlags.HEIGHT_ABSOLUTE
-    | SolutionFlags.PREDICTED_RELATIVE | SolutionFlags.PREDICTED_ABSOLUTE
+    SOLUTION.ATTITUDE | SOLUTION.VELOCITY_HORIZONTAL | SOLUTION.VELOCITY_VERTICAL
+    | SOLUTION.POSITION_RELATIVE | SOLUTION.POSITION_ABSOLUTE | SOLUTION.HEIGHT_ABSOLUTE
+    | SOLUTION.PREDICTED_RELATIVE | SOLUTION.PREDICTED_ABSOLUTE
 )  # fmt: skip
 
 
@@ -65,8 +65,8 @@ def test_report_of_a_good_flight_has_good_flags() -> None:
     report = sensed.report
     assert report.solution == GOOD
     in_use = (
-        ControlFlags.GNSS_POSITION | ControlFlags.GNSS_VELOCITY | ControlFlags.BARO_HEIGHT | ControlFlags.MAG_3D
-        | ControlFlags.TILT_ALIGN | ControlFlags.YAW_ALIGN | ControlFlags.IN_AIR | ControlFlags.GNSS_HEIGHT
+        CONTROL.GNSS_POSITION | CONTROL.GNSS_VELOCITY | CONTROL.BARO_HEIGHT | CONTROL.MAG_3D
+        | CONTROL.TILT_ALIGN | CONTROL.YAW_ALIGN | CONTROL.IN_AIR | CONTROL.GNSS_HEIGHT
     )  # fmt: skip
     assert report.control == in_use
     assert report.rejected == 0
@@ -83,15 +83,15 @@ def test_report_before_alignment_has_no_flags() -> None:
 
 @pytest.mark.parametrize(
     ("without_s", "flags"),
-    [(2.0, GOOD), (8.0, SolutionFlags.ATTITUDE | SolutionFlags.VELOCITY_VERTICAL | SolutionFlags.HEIGHT_ABSOLUTE
-                  | SolutionFlags.CONSTANT_POSITION)],
+    [(2.0, GOOD), (8.0, SOLUTION.ATTITUDE | SOLUTION.VELOCITY_VERTICAL | SOLUTION.HEIGHT_ABSOLUTE
+                  | SOLUTION.CONSTANT_POSITION)],
 )  # fmt: skip
 def test_position_is_invalid_after_five_seconds_without_gnss(without_s: float, flags: int) -> None:
     faults = Faults(no_gnss_s=(SECONDS - without_s, math.inf))
     report = sensed_after(SECONDS, faults)[0].report
     assert report.solution == flags
-    assert report.control & ControlFlags.INERTIAL_DEAD_RECKONING
-    assert not report.control & ControlFlags.GNSS_POSITION
+    assert report.control & CONTROL.INERTIAL_DEAD_RECKONING
+    assert not report.control & CONTROL.GNSS_POSITION
 
 
 def test_dead_reckoning_grows_the_reported_uncertainty() -> None:
@@ -101,16 +101,16 @@ def test_dead_reckoning_grows_the_reported_uncertainty() -> None:
 
 def test_jump_of_gnss_is_a_glitch_of_the_position() -> None:
     report = sensed_after(SECONDS, Faults(jump_s=(SECONDS - 1.0, math.inf), jump_m=30.0))[0].report
-    assert report.rejected == RejectionFlags.POSITION_HORIZONTAL
-    assert report.solution & SolutionFlags.GNSS_GLITCH
+    assert report.rejected == REJECTION.POSITION_HORIZONTAL
+    assert report.solution & SOLUTION.GNSS_GLITCH
     assert report.position_ratio > 1.0 > report.velocity_ratio
 
 
 def test_disturbed_field_is_rejected_and_is_no_glitch() -> None:
     disturbed = Faults(disturbed_s=(SECONDS - 2.0, math.inf), disturbance_gauss=0.4)
     report = sensed_after(SECONDS, disturbed)[0].report
-    assert report.rejected & RejectionFlags.MAG_X
-    assert not report.solution & SolutionFlags.GNSS_GLITCH
+    assert report.rejected & REJECTION.MAG_X
+    assert not report.solution & SOLUTION.GNSS_GLITCH
     assert report.field_ratio > 1.0
 
 
@@ -276,12 +276,12 @@ def test_health_of_sensors_is_bad_while_the_imu_is_frozen() -> None:
     healthy = the(mavlink.MAVLINK_MSG_ID_SYS_STATUS, shown).onboard_control_sensors_health
     assert not healthy & (IMU | mavlink.MAV_SYS_STATUS_AHRS)
     assert healthy & BARO
-    assert not the(mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS, shown).flags & SolutionFlags.ATTITUDE
+    assert not the(mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS, shown).flags & SOLUTION.ATTITUDE
 
 
 def test_estimator_status_has_no_good_state_after_the_imu_dies() -> None:
     flags = the(mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS, silent_after(2.0)).flags
-    assert flags & GOOD == GOOD & ~SolutionFlags.ATTITUDE  # GNSS is accepted for the last time 2 s before
+    assert flags & GOOD == GOOD & ~SOLUTION.ATTITUDE  # GNSS is accepted for the last time 2 s before
     assert the(mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS, silent_after(10.0)).flags & GOOD == 0
 
 

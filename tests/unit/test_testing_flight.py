@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -98,6 +99,12 @@ def test_signals_are_made_once_and_only_if_asked_for(flight: Flight, monkeypatch
     assert values["roll_deg"] is known
     with pytest.raises(KeyError):
         values["no_signal"]
+
+
+def test_signals_are_copied_whole(flight: Flight) -> None:
+    copy = pickle.loads(pickle.dumps(flight.signals))
+    assert list(copy.values) == list(flight.signals.values)
+    assert copy.values["altitude_m"].tolist() == flight.signals.values["altitude_m"].tolist()
 
 
 def test_figures_of_a_flight_need_few_signals(flight: Flight, monkeypatch: pytest.MonkeyPatch) -> None:

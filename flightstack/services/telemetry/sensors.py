@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from flightstack.core.contract import Quaternion, Vector3
 from flightstack.core.portable_math import atan2, distance
-from flightstack.estimation.estimator_report import ControlFlags, SolutionFlags
+from flightstack.estimation.estimator_report import CONTROL, SOLUTION
 from flightstack.estimation.motion_covariance import upper_triangle
 from flightstack.estimation.sensed import Sensed
 from flightstack.estimation.sensor_feed import NewestSamples
@@ -223,7 +223,7 @@ def sensor_health(sensed: Sensed) -> tuple[int, int]:
     """Return the bits of MAV_SYS_STATUS_SENSOR of the sensors that are present, and of the healthy ones."""
     samples, now_s = sensed.samples, sensed.time_s
     present = healthy = mavlink.MAV_SYS_STATUS_AHRS | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
-    if not sensed.report.solution & SolutionFlags.ATTITUDE:
+    if not sensed.report.solution & SOLUTION.ATTITUDE:
         healthy &= ~mavlink.MAV_SYS_STATUS_AHRS
     for bits, sample, limit_s in _sensors(samples):
         if sample is None:
@@ -233,7 +233,7 @@ def sensor_health(sensed: Sensed) -> tuple[int, int]:
             healthy |= bits
     if sensed.imu_has_failed:
         healthy &= ~_IMU
-    if not sensed.report.control & ControlFlags.MAG_3D:
+    if not sensed.report.control & CONTROL.MAG_3D:
         healthy &= ~mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
     return present, healthy
 
