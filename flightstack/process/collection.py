@@ -14,7 +14,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def paused() -> Iterator[None]:
-    """Collect nothing until ``resume`` or the end of the block, and nothing at the end of the interpreter."""
+    """Collect nothing until ``resume``, which ends the block too, and nothing at the end of the interpreter."""
     collects = gc.isenabled()
     gc.disable()
     atexit.register(gc.freeze)
@@ -22,7 +22,7 @@ def paused() -> Iterator[None]:
         yield
     finally:
         if collects:
-            gc.enable()
+            resume()
 
 
 def resume() -> None:

@@ -17,6 +17,7 @@ import signal
 import sys
 import threading
 
+from flightstack.process import collection
 from flightstack.process.command_line import own_program
 
 _READS = "-"
@@ -63,7 +64,8 @@ if __name__ == "__main__":
     pipe, module_name = int(sys.argv.pop(1)), sys.argv.pop(1)
     if module_name == _READS:
         try:
-            importlib.import_module(sys.argv.pop(1))
+            with collection.paused():
+                importlib.import_module(sys.argv.pop(1))
         except BaseException:
             _take_order(pipe)  # its output is where the reason is looked for
             raise
