@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 
@@ -13,6 +14,9 @@ from gcs_cli.help_generated import HELP, WIDTH
 
 _INTERRUPTED = 130
 """``gcs_cli.errors.INTERRUPTED``, without the import."""
+_HELP = ("-h", "--help")
+_FLYING = ("fly", "sim")
+"""Commands with a simulator and a flight stack of their own."""
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -29,11 +33,23 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _run(words: list[str]) -> int:
-    if len(words) == 1 and words[0] in ("-h", "--help") and _columns() >= WIDTH and _prints(HELP):
+    if len(words) == 1 and words[0] in _HELP and _columns() >= WIDTH and _prints(HELP):
         return 0
-    from gcs_cli.program import run
+    with contextlib.ExitStack() as ends:
+        prepared = None
+        if _flies(words):
+            from gcs_cli.fly.processes import prepare  # noqa: PLC0415  # other commands do without it
 
-    return run(words)
+            with contextlib.suppress(OSError):  # the command reports it
+                prepared = ends.enter_context(prepare())
+        from gcs_cli.program import run
+
+        return run(words, prepared)
+
+
+def _flies(words: list[str]) -> bool:
+    """Return True if the command will start simulator and flight stack, which takes longer than its own imports."""
+    return bool(words) and words[0] in _FLYING and not any(flag in words for flag in _HELP)
 
 
 def _report_interrupt(as_json: bool) -> int:

@@ -29,6 +29,7 @@ from gcs_cli.link.endpoint import (
 from gcs_cli.output import Output
 
 if TYPE_CHECKING:
+    from flightstack.process.supervised import PreparedPrograms
     from gcs_cli.link.connection import Connection
 
 DEFAULT_TIMEOUT_S = 5.0
@@ -143,6 +144,8 @@ class Settings:
     signing_key: Path | None = None
     lent: Connection | None = None
     """The open link of a shell, for commands that name no other link."""
+    prepared: PreparedPrograms | None = None
+    """Simulator and flight stack of the command, if they were started before the command was imported."""
 
 
 def settings_of(context: typer.Context) -> Settings:

@@ -1,4 +1,4 @@
-"""Command lines of the three programs: common appearance, shared options, and how one program starts another."""
+"""Command lines of the three programs: common appearance and shared options."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import dataclasses
 import functools
 import inspect
 import re
-import sys
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, get_type_hints
@@ -40,7 +39,6 @@ PANELS = (
 _IN_PANEL: Any = [{"rich_help_panel": title} for title in PANELS]
 IN_VEHICLE, IN_LOOPS, IN_SIMULATION, IN_DISTURBANCES, IN_LINKS, IN_OUTPUT = _IN_PANEL
 _EXTRA = re.compile(r"Got unexpected extra arguments?(?:\(s\))? \((.*)\)", re.DOTALL)
-_ROOT = Path(__file__).resolve().parents[2]
 
 
 def usage_sentence(error: Any) -> str:
@@ -231,16 +229,6 @@ def run_app(app: typer.Typer, name: str, arguments: Sequence[str] | None = None)
     if not code:
         check_output()
     return int(code or 0)
-
-
-def own_program(module: str, *arguments: str) -> list[str]:
-    """Return the command that runs a module of this installation.
-
-    ``-P`` keeps Python from importing a folder of the same name in the working directory, unless the working
-    directory is this installation.
-    """
-    safe = [] if Path.cwd() == _ROOT else ["-P"]
-    return [sys.executable, *safe, "-m", module, *arguments]
 
 
 def _print_version(context: typer.Context, wanted: bool) -> None:

@@ -18,7 +18,7 @@ from flightstack.core.errors import ConfigError
 from flightstack.core.port_numbers import api_client_port, ground_station_port
 from flightstack.params.behaviour import SPECS, Behaviour
 from flightstack.params.vehicle import load_vehicle
-from flightstack.process.command_line import own_program
+from flightstack.process.supervised import own_program
 from flightstack.testing.instances import ServerError, free_instance
 from flightstack.testing.setup import Setup
 from gcs_cli.fly.fly_flags import LONGEST_S, TO_STACK, FlyOptions, passed

@@ -13,7 +13,7 @@ import signal
 import sys
 from pathlib import Path
 
-from gcs_cli.fly.processes import Child, Children, PreparedStack
+from gcs_cli.fly.processes import Child, Children, prepare
 from gcs_cli.run_directory import SIMULATOR, STACK
 
 _LISTENS = {SIMULATOR: b", speed ", STACK: b"; simulator "}
@@ -45,7 +45,7 @@ class _Guard:
 
 def main(folder: Path, simulator: list[str], stack: list[str]) -> str:
     """Run both processes; return why they ended, empty if standard input was closed."""
-    with PreparedStack() as stack_process, Children(folder, stack_process) as children:
+    with prepare("flightstack") as prepared, Children(folder, prepared) as children:
         guard = _Guard(children)
         # the simulator's port is the lock of an instance: no flight stack may connect to the simulator of another test
         first = children.start(SIMULATOR, "sim_bridge", simulator)

@@ -11,7 +11,7 @@ import typer
 from flightstack.process.command_line import IN_OUTPUT, PanelCommand, expand_options, make_app
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly.fly_flags import FlyOptions, RunOptions, complete_options
-from gcs_cli.settings import FlownInstanceOption, FlownTimeoutOption, JsonOption, output_of
+from gcs_cli.settings import FlownInstanceOption, FlownTimeoutOption, JsonOption, output_of, settings_of
 from gcs_cli.sim.sim_flags import PLAN_FIELDS, SimOptions
 
 app = make_app(add_completion=False)
@@ -35,12 +35,12 @@ def fly(
     ] = None,
 ) -> None:
     """Fly a mission in simulation and write log, summary and report."""
-    from gcs_cli.fly.processes import PreparedStack  # noqa: PLC0415  # --help has no use for it
+    from gcs_cli.fly.processes import prepare  # noqa: PLC0415  # --help has no use for it
 
-    with PreparedStack() as stack:
+    with settings_of(context).prepared or prepare() as programs:
         from gcs_cli.fly.fly_run import run_fly
 
-        run_fly(complete_options(context, "fly", options, run), run, out, stack)
+        run_fly(complete_options(context, "fly", options, run), run, out, programs)
 
 
 @app.command(cls=PanelCommand)
@@ -63,10 +63,10 @@ def sim(
     out = output_of(context, as_json)
     if watch and out.as_json:
         raise CliError("give either --watch or --json: the view needs the terminal", USAGE)
-    from gcs_cli.fly.processes import PreparedStack  # noqa: PLC0415  # --help has no use for it
+    from gcs_cli.fly.processes import prepare  # noqa: PLC0415  # --help has no use for it
 
-    with PreparedStack() as stack:
+    with settings_of(context).prepared or prepare() as programs:
         from gcs_cli.sim.sim_run import simulate
 
         run = RunOptions(instance=instance, timeout=timeout)
-        simulate(complete_options(context, "sim", options, run), out, watch, stack)
+        simulate(complete_options(context, "sim", options, run), out, watch, programs)

@@ -13,6 +13,7 @@ from pathlib import Path
 from flightstack.core.port_numbers import vehicle_ground_port
 from flightstack.plan import Plan
 from flightstack.process.console import complain
+from flightstack.process.supervised import PreparedPrograms
 from gcs_cli.errors import FAILED, INTERRUPTED, NO_ANSWER, USAGE, CliError
 from gcs_cli.fly.flight import Flight, Flown, Phase
 from gcs_cli.fly.flight_watch import STALL_S
@@ -26,7 +27,7 @@ from gcs_cli.fly.fly_options import (
     simulator_arguments,
     stack_arguments,
 )
-from gcs_cli.fly.processes import Child, Children, Interruption, PreparedStack
+from gcs_cli.fly.processes import Child, Children, Interruption
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.endpoint import LOOPBACK, UDP_IN, VehicleEndpoint
 from gcs_cli.link.tlog import TlogFile
@@ -55,7 +56,7 @@ def fly(
     out: Path | None,
     display: Display,
     overwrite: bool = False,
-    prepared: PreparedStack | None = None,
+    prepared: PreparedPrograms | None = None,
 ) -> Flown:
     """Fly ``plan`` with a simulator and a flight stack of our own; raise CliError if they cannot be started.
 
@@ -165,7 +166,7 @@ def _failed_child(flight: Flight, children: Children) -> Child | None:
 
 
 def run_fly(
-    options: FlyOptions, run: RunOptions, out: Path | None, prepared: PreparedStack | None = None
+    options: FlyOptions, run: RunOptions, out: Path | None, prepared: PreparedPrograms | None = None
 ) -> None:
     """Fly the mission, write the results to ``out`` and print a summary; raise CliError, ConfigError."""
     items = checked_plan(options)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import re
 import signal
 import subprocess
@@ -12,13 +11,25 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, Protocol, TypeVar
 
-from flightstack.process.supervised import order, prepared, supervised
+from flightstack.process.supervised import PreparedPrograms, supervised
 
 _TAIL_BYTES = 4096
 _POLL_S = 0.02
 _NOTICE = re.compile(r"\S+: (warning: |compiling )|.*\wWarning: ")
 """A line to show in flight: a warning of the child or of one of its libraries, or progress of compilation."""
 _BLAME = ("lost at", "lost:", "was shut down")  # in the last line of simulator or flight stack
+
+
+_IMPORTED = {
+    "flightstack": ("flightstack.process.program",),
+    "sim_bridge": ("sim_bridge.program", "sim_bridge.server.quiet_exchanges"),
+}
+"""What a program imports first, by its module."""
+
+
+def prepare(*modules: str) -> PreparedPrograms:
+    """Start the programs of these modules, which wait for their command lines."""
+    return PreparedPrograms({module: _IMPORTED[module] for module in modules or _IMPORTED})
 
 
 class Process(Protocol):
@@ -135,59 +146,14 @@ class Child:
         self._process.stdin.close()
 
 
-class PreparedStack:
-    """A process that imports a flight stack's modules, a third of its start, and waits for its command line.
-
-    A command starts it before it imports what it needs itself. The end of the ``with`` block ends one that still waits.
-    """
-
-    def __init__(self) -> None:
-        self._process: subprocess.Popen[bytes] | None = subprocess.Popen(
-            prepared("flightstack.process.program"),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
-
-    def take(self, module: str, arguments: Sequence[str], output: Path) -> subprocess.Popen[bytes] | None:
-        """Run ``module`` with its output in the file ``output``; return None if this process cannot.
-
-        That is the case for another module than the flight stack, after the first call, and if the process has ended.
-        One whose imports fail says why in ``output``.
-        """
-        process = self._process
-        if module != "flightstack" or process is None or process.poll() is not None:
-            return None
-        assert process.stdin is not None
-        try:
-            process.stdin.write(order(str(output.absolute()), module, *arguments))
-            process.stdin.flush()
-        except OSError:
-            return None
-        self._process = None
-        return process
-
-    def __enter__(self) -> PreparedStack:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._process is not None:
-            self._process.kill()
-            self._process.wait()
-            assert self._process.stdin is not None
-            with contextlib.suppress(OSError):
-                self._process.stdin.close()
-
-
 class Children:
     """The children of a run. Leaving the ``with`` block ends them all, and so does the end of this process.
 
     The last one started is stopped first: it depends on those before it.
     """
 
-    def __init__(self, folder: Path, prepared: PreparedStack | None = None) -> None:
-        """``prepared`` becomes the flight stack."""
+    def __init__(self, folder: Path, prepared: PreparedPrograms | None = None) -> None:
+        """``prepared`` become children of their modules."""
         self._folder = folder
         self._prepared = prepared
         self._all: list[Child] = []

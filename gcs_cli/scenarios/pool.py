@@ -12,7 +12,7 @@ from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from flightstack.process.command_line import own_program
+from flightstack.process.supervised import own_program
 from gcs_cli.scenarios.pipes import receive, send
 
 if TYPE_CHECKING:  # they import the simulator, while the first worker starts

@@ -17,11 +17,11 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.process.config_check import DIRECTORY_HINT, check_state
 from flightstack.process.console import complain
 from flightstack.process.ports import ports_config
-from flightstack.process.supervised import supervised
+from flightstack.process.supervised import PreparedPrograms, supervised
 from flightstack.transports.udp import UdpSocket
 from gcs_cli.errors import FAILED, NO_ANSWER, CliError
 from gcs_cli.fly.fly_options import check_options, check_ports, simulator_arguments
-from gcs_cli.fly.processes import Children, Interruption, PreparedStack
+from gcs_cli.fly.processes import Children, Interruption
 from gcs_cli.link import calls
 from gcs_cli.link.endpoint import LOOPBACK
 from gcs_cli.link.session import Session
@@ -121,8 +121,8 @@ class Fleet:
     Their output goes to a temporary directory.
     """
 
-    def __init__(self, prepared: PreparedStack | None) -> None:
-        """``prepared`` becomes the flight stack of the first vehicle."""
+    def __init__(self, prepared: PreparedPrograms | None) -> None:
+        """``prepared`` become simulator and flight stack of the first vehicle."""
         self._prepared = prepared
         self._all: list[VehicleProcesses] = []
         self._ends = contextlib.ExitStack()
@@ -187,7 +187,7 @@ def check_vehicle(vehicle: SimOptions) -> None:
     check_ports(vehicle)
 
 
-def simulate(options: SimOptions, out: Output, watch: bool, prepared: PreparedStack | None = None) -> None:
+def simulate(options: SimOptions, out: Output, watch: bool, prepared: PreparedPrograms | None = None) -> None:
     """Run the vehicles until a signal, the end of the view, or the end of a process; raise CliError, ConfigError."""
     vehicles = vehicles_of(options)
     for vehicle in vehicles:

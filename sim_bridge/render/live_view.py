@@ -16,7 +16,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from flightstack.core.contract import MAX_ROTORS, STATE_SIZE
-from flightstack.process.command_line import own_program
+from flightstack.process.supervised import own_program
 from sim_bridge.errors import UsageProblemError
 
 if TYPE_CHECKING:

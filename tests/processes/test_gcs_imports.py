@@ -6,9 +6,12 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import pytest
 
+from flightstack.process.supervised import PreparedPrograms
+from gcs_cli import program
 from gcs_cli.__main__ import main
 from gcs_cli.commands.lazy_group import LazyGroup
 from gcs_cli.commands.registry import (
@@ -20,6 +23,8 @@ from gcs_cli.commands.registry import (
     PilGroup,
     RallyGroup,
 )
+from gcs_cli.fly import processes
+from gcs_cli.fly.processes import prepare
 from gcs_cli.program import run
 from tests.support.sample_logs import small_tlog, small_ulog
 
@@ -191,3 +196,41 @@ def test_short_log_is_read_without_a_compiler(words: list[str], tmp_path: Path) 
     log.write_bytes(small_ulog())
     code = "import sys; from gcs_cli.__main__ import main; assert main(sys.argv[1:]) == 0"
     assert "numba" not in loaded_by(code, *words, str(log))
+
+
+@pytest.mark.parametrize(
+    ("words", "is_started"),
+    [
+        (["fly", "square"], True),
+        (["sim"], True),
+        (["fly", "square", "--help"], False),
+        (["sim", "-h"], False),
+        (["param", "get", "fly"], False),
+        ([], False),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else None,
+)
+def test_simulator_and_flight_stack_start_before_the_command_line_is_imported(
+    words: list[str], is_started: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    programs = MagicMock()
+    programs.__enter__.return_value = programs
+    given: list[object] = []
+    monkeypatch.setattr(processes, "prepare", lambda: programs)
+    monkeypatch.setattr(program, "run", lambda _words, prepared: given.append(prepared) or 3)
+    assert main(words) == 3
+    assert given == [programs if is_started else None]
+    assert programs.__exit__.called == is_started
+
+
+def test_programs_that_are_not_used_end_with_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[PreparedPrograms] = []
+
+    def start() -> PreparedPrograms:
+        started.append(prepare())
+        return started[0]
+
+    monkeypatch.setattr(processes, "prepare", start)
+    assert main(["fly", "--no-such-option"]) == 2
+    for module in ("flightstack", "sim_bridge"):
+        assert started[0].take(module, [], Path(os.devnull)) is None

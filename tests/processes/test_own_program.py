@@ -10,9 +10,8 @@ from pathlib import Path
 import pytest
 
 import flightstack
-from flightstack.process.command_line import own_program
-from flightstack.process.supervised import order, prepared, supervised
-from gcs_cli.fly.processes import Children, PreparedStack
+from flightstack.process.supervised import order, own_program, prepared, supervised
+from gcs_cli.fly.processes import Children, prepare
 
 
 @pytest.mark.parametrize("inside", [False, True], ids=["elsewhere", "in the checkout"])
@@ -54,12 +53,14 @@ def test_a_prepared_program_that_cannot_be_imported_says_so_in_its_output(tmp_pa
     assert output.read_text().splitlines()[-1] == "ModuleNotFoundError: No module named 'flightstack.missing'"
 
 
-def test_one_prepared_flight_stack_is_taken_once(tmp_path: Path) -> None:
-    with PreparedStack() as stack, Children(tmp_path, stack) as children:
-        children.start("sim-bridge", "sim_bridge", ["--version"])
+def test_each_prepared_program_is_taken_once(tmp_path: Path) -> None:
+    with prepare() as programs, Children(tmp_path, programs) as children:
+        simulator = children.start("sim-bridge", "sim_bridge", ["--version"])
         first = children.start("flightstack", "flightstack", ["--version"])
         assert children.wait(60.0)
         assert first.last_line == f"flightstack {flightstack.__version__}"
+        assert simulator.last_line == f"sim-bridge {flightstack.__version__}"
+        assert programs.take("sim_bridge", [], tmp_path / "sim-bridge.log") is None
         again = children.start("second", "flightstack", ["--version"])
         assert children.wait(60.0)
         assert again.last_line == first.last_line

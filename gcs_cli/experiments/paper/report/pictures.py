@@ -13,7 +13,7 @@ from typing import NamedTuple
 from flightstack.core.errors import INSTALL_MULTIBODY
 from flightstack.core.geometry_bulk import quaternions_from_euler
 from flightstack.flight_log.poses_file import Poses, write_poses
-from flightstack.process.command_line import own_program
+from flightstack.process.supervised import own_program
 from gcs_cli.experiments.paper.flights import cases
 from gcs_cli.experiments.paper.flights.types import Recording
 
