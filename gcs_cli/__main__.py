@@ -9,6 +9,7 @@ import contextlib
 import os
 import sys
 
+from flightstack.process import collection
 from flightstack.process.interrupts import report, signals
 from gcs_cli.help_generated import HELP, WIDTH
 
@@ -42,8 +43,8 @@ def _run(words: list[str]) -> int:
 
             with contextlib.suppress(OSError):  # the command reports it
                 prepared = ends.enter_context(prepare())
-        from gcs_cli.program import run
-
+        with collection.paused():
+            from gcs_cli.program import run
         return run(words, prepared)
 
 

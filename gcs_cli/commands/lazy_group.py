@@ -13,6 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
+from flightstack.process import collection
 from gcs_cli.commands.examples import epilog
 
 
@@ -28,7 +29,9 @@ class LazyCommand(NamedTuple):
 
     def load(self, words: str) -> Any:
         """Import the module and return the Click command, named by its ``words``, such as ``mission upload``."""
-        loaded = get_command(getattr(import_module(self.module), self.app))
+        with collection.paused():
+            module = import_module(self.module)
+        loaded = get_command(getattr(module, self.app))
         command = loaded.commands[words.rsplit(maxsplit=1)[-1]] if isinstance(loaded, TyperGroup) else loaded
         command.epilog = epilog(words)
         return command

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from flightstack.process import collection
 from flightstack.process.command_line import IN_OUTPUT, PanelCommand, expand_options, make_app
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly.fly_flags import FlyOptions, RunOptions, complete_options
@@ -38,7 +39,8 @@ def fly(
     from gcs_cli.fly.processes import prepare  # noqa: PLC0415  # --help has no use for it
 
     with settings_of(context).prepared or prepare() as programs:
-        from gcs_cli.fly.fly_run import run_fly
+        with collection.paused():
+            from gcs_cli.fly.fly_run import run_fly
 
         run_fly(complete_options(context, "fly", options, run), run, out, programs)
 
@@ -66,7 +68,8 @@ def sim(
     from gcs_cli.fly.processes import prepare  # noqa: PLC0415  # --help has no use for it
 
     with settings_of(context).prepared or prepare() as programs:
-        from gcs_cli.sim.sim_run import simulate
+        with collection.paused():
+            from gcs_cli.sim.sim_run import simulate
 
         run = RunOptions(instance=instance, timeout=timeout)
         simulate(complete_options(context, "sim", options, run), out, watch, programs)

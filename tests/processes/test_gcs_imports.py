@@ -33,6 +33,7 @@ LIGHT = (
     "flightstack.core",
     "flightstack.core.errors",
     "flightstack.process",
+    "flightstack.process.collection",
     "flightstack.process.command_line",
     "flightstack.process.console",
     "flightstack.process.interrupts",
