@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 import socket
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from flightstack.plan import Command
+from flightstack.plan.files import load_plan, save_plan
 from tests.support.commands import gcs
 from tests.support.dask_cluster import Cluster
 from tests.support.process import Process, children_of, ends_of, wait_until
@@ -41,6 +44,8 @@ wind.gust_m_s = { uniform = [0, 2] }
 """
 FLIES = "gcs_cli.scenarios.worker"
 TABLES = ("flights.parquet", "flights.csv")
+HELD_S = 900.0
+"""Of a flight, which takes a second of processor time: a worker that is killed after the first one flies another."""
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +57,10 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     vehicles.mkdir()
     (vehicles / "v.toml").write_bytes((ROOT / "flightstack/params/vehicles/x_quad.toml").read_bytes())
     plan = here / "p.plan"
-    plan.write_bytes((ROOT / "missions/hop.plan").read_bytes())
+    hop = load_plan(ROOT / "missions/hop.plan")
+    takeoff, landing = hop.items
+    held = replace(takeoff, command=Command.NAV_LOITER_TIME, param1=HELD_S)
+    save_plan(plan, replace(hop, items=(takeoff, held, landing)))
     (here / "c.toml").write_text(CAMPAIGN.format(plan=plan))
     with pytest.MonkeyPatch.context() as patch, warm_children():
         patch.chdir(here)
