@@ -19,7 +19,7 @@ CORES := $(shell getconf _NPROCESSORS_ONLN)
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 .DEFAULT_GOAL := help
 
-.PHONY: help setup fly test test-all nightly stress check static lint types imports generated generate docs bench fuzz fuzz-firmware firmware-check mutation clean
+.PHONY: help setup fly test test-all nightly oldest stress check static lint types imports generated generate docs bench fuzz fuzz-firmware firmware-check mutation clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
@@ -59,8 +59,14 @@ test: $(READY) ## Run the tests that a developer runs all day: eleven in twelve 
 test-all: $(READY) ## Run every test
 	@$(PYTEST) --durations 15
 
-nightly: $(READY) ## Run every test with all its samples, seeds and combinations
+nightly: $(READY) ## Run every test with all its samples, seeds and combinations, and those of oldest
 	@NIGHTLY=1 $(PYTEST) --durations 25
+	@$(MAKE) --no-print-directory oldest
+
+oldest: ## Run the quick tests with the oldest libraries that pyproject.toml admits, in an environment of their own
+	@mkdir -p build
+	@$(PYTHON) -m tools.oldest_versions > build/oldest.txt
+	@PIP_CONSTRAINT=$(CURDIR)/build/oldest.txt $(MAKE) --no-print-directory VENV=.venv-oldest test
 
 stress: $(READY) ## Run every test beside a program that keeps each core busy
 	@$(BIN)/python tools/beside_load.py $(PYTEST)
