@@ -6,6 +6,8 @@ lost scheduler loses no flight that is over.
 
 from __future__ import annotations
 
+import asyncio
+import concurrent.futures
 import contextlib
 import functools
 import logging
@@ -16,7 +18,6 @@ import socket
 import time
 import warnings
 from collections.abc import Generator, Iterator, Mapping, Sequence
-from concurrent.futures import CancelledError
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from types import TracebackType
@@ -42,7 +43,7 @@ _SIZE_S = 1.0
 _CLOSE_S = 2.0
 """Longest wait for the end of the connection: without its scheduler Dask tries to connect for a while."""
 _PACKAGE = "flightstack"
-_LOST = (OSError, CancelledError, distributed.client.ClosedClientError)
+_LOST = (OSError, concurrent.futures.CancelledError, distributed.client.ClosedClientError)
 """What Dask raises without its scheduler."""
 
 
@@ -137,8 +138,8 @@ class _Run:
 
     def __init__(self, client: Any, address: str, session: tuple[str, str, Mapping[str, str]]) -> None:
         self._client, self._address, self._session = client, address, session
-        self._flying: dict[int, Any] = {}
-        """Futures of Dask by the number of their cases."""
+        self._flying: dict[int, tuple[Any, concurrent.futures.Future[Answer | None]]] = {}
+        """Future of Dask, and the answer that is fetched when it is done, by the number of their cases."""
         self._done: SimpleQueue[int] = SimpleQueue()
         self._threads, self._next_size_s = 1, -math.inf
         self._seen: set[str] = set()
@@ -174,9 +175,21 @@ class _Run:
         with self._losing_scheduler():
             futures = self._client.map(task, list(map(pickle.dumps, orders)), pure=False)
         for number, future in enumerate(futures, self.submitted):
-            future.add_done_callback(lambda _, number=number: self._done.put(number))
-            self._flying[number] = future
+            self._flying[number] = future, self._fetch(number, future)
         self.submitted += len(orders)
+
+    def _fetch(self, number: int, future: Any) -> concurrent.futures.Future[Answer | None]:
+        """Return the future answer to a flight, None if Dask will have none; once it is done, so is ``number``.
+
+        A result that is lost with its worker is computed again, after a long time without workers: it is awaited in
+        Dask's thread. Dask fetches together what is done at the same time.
+        """
+        answer = self._client.gather(future, errors="skip", asynchronous=True)
+        fetched: concurrent.futures.Future[Answer | None] = asyncio.run_coroutine_threadsafe(
+            answer, self._client.loop.asyncio_loop
+        )
+        fetched.add_done_callback(lambda _: self._done.put(number))
+        return fetched
 
     def events(self) -> Iterator[Message]:
         """Yield what happened since the last call; wait a little."""
@@ -191,12 +204,12 @@ class _Run:
         with contextlib.suppress(Empty):
             while True:
                 numbers.append(self._done.get_nowait())
-        futures = {number: self._flying.pop(number) for number in numbers}
-        with self._losing_scheduler():
-            answers = self._client.gather(futures, errors="skip")  # at once: each call takes two messages
-        for number, answer in answers.items():
+        for number in numbers:  # all of them before the next ones are submitted at once
+            future, fetched = self._flying.pop(number)
+            with self._losing_scheduler():
+                answer = fetched.result()
             self.over += 1
-            yield self._finished(number, futures[number], answer)
+            yield self._finished(number, future, answer)
 
     def _finished(self, number: int, future: Any, answer: Answer | None) -> Finished:
         """Return the end of a flight; ``answer`` is None if Dask has none."""
@@ -230,4 +243,4 @@ class _Run:
         """Cancel all flights."""
         if self._flying and self._client.status == "running":
             with contextlib.suppress(*_LOST):
-                self._client.cancel(list(self._flying.values()))
+                self._client.cancel([future for future, _ in self._flying.values()])

@@ -42,6 +42,23 @@ flights = 3
 wind.gust_m_s = { uniform = [0, 2] }
 [expect]
 """
+FETCHED_LATE = """\
+import asyncio
+import contextlib
+
+def dask_setup(scheduler):
+    gather = scheduler.handlers["gather"]
+
+    async def gather_without_worker(*arguments, **keywords):
+        scheduler.handlers["gather"] = gather
+        print("a result is fetched", flush=True)
+        while scheduler.workers:
+            await asyncio.sleep(0.01)
+        return await gather(*arguments, **keywords)
+
+    scheduler.handlers["gather"] = gather_without_worker
+"""
+"""Makes the fetch of the first result wait for the loss of the worker that has it."""
 FLIES = "gcs_cli.scenarios.worker"
 TABLES = ("flights.parquet", "flights.csv")
 HELD_S = 900.0
@@ -109,6 +126,40 @@ def test_flights_of_a_killed_worker_fly_on_an_added_one_to_the_same_table(
     second.kill()
     assert sorted(event["flight"] for event in flights(run)) == [1, 2, 3, 4]
     assert tables("cluster") == tables("local")
+
+
+def lose_first_result(cluster: Cluster, *arguments: str) -> Process:
+    """Return a campaign whose only worker is lost between the end of a flight and the fetch of its result."""
+    worker = cluster.add_worker()
+    worker.wait_for("Registered to")
+    run = campaign(cluster, *arguments)
+    cluster.scheduler.wait_for("a result is fetched")
+    worker.kill()
+    run.wait_for(f"{cluster.address} has no workers: the flights wait for one")
+    return run
+
+
+def test_flight_whose_result_is_lost_with_its_worker_flies_again(
+    flown: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(flown)
+    with Cluster(tmp_path, FETCHED_LATE) as cluster:
+        run = lose_first_result(cluster, "--out", "refetched", "--csv", "--json")
+        cluster.add_worker()
+        assert run.end() == 0
+    assert sorted(event["flight"] for event in flights(run)) == [1, 2, 3, 4]
+    assert tables("refetched") == tables("local")
+
+
+def test_ctrl_c_ends_the_wait_for_a_lost_result(
+    flown: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(flown)
+    with Cluster(tmp_path, FETCHED_LATE) as cluster:
+        run = lose_first_result(cluster, "--out", "interrupted")
+        run.interrupt()
+        assert run.end() == 130
+    assert run.lines[-1] == "gcs: interrupted: 0 of 4 flights are over; the same command continues"
 
 
 def test_ctrl_c_cancels_the_flights_and_keeps_those_that_are_over(folder: Path, cluster: Cluster) -> None:
