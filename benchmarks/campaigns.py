@@ -102,7 +102,7 @@ class Workers:
 
 @contextmanager
 def _new_journal(campaign: Campaign, planned: Sequence[PlannedFlight]) -> Iterator[Journal]:
-    record = record_of("plan", campaign.files(flight.inputs for flight in planned), planned)
+    record = record_of("plan", campaign.path, campaign.files(flight.inputs for flight in planned), planned)
     with tempfile.TemporaryDirectory() as folder, open_journal(Path(folder), record) as journal:
         yield journal
 

@@ -27,16 +27,24 @@ from gcs_cli.errors import USAGE, CliError
 
 JOURNAL, RECORD = "flights.jsonl", "campaign.json"
 RESULTS = PARQUET, CSV, REPORT = "flights.parquet", "flights.csv", "report.html"
-_FORM = 1
+_FORM = 2
 """Version of the directory's form."""
+_DAMAGED = (ValueError, TypeError, AttributeError, KeyError)
+"""What a damaged record raises."""
 
 
-def record_of(kind: str, files: Mapping[str, bytes], flights: Sequence[PlannedFlight]) -> dict[str, Any]:
-    """Return the record of a campaign: equal records fly equal flights. ``kind``: ``plan`` or ``seek``."""
+def record_of(
+    kind: str, path: Path, files: Mapping[str, bytes], flights: Sequence[PlannedFlight]
+) -> dict[str, Any]:
+    """Return the record of the campaign in the file ``path``. ``kind``: ``plan`` or ``seek``.
+
+    Records that are equal but for the path fly equal flights.
+    """
     inputs = json.dumps([[flight.number, flight.seed, dict(flight.inputs)] for flight in flights])
     return {
         "form": _FORM,
         "kind": kind,
+        "campaign": str(path.resolve()),
         "version": __version__,
         "sources": sources_digest(FLYING),
         "flights": hashlib.sha256(inputs.encode()).hexdigest(),
@@ -149,13 +157,23 @@ def flown_before(folder: Path, number: int) -> PlannedFlight:
     return PlannedFlight(number, rows[number]["seed"], rows[number]["inputs"])
 
 
-def changed_since(folder: Path, files: Mapping[str, bytes]) -> str:
-    """Return what changed since the flights of ``folder``, as the beginning of a sentence, or empty."""
-    with contextlib.suppress(
-        OSError, ValueError, TypeError, AttributeError, KeyError
-    ):  # no record, or a damaged one
+def check_search(folder: Path, record: Mapping[str, Any]) -> None:
+    """Raise CliError (usage) if ``folder`` holds another campaign than the search with ``record``."""
+    held = ""
+    with contextlib.suppress(OSError, *_DAMAGED):  # no record, or a damaged one
+        held = _held(json.loads((folder / RECORD).read_text(encoding="utf-8")), record)
+    if held:
+        raise CliError(f"{folder}: {held}: give the --out of the search", USAGE)
+
+
+def changed_since(folder: Path, record: Mapping[str, Any]) -> str:
+    """Return what changed since the flights of ``folder``, as the beginning of a sentence, or empty.
+
+    ``record`` need not have the same flights.
+    """
+    with contextlib.suppress(OSError, *_DAMAGED):  # no record, or a damaged one
         before = json.loads((folder / RECORD).read_text(encoding="utf-8"))
-        return _difference(before, record_of("seek", files, ()) | {"flights": before["flights"]})
+        return _difference(before, {**record, "flights": before["flights"]})
     return ""
 
 
@@ -186,12 +204,31 @@ def _check_record(folder: Path, record: Mapping[str, Any]) -> None:
         return
     try:
         before = json.loads(path.read_text(encoding="utf-8"))
+        held = _held(before, record)
         difference = _difference(before, record)
-    except (ValueError, TypeError, AttributeError, KeyError):
+    except _DAMAGED:
         raise ConfigError(path, "", "is damaged: give another --out, or --overwrite") from None
+    if held:
+        raise CliError(f"{folder}: {held}: give another --out, or --overwrite to replace it", USAGE)
     if difference:
         remedy = "give another --out, or --overwrite to fly all of them again"
         raise CliError(f"{folder}: {difference} since its flights: {remedy}", USAGE)
+
+
+def _held(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
+    """Return which other campaign the record ``before`` is of, as the beginning of a sentence; empty for the same.
+
+    A file that has moved with its content is the same campaign.
+    """
+    if before["form"] != now["form"]:
+        return "the directory holds the campaign of another version of flightstack"
+    name = Path(now["campaign"]).name
+    if before["campaign"] != now["campaign"] and before["files"].get(name) != now["files"].get(name):
+        return f"the directory holds the campaign of {before['campaign']}"
+    if before["kind"] != now["kind"]:
+        kind = "a search with --seek" if before["kind"] == "seek" else "a campaign without --seek"
+        return f"the directory holds {kind}"
+    return ""
 
 
 def _difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
@@ -200,9 +237,7 @@ def _difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
         if before["files"].get(name) != now["files"].get(name):
             return f"{name} has changed"
     words = {
-        "kind": "the kind of the campaign has changed",
         "version": f"flightstack has changed from {before['version']} to {now['version']}",
-        "form": "the form of the directory has changed",
         "sources": "the source code of flightstack has changed",
         "flights": "the plan of the flights has changed",
     }

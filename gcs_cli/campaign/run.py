@@ -20,6 +20,7 @@ from gcs_cli.campaign.journal import (
     REPORT,
     Journal,
     changed_since,
+    check_search,
     flown_before,
     open_journal,
     record_of,
@@ -46,11 +47,7 @@ def run_campaign(pool: FlightPool, options: CampaignOptions, console: Console) -
         raise missing_error(options.file, is_campaign)
     campaign = load_campaign(options.file)
     if options.seek is not None and options.only is not None:
-        flight = flown_before(options.folder, options.only)
-        if changed := changed_since(options.folder, campaign.files([flight.inputs])):
-            _say(
-                console, f"{changed} since the search: this flight may differ from its flight {flight.number}"
-            )
+        flight = _searched(campaign, options.folder, options.only, console)
         return fly_only(pool, campaign, flight, options, console)
     if options.seek is not None:
         return run_search(pool, campaign, options, console)
@@ -59,7 +56,7 @@ def run_campaign(pool: FlightPool, options: CampaignOptions, console: Console) -
         return fly_only(pool, campaign, _numbered(campaign, flights, options.only), options, console)
     check_flights(campaign, flights)
     inputs = [flight.inputs for flight in flights]
-    record = record_of("plan", campaign.files(inputs), flights)
+    record = record_of("plan", campaign.path, campaign.files(inputs), flights)
     began_s = time.monotonic()
     with (
         results_directory(options.folder),
@@ -73,7 +70,7 @@ def run_campaign(pool: FlightPool, options: CampaignOptions, console: Console) -
             raise CliError(f"interrupted: {over}; {continuing(options)} continues", INTERRUPTED) from None
         finally:
             display.close()
-        journal.check_unchanged(record_of("plan", campaign.files(inputs), flights))
+        journal.check_unchanged(record_of("plan", campaign.path, campaign.files(inputs), flights))
         rows = ordered(journal)
         write_tables(options.folder, rows, options.csv)
         write_text_atomically(options.folder / REPORT, render_campaign(campaign, rows, options))
@@ -89,6 +86,16 @@ def open_report(folder: Path) -> None:
 def ordered(journal: Journal) -> list[Row]:
     """Return the rows of a journal in the order of their flights."""
     return [journal.rows[number] for number in sorted(journal.rows)]
+
+
+def _searched(campaign: Campaign, folder: Path, number: int, console: Console) -> PlannedFlight:
+    """Return a flight of the search in ``folder``; say what has changed since."""
+    check_search(folder, record_of("seek", campaign.path, campaign.files(()), ()))
+    flight = flown_before(folder, number)
+    record = record_of("seek", campaign.path, campaign.files([flight.inputs]), ())
+    if changed := changed_since(folder, record):
+        _say(console, f"{changed} since the search: this flight may differ from its flight {number}")
+    return flight
 
 
 def _numbered(campaign: Campaign, flights: Sequence[PlannedFlight], number: int) -> PlannedFlight:

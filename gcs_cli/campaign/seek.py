@@ -38,7 +38,7 @@ def run_search(pool: FlightPool, campaign: Campaign, options: CampaignOptions, c
         check_scenario(campaign.scenario(_inputs(campaign, point)))
     flights = options.flights or _DEFAULT_FLIGHTS
     marker = PlannedFlight(flights, campaign.plan.seed, _inputs(campaign, nominal))
-    record = record_of("seek", campaign.files([marker.inputs]), [marker])
+    record = record_of("seek", campaign.path, campaign.files([marker.inputs]), [marker])
     with (
         results_directory(options.folder),
         open_journal(options.folder, record, options.overwrite) as journal,
@@ -52,7 +52,7 @@ def run_search(pool: FlightPool, campaign: Campaign, options: CampaignOptions, c
             raise CliError(f"interrupted: {over}; {continuing(options)} continues", INTERRUPTED) from None
         finally:
             display.close()
-        journal.check_unchanged(record_of("seek", campaign.files([marker.inputs]), [marker]))
+        journal.check_unchanged(record_of("seek", campaign.path, campaign.files([marker.inputs]), [marker]))
         rows = [journal.rows[each.number] for each in found.flown]
     sentences = list(_sentences(campaign, found, journal, options))
     write_tables(options.folder, rows, options.csv)

@@ -194,3 +194,9 @@ def test_a_search_continues_and_its_flights_fly_alone(folder: Path) -> None:
     assert changed.stdout.startswith(
         "s.toml has changed since the search: this flight may differ from its flight 1\n"
     )
+    other = gcs("campaign", "c.toml", "--seek", "worst", "--out", "found", "--only", 1)
+    assert (other.returncode, other.stdout, other.stderr) == (
+        2,
+        "",
+        f"gcs: found: the directory holds the campaign of {folder / 's.toml'}: give the --out of the search\n",
+    )

@@ -346,7 +346,7 @@ def test_each_case_is_made_when_it_is_flown(folder: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr(Campaign, "scenario", scenario)
     options = CampaignOptions(folder / "c.toml")
     display = make_display(Console(file=io.StringIO()), 100, ())
-    with open_journal(folder, record_of("plan", {}, flights)) as journal:
+    with open_journal(folder, record_of("plan", found.path, {}, flights)) as journal:
         Flyer(Pool(), found, journal, display, options).fly(flights)
     assert read == [flights[7].inputs]
 

@@ -34,7 +34,8 @@ from gcs_cli.scenarios.result import Result, not_flown
 FLIGHTS = tuple(
     PlannedFlight(number, 100 + number, {"wind": 0.5 * number, "law": "pid"}) for number in range(1, 6)
 )
-RECORD_1 = record_of("plan", {"c.toml": b"one", "hop.plan": b"plan"}, FLIGHTS)
+FILE = Path("c.toml")
+RECORD_1 = record_of("plan", FILE, {"c.toml": b"one", "hop.plan": b"plan"}, FLIGHTS)
 
 
 def row(flight: PlannedFlight) -> Any:
@@ -131,15 +132,11 @@ def test_each_row_is_synced_before_add_returns(tmp_path: Path, monkeypatch: pyte
 @pytest.mark.parametrize(
     ("record", "difference"),
     [
-        (record_of("plan", {"c.toml": b"two", "hop.plan": b"plan"}, FLIGHTS), "c.toml has changed"),
-        (record_of("plan", {"c.toml": b"one"}, FLIGHTS), "hop.plan has changed"),
+        (record_of("plan", FILE, {"c.toml": b"two", "hop.plan": b"plan"}, FLIGHTS), "c.toml has changed"),
+        (record_of("plan", FILE, {"c.toml": b"one"}, FLIGHTS), "hop.plan has changed"),
         (
-            record_of("plan", {"c.toml": b"one", "hop.plan": b"plan"}, FLIGHTS[:3]),
+            record_of("plan", FILE, {"c.toml": b"one", "hop.plan": b"plan"}, FLIGHTS[:3]),
             "the plan of the flights has changed",
-        ),
-        (
-            record_of("seek", {"c.toml": b"one", "hop.plan": b"plan"}, FLIGHTS),
-            "the kind of the campaign has changed",
         ),
         ({**RECORD_1, "version": "9.9"}, f"flightstack has changed from {RECORD_1['version']} to 9.9"),
         ({**RECORD_1, "sources": "0"}, "the source code of flightstack has changed"),
@@ -157,6 +154,44 @@ def test_a_changed_campaign_is_refused_and_its_rows_stay(
         assert list(journal.rows) == [1]
     with open_journal(tmp_path, record, overwrite=True) as journal:
         assert journal.rows == {}
+
+
+@pytest.mark.parametrize(
+    ("record", "held"),
+    [
+        (record_of("plan", Path("d.toml"), {"d.toml": b"one"}, FLIGHTS), f"the campaign of {FILE.resolve()}"),
+        (
+            record_of("plan", Path("other/c.toml"), {"c.toml": b"two"}, FLIGHTS),
+            f"the campaign of {FILE.resolve()}",
+        ),
+        (
+            record_of("seek", FILE, {"c.toml": b"one", "hop.plan": b"plan"}, FLIGHTS),
+            "a campaign without --seek",
+        ),
+        ({**RECORD_1, "form": 0}, "the campaign of another version of flightstack"),
+    ],
+    ids=["other file", "file of that name elsewhere", "search", "other form"],
+)
+def test_directory_of_another_campaign_is_refused_with_its_file(
+    tmp_path: Path, record: Any, held: str
+) -> None:
+    with open_journal(tmp_path, RECORD_1):
+        pass
+    remedy = "give another --out, or --overwrite to replace it"
+    with pytest.raises(CliError) as refused:
+        Journal(tmp_path, record)
+    assert (refused.value.exit_code, str(refused.value)) == (
+        USAGE,
+        f"{tmp_path}: the directory holds {held}: {remedy}",
+    )
+
+
+def test_campaign_whose_file_has_moved_continues(tmp_path: Path) -> None:
+    with open_journal(tmp_path, RECORD_1) as journal:
+        journal.add(ROWS[0])
+    files = {"c.toml": b"one", "hop.plan": b"plan"}
+    with open_journal(tmp_path, record_of("plan", Path("moved/c.toml"), files, FLIGHTS)) as journal:
+        assert list(journal.rows) == [1]
 
 
 def test_two_campaigns_do_not_write_to_one_directory(tmp_path: Path) -> None:
@@ -315,7 +350,7 @@ def test_plan_that_changes_during_the_flights_is_no_result(tmp_path: Path) -> No
 def test_a_row_counts_if_ctrl_c_comes_after_its_write(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with open_journal(tmp_path, record_of("plan", {}, ())) as journal:
+    with open_journal(tmp_path, record_of("plan", Path("c.toml"), {}, ())) as journal:
         monkeypatch.setattr(os, "fsync", Mock(side_effect=KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
             journal.add({"flight": 1})
