@@ -60,7 +60,12 @@ Seek = Annotated[
 ]
 Flights = Annotated[
     int | None,
-    typer.Option(min=20, max=100_000, metavar="N", help="Flights of a search, about.  [default: 200]"),
+    typer.Option(
+        min=20,
+        max=100_000,
+        metavar="N",
+        help="Most flights of a search; fewer find the boundary less exactly.  [default: 200]",
+    ),
 ]
 
 

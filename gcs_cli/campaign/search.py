@@ -17,10 +17,11 @@ from scipy.stats import qmc
 from flightstack.core.contract import FloatArray
 
 _GLOBAL_PART = 0.6
-"""Part of the flights for the least margin; the others are for the boundary."""
-_FEWEST_MEMBERS, _GENERATIONS = 8, 8
+"""Largest part of the flights for the least margin; the others are for the boundary."""
+_FEWEST_MEMBERS, _GENERATIONS = 6, 8
+_FEWEST_GLOBAL = 2 * _FEWEST_MEMBERS
 HALVINGS = 6
-"""Flights on each ray: its boundary is known to 1/64 of it."""
+"""Most flights on each ray: its boundary is known to 1/64 of it."""
 _NEAREST = 3
 """Failing points of the global search to which rays lead."""
 
@@ -78,8 +79,17 @@ class Search(NamedTuple):
         ]
 
 
+def fewest_flights(nominal: FloatArray) -> int:
+    """Return the least number of flights of a search from ``nominal``, shape (inputs,)."""
+    return 1 + len(box_ends(nominal)) + _FEWEST_GLOBAL
+
+
 def search(fly: Fly, nominal: FloatArray, flights: int, seed: int) -> Search:
-    """Search with about ``flights`` flights; the same ``seed`` and margins search the same points."""
+    """Search with at most ``flights`` flights, at least ``fewest_flights``.
+
+    The same ``seed`` and margins search the same points. Flights that do not suffice for another round on all rays are
+    left.
+    """
     flown: list[Flown] = []
 
     def fly_all(points: Sequence[FloatArray]) -> Sequence[Flown]:
@@ -90,13 +100,16 @@ def search(fly: Fly, nominal: FloatArray, flights: int, seed: int) -> Search:
     (start,) = fly_all([nominal])
     if not start.passed:
         return Search(start, flown, ())
-    _find_least(fly_all, nominal, round(_GLOBAL_PART * flights), seed)
+    ends = [end for end in fly_all(box_ends(nominal)) if not end.passed]
+    nearest, before = min(_NEAREST, len(nominal)), len(flown)
+    for_least = min(round(_GLOBAL_PART * flights), flights - before - HALVINGS * (len(ends) + nearest))
+    _find_least(fly_all, nominal, max(_FEWEST_GLOBAL, for_least), seed)
     failed = sorted(
-        (each for each in flown if not each.passed), key=lambda each: math.dist(each.point, nominal)
+        (each for each in flown[before:] if not each.passed), key=lambda each: math.dist(each.point, nominal)
     )
-    ends = fly_all(box_ends(nominal))
-    rays = [Ray(start, end) for end in (*ends, *failed[: min(_NEAREST, len(nominal))]) if not end.passed]
-    return Search(start, flown, _boundary(fly_all, rays))
+    rays = [Ray(start, end) for end in (*ends, *failed[:nearest])]
+    rounds = min(HALVINGS, (flights - len(flown)) // max(1, len(rays)))
+    return Search(start, flown, _boundary(fly_all, rays, rounds))
 
 
 def box_ends(nominal: FloatArray) -> list[FloatArray]:
@@ -115,7 +128,7 @@ def box_ends(nominal: FloatArray) -> list[FloatArray]:
 
 
 def _find_least(fly: Fly, nominal: FloatArray, flights: int, seed: int) -> None:
-    """Minimise the robustness by differential evolution; ``fly`` records what is flown."""
+    """Minimise the robustness with at most ``flights`` by differential evolution; ``fly`` records what is flown."""
     members = max(_FEWEST_MEMBERS, flights // _GENERATIONS)
     random = np.random.default_rng(seed)
     first = qmc.LatinHypercube(d=len(nominal), seed=random).random(members)
@@ -128,16 +141,16 @@ def _find_least(fly: Fly, nominal: FloatArray, flights: int, seed: int) -> None:
         robustness,
         [(0.0, 1.0)] * len(nominal),
         init=first,
-        maxiter=max(1, flights // members - 1),
+        maxiter=flights // members - 1,
         seed=random,
         **settings,
     )
 
 
-def _boundary(fly: Fly, rays: Sequence[Ray]) -> list[Ray]:
-    """Halve each ray between a flight that passes and one that fails, all rays in parallel."""
+def _boundary(fly: Fly, rays: Sequence[Ray], rounds: int) -> list[Ray]:
+    """Halve each ray ``rounds`` times between a flight that passes and one that fails, all rays in parallel."""
     found = list(rays)
-    for _ in range(HALVINGS if found else 0):
+    for _ in range(rounds if found else 0):
         middles = fly([0.5 * (ray.passes.point + ray.fails.point) for ray in found])
         found = [
             ray._replace(passes=middle) if middle.passed else ray._replace(fails=middle)

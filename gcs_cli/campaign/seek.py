@@ -21,7 +21,7 @@ from gcs_cli.campaign.options import CampaignOptions, continuing, only_command
 from gcs_cli.campaign.page import render_campaign
 from gcs_cli.campaign.plan import PlannedFlight, flight_seed
 from gcs_cli.campaign.rows import Row
-from gcs_cli.campaign.search import Flown, Search, box_ends, search
+from gcs_cli.campaign.search import Flown, Search, box_ends, fewest_flights, search
 from gcs_cli.campaign.statistics import sensitivities
 from gcs_cli.campaign.table import write_tables
 from gcs_cli.charts.figure import Figure
@@ -37,6 +37,11 @@ def run_search(pool: FlightPool, campaign: Campaign, options: CampaignOptions, c
     for point in (nominal, *box_ends(nominal)):
         check_scenario(campaign.scenario(_inputs(campaign, point)))
     flights = options.flights or _DEFAULT_FLIGHTS
+    if flights < (fewest := fewest_flights(nominal)):
+        raise CliError(
+            f"--flights: {flights} is too few for the inputs of {campaign.path}: give at least {fewest}",
+            USAGE,
+        )
     marker = PlannedFlight(flights, campaign.plan.seed, _inputs(campaign, nominal))
     record = record_of("seek", campaign.path, campaign.files([marker.inputs]), [marker])
     with (

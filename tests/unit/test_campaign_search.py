@@ -18,7 +18,7 @@ from gcs_cli.campaign.options import CampaignOptions
 from gcs_cli.campaign.page import render_campaign
 from gcs_cli.campaign.plan import plan_flights
 from gcs_cli.campaign.rows import Row, row_of
-from gcs_cli.campaign.search import HALVINGS, Flown, box_ends, search
+from gcs_cli.campaign.search import HALVINGS, Flown, box_ends, fewest_flights, search
 from gcs_cli.campaign.seek import nominal_point
 from gcs_cli.scenarios.result import Result
 from tests.support.parsed_page import own_part
@@ -65,6 +65,17 @@ def test_each_input_alone_is_halved_to_its_boundary(inputs: int) -> None:
             low, high = ray.passes.point[index], ray.fails.point[index]
             assert low <= 0.7 < high
             assert high - low <= 0.5**HALVINGS
+
+
+@pytest.mark.parametrize("inputs", [1, 2, 3, 10])
+@pytest.mark.parametrize("flights", [20, 40, 70, 200])
+@pytest.mark.parametrize("limit", [0.01, 0.7])
+def test_search_flies_no_more_than_its_flights(inputs: int, flights: int, limit: float) -> None:
+    start = np.full(inputs, 0.5)
+    flights = max(flights, fewest_flights(start))
+    world = World(lambda point: limit - abs(float(point.max()) - 0.5))
+    found = search(world.fly, start, flights, 1)
+    assert len(found.flown) == world.count <= flights
 
 
 @pytest.mark.parametrize("start", [(0.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5)])
