@@ -16,6 +16,8 @@ from flightstack.process.command_line import IN_OUTPUT, Overwrite
 from gcs_cli.settings import JsonOption, OpenOption
 
 SEEKS = ("worst",)
+FLIGHTS = range(20, 100_001)
+"""Allowed flights of a search."""
 File = Annotated[
     Path,
     typer.Argument(
@@ -61,10 +63,9 @@ Seek = Annotated[
 Flights = Annotated[
     int | None,
     typer.Option(
-        min=20,
-        max=100_000,
         metavar="N",
-        help="Most flights of a search; fewer find the boundary less exactly.  [default: 200]",
+        help=f"Most flights of a search, {FLIGHTS[0]} to {FLIGHTS[-1]}; fewer find the boundary less exactly.  "
+        "[default: 200]",
     ),
 ]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from flightstack.process.command_line import expand_options, make_app
-from gcs_cli.campaign.options import SEEKS, CampaignOptions
+from gcs_cli.campaign.options import FLIGHTS, SEEKS, CampaignOptions
 from gcs_cli.errors import INTERRUPTED, USAGE, CliError, library
 from gcs_cli.scenarios.options import TestOptions
 from gcs_cli.settings import check_output_file, settings_of
@@ -92,5 +92,10 @@ def _check(context: typer.Context, options: CampaignOptions) -> None:
         )
     if options.seek not in (None, *SEEKS):
         raise CliError(f"--seek: {options.seek} is not one of {', '.join(SEEKS)}", USAGE)
-    if options.flights is not None and options.seek is None:
+    if options.flights is None:
+        return
+    if options.seek is None:  # before the range, which is that of a search
         raise CliError("--flights is for --seek: a campaign's number of flights is in its file", USAGE)
+    if options.flights not in FLIGHTS:
+        limits = f"{FLIGHTS[0]} to {FLIGHTS[-1]}"
+        raise CliError(f"--flights: {options.flights} is outside the allowed range {limits}", USAGE)

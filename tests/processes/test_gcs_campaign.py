@@ -141,6 +141,11 @@ def test_a_killed_worker_leaves_its_flight_to_the_next_run(folder: Path) -> None
         (["none.toml"], "gcs: none.toml: there is no such file or folder"),
         (["c.toml", "--seek", "best"], "gcs: --seek: best is not one of worst"),
         (["c.toml", "--flights", "50"], "gcs: --flights is for --seek: "),
+        (["c.toml", "--flights", "12"], "gcs: --flights is for --seek: "),
+        (
+            ["c.toml", "--flights", "12", "--seek", "worst"],
+            "gcs: --flights: 12 is outside the allowed range 20 to 100000\n",
+        ),
         (["c.toml", "--workers", "0"], "gcs: --workers: 0 is outside the allowed range 1 to 256"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
