@@ -152,7 +152,8 @@ def check_flights(campaign: Campaign, flights: Sequence[PlannedFlight]) -> None:
                 f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}"
                 for name, value in flight.inputs.items()
             )
-            raise ConfigError(campaign.path, f"vary, flight {number} ({inputs})", str(error)) from None
+            problem = str(error).removeprefix(f"{campaign.path}: ")
+            raise ConfigError(campaign.path, f"vary, flight {number} ({inputs})", problem) from None
 
 
 def _refused(campaign: Campaign) -> str:

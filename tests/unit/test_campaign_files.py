@@ -283,6 +283,7 @@ def test_inputs_out_of_range_are_refused_before_a_flight(folder: Path, vary: str
         check_flights(found, flights)
     assert str(refused.value).startswith(f"{folder / 'c.toml'}: vary, flight ")
     assert f"({next(iter(found.vary))} " in str(refused.value)
+    assert str(refused.value).count("c.toml") == 1
     assert sentence.replace("{folder}", str(folder)) in str(refused.value)
 
 
