@@ -22,6 +22,10 @@ class ServerError(RuntimeError):
     """A vehicle could not be started, or its processes ended."""
 
 
+class ServerRefusalError(ServerError):
+    """A vehicle cannot have a condition that was asked for."""
+
+
 def free_instance(taken: Collection[int] = (), count: int = 1) -> int:
     """Return the first of ``count`` successive instances with free ports, none in ``taken``.
 

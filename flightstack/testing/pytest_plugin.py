@@ -31,7 +31,14 @@ _TESTING = "flightstack.testing."
 _OURS = frozenset({"flightstack", "sim_bridge", "gcs_cli"})
 _BELOW_TESTS = _OURS | sys.stdlib_module_names
 _REFUSALS = frozenset(
-    {"ConfigError", "RefusedError", "ConditionTimeoutError", "PropertyViolationError", "UsageProblemError"}
+    {
+        "ConfigError",
+        "RefusedError",
+        "ConditionTimeoutError",
+        "PropertyViolationError",
+        "ServerRefusalError",
+        "UsageProblemError",
+    }
 )
 """Errors of this project that say what a test asked for in vain, by name: their modules are heavy."""
 _ARGUMENTS = frozenset(_TESTING + name for name in ("link", "network", "setup", "sitl", "world"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import select
 import shutil
 import subprocess
@@ -19,8 +20,8 @@ from flightstack.core.port_numbers import api_client_port, ground_station_port
 from flightstack.params.behaviour import SPECS, Behaviour
 from flightstack.params.vehicle import load_vehicle
 from flightstack.process.supervised import own_program
-from flightstack.testing.instances import ServerError, free_instance
-from flightstack.testing.setup import Setup
+from flightstack.testing.instances import ServerError, ServerRefusalError, free_instance
+from flightstack.testing.setup import OPTION_KEYS, Setup, with_keys
 from gcs_cli.fly.fly_flags import LONGEST_S, TO_STACK, FlyOptions, passed
 from gcs_cli.fly.fly_options import home_text, outer_rate_hz, simulator_arguments
 from gcs_cli.link import calls
@@ -33,6 +34,9 @@ READY = b"ready\n"
 _GUARD_LOG = "guard.log"
 _STEP_S = 0.1
 _TAIL_LINES = 3
+_REFUSED = re.compile(r"\S+ ended with code 2: (?:(--[\w-]+):? )?(.*)")
+"""What the guard says if a process refuses its arguments."""
+_KEYS = {**OPTION_KEYS, "--fault": "faults"}
 _LOSS_TIMEOUTS = ("COM_DL_LOSS_T", "COM_OF_LOSS_T", "COM_RC_LOSS_T")
 
 
@@ -59,7 +63,8 @@ class Server:
 
         The vehicle's timeouts for lost links are those of ``client_timeouts``, unless ``setup`` has them.
 
-        Raise ServerError if a process ends, as with a fault that it cannot have, or after ``timeout_s`` of wall time.
+        Raise ServerRefusalError, which is a ServerError, for a condition or fault that the vehicle cannot have;
+        ServerError if a process ends, or after ``timeout_s`` of wall time.
         Kernels that are not compiled yet take a minute.
         """
         self.setup = setup
@@ -196,12 +201,25 @@ class Server:
         """Raise the error of processes that have ended, for the reason that the guard gives."""
         assert self.guard is not None
         reason = (line + self.guard.communicate()[0]).decode(errors="replace").strip()
-        kind = _BusyError if "in use" in reason else ServerError
-        raise kind(f"{reason or 'the processes ended'}\n{self._tail()}")
+        if "in use" in reason:
+            raise _BusyError(reason)
+        if refusal := _refusal(reason):
+            raise ServerRefusalError(refusal)
+        raise ServerError(f"{reason or 'the processes ended'}\n{self._tail()}")
 
     def _tail(self) -> str:
         lines = self.output.splitlines()[-_TAIL_LINES:]
         return "\n".join(f"{'' if index else 'output:':8} {line}" for index, line in enumerate(lines))
+
+
+def _refusal(reason: str) -> str:
+    """Return the problem of an argument that a process refused, in words of the conditions; empty for another end."""
+    refused = _REFUSED.fullmatch(reason)
+    if refused is None:
+        return ""
+    option, problem = refused.groups()
+    key = "" if option is None else _KEYS.get(option, option.removeprefix("--").replace("-", "_"))
+    return f"{key}: {with_keys(problem)}" if key else problem
 
 
 def fly_options(setup: Setup, instance: int, speed: float) -> FlyOptions:

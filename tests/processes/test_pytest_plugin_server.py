@@ -68,8 +68,18 @@ def test_vehicle_that_cannot_start_names_the_reason(tmp_path: Path) -> None:
 
 
 def test_fault_that_the_vehicle_cannot_have_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(ServerError, match="rotors 1 to 4"):
+    with pytest.raises(ServerError, match=r"^faults: rotor 5 dead: .* rotors 1 to 4$"):
         Server(Setup(vehicle="x_quad", state="truth"), tmp_path, faults=["rotor 5 dead"])
+
+
+def test_condition_that_the_vehicle_cannot_have_is_one_sentence(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile("def test_a(sitl_server):\n    sitl_server(wind=(3.0, 0.0))\n")
+    result = pytester.runpytest_subprocess()
+    sentence = "wind: wind cannot act: the vehicle paper_quad has no drag; set drag to true"
+    shown = [line for line in result.outlines if line.startswith("E ")]
+    assert shown == [f"E       flightstack.testing.instances.ServerRefusalError: {sentence}"]
+    assert "server.py" not in result.stdout.str()
+    assert "sitl.py" not in result.stdout.str()
 
 
 def test_port_taken_after_the_search_means_the_next_instance(
