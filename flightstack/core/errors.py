@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import difflib
+from collections.abc import Iterable, Mapping
 
 # the packages of the extras by name: ``pip install 'flightstack[…]'`` needs a release on PyPI
 INSTALL_MULTIBODY = "pip install mujoco pillow imageio-ffmpeg"
@@ -19,6 +20,16 @@ def clause(subject: str, problem: str) -> str:
     if not subject:
         return problem
     return f"{subject} {problem}" if problem.partition(" ")[0] in _PREDICATES else f"{subject}: {problem}"
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return the end of a sentence about an unknown name, with the known one that is most like it, or nothing.
+
+    >>> did_you_mean("squar", ["hop", "square"]), did_you_mean("circle", ["hop", "square"])
+    ('; did you mean square?', '')
+    """
+    near = difflib.get_close_matches(name, list(known), n=1)
+    return f"; did you mean {near[0]}?" if near else ""
 
 
 def plain(number: float) -> str:

@@ -12,7 +12,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from flightstack.core.errors import ConfigError, plain
+from flightstack.core.errors import ConfigError, did_you_mean, plain
 
 _LIKE = 0.85
 """Similarity of a misspelt key; that of the coefficients of thrust and torque is 0.83."""
@@ -245,7 +245,7 @@ def find_file(name_or_path: str, folder: Path, kind: str) -> Path:
     if Path(name_or_path).is_file():
         problem = f"is not {kind} ({names}); to use the file give ./{name_or_path}"
     else:
-        problem = f"is neither a file nor {kind} ({names})"
+        problem = f"is neither a file nor {kind} ({names}){did_you_mean(name_or_path, known)}"
     raise ConfigError(name_or_path, "", problem)
 
 

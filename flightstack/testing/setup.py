@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from flightstack.control.controller_loading import load_controller
 from flightstack.control.loop_parameters import loop_numbers
 from flightstack.core.contract import Vector3
-from flightstack.core.errors import ConfigError
+from flightstack.core.errors import ConfigError, did_you_mean
 from flightstack.core.geodesy import GeoPoint
 from flightstack.firmware.c_loops import LoopsSetup
 from flightstack.firmware.choice import PYTHON, parse_loops
@@ -134,10 +134,11 @@ class Setup:
         """Read a plan file, as ``plan_path`` finds it; raise ConfigError."""
         path = self.plan_path(plan)
         if not path.exists():
-            examples = ", ".join(example_plans())
-            raise ConfigError(
-                path, "", f"cannot be read: No such file or directory; the example plans are {examples}"
+            examples = example_plans()
+            problem = (
+                f"cannot be read: No such file or directory; the example plans are {', '.join(examples)}"
             )
+            raise ConfigError(path, "", f"{problem}{did_you_mean(Path(plan).stem, examples)}")
         return load_plan(path)
 
     def stack_config(self) -> StackConfig:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import difflib
 import os
 import re
 from collections import Counter
@@ -56,10 +57,13 @@ def find_scenarios(paths: Sequence[Path]) -> list[Path]:
 
 
 def missing_error(path: Path, is_wanted: Callable[[Path], bool]) -> ConfigError:
-    """Return the error of a missing file, with the wanted file whose name lacks its suffix or its folder."""
-    name = f"{path.name.removesuffix('.toml')}.toml"
-    places = (path.parent / name, Path("missions", name), examples_folder() / name)
-    near = next((place for place in places if place.is_file() and is_wanted(place)), None)
+    """Return the error of a missing file, with the wanted file whose name lacks its suffix or folder, or is like it."""
+    name = path.name.removesuffix(".toml")
+    folders = (path.parent, Path("missions"), examples_folder())
+    found = [{file.stem: file for file in sorted(folder.glob("*.toml"))} for folder in folders]
+    places = [stems[name] for stems in found if name in stems]
+    places += [stems[near] for stems in found for near in difflib.get_close_matches(name, stems)]
+    near = next((place for place in places if is_wanted(place)), None)
     hint = "" if near is None else f"; did you mean {near}?"
     return ConfigError(path, "", f"there is no such file or folder{hint}")
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from flightstack.core.errors import did_you_mean
 from gcs_cli.errors import USAGE, CliError
 
 DEFAULT_PLAN = "square"
@@ -35,11 +36,10 @@ def plan_file(given: str | Path) -> Path:
             raise CliError(f"{text}: there is no such file; the example plan is named {path.stem}", USAGE)
         return path
     if text not in examples:
-        raise CliError(
-            f"{text}: there is no example plan of that name; there are {', '.join(examples)}; "
-            f"a file in this folder is ./{text}",
-            USAGE,
-        )
+        is_file = Path(text).is_file()
+        hint = f"; to use the file give ./{text}" if is_file else did_you_mean(text, examples)
+        problem = f"there is no example plan of that name; there are {', '.join(examples)}"
+        raise CliError(f"{text}: {problem}{hint}", USAGE)
     return examples[text]
 
 

@@ -48,7 +48,13 @@ def test_a_missing_path_is_an_error(folder: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "near"),
-    [("a", "a.toml"), ("wind/gust", "wind/gust.toml"), ("low_battery", ".*missions/low_battery.toml")],
+    [
+        ("a", "a.toml"),
+        ("wind/gust", "wind/gust.toml"),
+        ("wind/guts.toml", "wind/gust.toml"),
+        ("low_battery", ".*missions/low_battery.toml"),
+        ("low_batery", ".*missions/low_battery.toml"),
+    ],
 )
 def test_a_missing_path_names_the_file_that_is_meant(folder: Path, name: str, near: str) -> None:
     with pytest.raises(
@@ -60,7 +66,8 @@ def test_a_missing_path_names_the_file_that_is_meant(folder: Path, name: str, ne
 
 def test_a_missing_campaign_names_a_campaign(folder: Path) -> None:
     (folder / "sweep.toml").write_text(TEXT + "[campaign]\nflights = 3\n[vary]\n")
-    assert "folder; did you mean sweep.toml?" in gcs("campaign", "sweep").stderr
+    for name in ("sweep", "swep.toml"):
+        assert "folder; did you mean sweep.toml?" in gcs("campaign", name).stderr
     assert gcs("test", "sweep").stderr == "gcs: sweep: there is no such file or folder\n"
 
 

@@ -125,7 +125,7 @@ def test_unknown_parameter_names_the_keyword_of_the_world() -> None:
 
 
 def test_missing_plan_names_the_examples_without_another_error() -> None:
-    with pytest.raises(ConfigError, match=r"the example plans are .*square") as caught:
+    with pytest.raises(ConfigError, match=r"the example plans are .*; did you mean square\?$") as caught:
         Setup().load_plan("sqare")
     assert caught.value.__context__ is None
 

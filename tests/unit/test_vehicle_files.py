@@ -257,6 +257,10 @@ def test_errors_name_file_key_and_range(tmp_path: Path, name: str) -> None:
     ("name", "sentence"),
     [
         ("nope", "nope: is neither a file nor a built-in vehicle (paper_quad, x_quad)"),
+        (
+            "x_quadd",
+            "x_quadd: is neither a file nor a built-in vehicle (paper_quad, x_quad); did you mean x_quad?",
+        ),
         ("no/such.toml", "no/such.toml: cannot be read: No such file or directory"),
         ("/", "/: cannot be read: Is a directory"),
     ],
