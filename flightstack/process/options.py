@@ -129,7 +129,8 @@ Assignments = Annotated[
 ParamFile = Annotated[
     str | None,
     typer.Option(
-        help="Parameter file; 'none' for none.  [default: vehicle.params in the state directory]",
+        help="Parameter file, created if there is none; 'none' for none.  "
+        "[default: vehicle.params in the state directory]",
         metavar="FILE|none",
         **IN_VEHICLE,
     ),

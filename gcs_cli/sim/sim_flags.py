@@ -26,8 +26,8 @@ class SimOptions(FlyOptions):
         Path | None,
         typer.Option(
             metavar="FILE|none",
-            help="Parameter file; 'none' for none. Several vehicles read it and do not write it.  "
-            "[default: vehicle.params in the state directory]",
+            help="Parameter file, created if there is none; 'none' for none. Several vehicles read it and do not "
+            "write it.  [default: vehicle.params in the state directory]",
             **world.IN_VEHICLE,
         ),
     ] = None
