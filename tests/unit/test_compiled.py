@@ -7,6 +7,7 @@ import math
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import numba
@@ -319,9 +320,18 @@ def test_cache_directory_of_other_numba_users_is_kept(monkeypatch: pytest.Monkey
     assert numba.config.CACHE_DIR == "elsewhere"
 
 
-def test_existing_read_only_cache_does_not_stop_compilation(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_existing_read_only_cache_does_not_stop_compilation(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setattr(os, "access", lambda path, mode: False)
-    assert kernel_cache.base_directory.__wrapped__().name.startswith("flightstack-kernels-")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    old, recent = tmp_path / "flightstack-kernels-old", tmp_path / "flightstack-kernels-recent"
+    for folder in (old, recent):
+        (folder / "a").mkdir(parents=True)
+    os.utime(old, (0.0, 0.0))
+    made = kernel_cache.base_directory.__wrapped__()
+    assert made.name.startswith("flightstack-kernels-")
+    assert sorted(tmp_path.iterdir()) == sorted([made, recent])
 
 
 @compiled

@@ -23,6 +23,7 @@ STARTED_S = time.time()
 """Time of the import of this module: sources that are newer are not those that this process runs [s]."""
 _KEPT_S = 14 * 86_400.0
 """Lifetime of a directory after its last use."""
+_TEMPORARY = "flightstack-kernels-"
 _IMPORT = re.compile(
     rf"\n[ \t]*(?:from[ \t]+((?:{'|'.join(OWN_PACKAGES)})[\w.]*)[ \t]+import[ \t]+(\([^)]*\)|[^\n]+)"
     rf"|import[ \t]+((?:{'|'.join(OWN_PACKAGES)})[^\n]*)"
@@ -109,17 +110,19 @@ def base_directory() -> Path:
     base = Path(caches) / "flightstack" / "kernels"
     with suppress(OSError):
         base.mkdir(parents=True, exist_ok=True)
-        _remove_old(base)
+        _remove_old(base.iterdir())
     if os.access(base, os.W_OK):
         return base
-    return Path(tempfile.mkdtemp(prefix="flightstack-kernels-"))  # compile in each process
+    with suppress(OSError):
+        _remove_old(Path(tempfile.gettempdir()).glob(f"{_TEMPORARY}*"))
+    return Path(tempfile.mkdtemp(prefix=_TEMPORARY))  # compile in each process
 
 
-def _remove_old(base: Path) -> None:
+def _remove_old(folders: Iterable[Path]) -> None:
     oldest_s = time.time() - _KEPT_S
-    for entry in os.scandir(base):
-        if entry.stat().st_mtime < oldest_s:
-            shutil.rmtree(entry.path, ignore_errors=True)
+    for folder in folders:
+        if folder.stat().st_mtime < oldest_s:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def is_shared() -> bool:
