@@ -215,7 +215,7 @@ def test_html_report_links_the_files(outside: pytest.Pytester) -> None:
         sys.modules["pytest_html"] = types.SimpleNamespace(extras=extras)
 
         def pytest_configure(config):
-            config.pluginmanager.register(types.SimpleNamespace(), "html")
+            config.pluginmanager.register(types.ModuleType("html"), "html")
 
         def pytest_runtest_logreport(report):
             for name, url in getattr(report, "extras", []):
