@@ -22,6 +22,7 @@ from flightstack.process.command_line import (
     run_app,
     usage_sentence,
 )
+from flightstack.process.plain_arguments import read_plain
 from sim_bridge import options
 from sim_bridge.errors import PlantDivergedError, UsageProblemError
 from sim_bridge.output import complain
@@ -43,14 +44,23 @@ def run(
     """
     if context.invoked_subcommand is not None:
         return
+    raise typer.Exit(_simulate(given))
+
+
+def _simulate(given: options.SimulatorOptions) -> int:
     from sim_bridge.program import simulate
 
-    raise typer.Exit(simulate(given))
+    return simulate(given)
+
+
+def _run(words: Sequence[str]) -> int:
+    given = read_plain(options.SimulatorOptions, words)
+    return run_app(app, "sim-bridge", words) if given is None else console.checked_code(_simulate(given))
 
 
 def check_arguments(given: Sequence[str]) -> None:
     """Check a command line of the simulator; raise UsageError, UsageProblemError, ConfigError, KeyboardInterrupt."""
-    run_app(app, "sim-bridge", [*given, "--check"])
+    _run([*given, "--check"])
 
 
 def check_port(host: str, port: int) -> None:
@@ -112,7 +122,7 @@ def run_command(argv: list[str]) -> int:
     console.replace_unencodable()
     try:
         with collection.paused():
-            return run_app(app, "sim-bridge", argv)
+            return _run(argv)
     except PlantDivergedError as error:
         complain(error)
         return 1

@@ -14,7 +14,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from flightstack import __version__
-from flightstack.process.console import check_output
+from flightstack.process.console import checked_code
 
 UsageError: Any = typer.BadParameter.__mro__[1]
 """Base class of usage errors: typer has its own copy of click in some versions."""
@@ -226,9 +226,7 @@ def run_app(app: typer.Typer, name: str, arguments: Sequence[str] | None = None)
         raise KeyboardInterrupt from None
     if code == _TYPER_INTERRUPTED:
         raise KeyboardInterrupt
-    if not code:
-        check_output()
-    return int(code or 0)
+    return checked_code(code)
 
 
 def _print_version(context: typer.Context, wanted: bool) -> None:

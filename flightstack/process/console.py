@@ -61,6 +61,13 @@ def check_output() -> None:
         raise errors[0]
 
 
+def checked_code(code: int | None) -> int:
+    """Return the exit code of a program that ends; raise OSError if one that succeeded has lost output."""
+    if not code:
+        check_output()
+    return code or 0
+
+
 def report_os_error(program: str, error: OSError) -> int:
     """Print an error of a named file or of stdout that ended ``program``, and return the exit code.
 

@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from flightstack.core.port_numbers import INSTANCES
-from flightstack.process.command_line import IN_LINKS, IN_LOOPS, IN_OUTPUT, IN_VEHICLE, Version
+from flightstack.process.command_line import IN_LINKS, IN_LOOPS, IN_OUTPUT, IN_VEHICLE
 
 Vehicle = Annotated[
     str, typer.Option(help="Built-in vehicle or a TOML file.", metavar="NAME|FILE", **IN_VEHICLE)
@@ -202,7 +202,6 @@ class RunOptions:
     wait_for_start: WaitForStart = False
     check: Check = False
     exit_on_gcs_loss: ExitOnGcsLoss = None
-    version: Version = False  # handled by its callback
 
     @property
     def named_params(self) -> Path | None:
