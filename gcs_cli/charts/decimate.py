@@ -29,8 +29,7 @@ def decimated(x: FloatArray, y: FloatArray, buckets: int = BUCKETS) -> tuple[Flo
     kept = {0, count - 1}
     for extreme in (low, high):
         hits = np.flatnonzero(y == extreme[bucket])
-        first_of_bucket = np.unique(bucket[hits], return_index=True)[1]
-        kept.update(hits[first_of_bucket].tolist())
+        kept.update(hits[np.searchsorted(hits, starts)].tolist())  # the first one of each bucket
     index = np.array(sorted(kept))
     return x[index], y[index]
 
@@ -68,7 +67,7 @@ def drawn_samples(x: FloatArray, y: FloatArray, buckets: int = BUCKETS) -> tuple
 
 def spaced(count: int, most: int) -> IndexArray:
     """Return at most ``most`` evenly spaced indices below ``count``, with the first and the last one."""
-    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.intp))
+    return np.linspace(0, count - 1, min(count, most)).round().astype(np.intp)  # no two: a step is 1 or more
 
 
 def is_decimated(count: int, buckets: int = BUCKETS) -> bool:
