@@ -235,6 +235,31 @@ def test_copies_of_the_sources_share_their_kernels(tmp_path: Path) -> None:
     assert hits == [0, 1]
 
 
+@pytest.mark.parametrize(
+    "example",
+    [
+        np.zeros(3),
+        np.zeros((2, 3), np.float32),
+        np.zeros((2, 3), order="F"),
+        np.zeros((4, 6))[::2, ::3],
+        np.broadcast_to(0.0, 3),
+        np.zeros(2, [("a", "<f8", 3), ("b", "<i8")]),
+        np.zeros((), np.dtype([("a", "<i2"), ("b", "<f8")], align=True)),
+    ],
+    ids=lambda example: f"{example.dtype} {example.shape}",
+)
+def test_types_of_arrays_are_those_of_numba(example: np.ndarray) -> None:  # type: ignore[type-arg]
+    assert mix.dispatcher.typeof_pyval(example) == numba.typeof(example)  # type: ignore[attr-defined]
+
+
+def test_a_kernel_of_arrays_is_called_without_the_import_of_masked_arrays() -> None:
+    code = (
+        "import sys, numpy as np; from flightstack.core.arrays import all_finite; "
+        "all_finite(np.zeros(3)); sys.exit('numpy.ma' in sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
 def test_a_stored_kernel_for_other_types_is_not_used(tmp_path: Path) -> None:
     """Two processes that save their first kernel of a function at once write the same file."""
     code = """if True:

@@ -13,6 +13,7 @@ import numpy as np
 from numba.core.caching import FunctionCache
 from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
+from numpy.typing import NDArray
 
 from flightstack.core.compiled import renamed
 from flightstack.core.kernels.cache import directory, is_own
@@ -67,10 +68,21 @@ def _type_of(example: Any, key: Any) -> numba.types.Type:
         if isinstance(example, tuple):
             items = [_type_of(item, of_item) for item, of_item in zip(example, key[1:], strict=True)]
             found = numba.types.BaseTuple.from_types(items, type(example))
+        elif type(example) is np.ndarray:
+            found = _type_of_array(example)
         else:
             found = numba.typeof(example)
         _types[key] = found
     return found
+
+
+def _type_of_array(example: NDArray[Any]) -> numba.types.Type:
+    """Return Numba's type of an array; ``numba.typeof`` imports ``numpy.ma`` for it, which takes 10 ms."""
+    flags = example.flags
+    layout = "C" if flags.c_contiguous else "F" if flags.f_contiguous else "A"
+    return numba.types.Array(
+        numba.from_dtype(example.dtype), example.ndim, layout, readonly=not flags.writeable
+    )
 
 
 def _enable_cache(dispatcher: CPUDispatcher, modules: frozenset[str], cache: type[FunctionCache]) -> None:
@@ -123,6 +135,11 @@ class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]  # Numba has no typ
     @property
     def _numba_type_(self) -> numba.types.Type:
         return numba.types.Dispatcher(self.part)
+
+    def typeof_pyval(self, val: Any) -> numba.types.Type:
+        """Return the type of an argument of a call that is the first one of its types."""
+        is_array = type(val) is np.ndarray and not val.dtype.hasobject
+        return _type_of(val, _key_of(val)) if is_array else super().typeof_pyval(val)
 
     def compile(self, sig: Any) -> Any:
         """Compile without garbage collection, which would take a tenth of the time."""
