@@ -245,7 +245,7 @@ class App:
                     return
                 next_log_us = self._next_log_us if starting is None else 0  # no further than this period
                 may_run_on = not (owes_ground or is_over)
-                data = loop.run(self._next_ground_ns, next_log_us, may_run_on)
+                data = loop.run(self._next_ground_ns, next_log_us, may_run_on, self._serves_pauses)
                 owes_ground = owes_ground or loop.serves_ground
                 if loop.ends_period:
                     self._end_period()

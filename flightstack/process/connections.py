@@ -133,7 +133,7 @@ class SimulatorPace:
             self._waits_ns = 0
 
     def note_wait(self, ended_ns: int, waited_ns: int) -> None:
-        """Note the end of a wait for a state, or of several, the longest of which took ``waited_ns``."""
+        """Note the end of a wait for a state, or of several, whose pauses took ``waited_ns`` in sum."""
         if waited_ns > PAUSE_NS:
             self._paused_ns = min(MOST_NS, self._left_ns(ended_ns) + waited_ns)
             self._noted_ns = ended_ns

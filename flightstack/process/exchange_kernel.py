@@ -24,7 +24,7 @@ from flightstack.simulator_link.frame_kernels import (
     write_bytes,
 )
 from flightstack.simulator_link.gps_kernels import GPS_NUMBER_AT
-from flightstack.transports.compiled_socket import forget, now_ns, receive_into, send_from
+from flightstack.transports.compiled_socket import forget, now_ns, receive_into, send_from, wait_for
 
 _FRAME = HEADER + CHECKSUM
 
@@ -52,8 +52,11 @@ class Exchange(NamedTuple):
     period_us: int
     ended_ns: int
     """Time at which the newest state was there."""
+    ends_in_pause: bool
+    """True if Python goes on in a pause of the simulator."""
+    pause_ns: int
+    """Wait for a state above which the simulator pauses, and the sum of such waits."""
     waited_ns: int
-    """Longest wait for a state."""
     began: int
     """Number of exchanges that began."""
 
@@ -155,9 +158,12 @@ def exchange(world: Any, time_us: int, flags: int) -> int:
     size = seal(answer, time_us - e["interval_us"], e["answer_size"], e["answer_extra"])
     if not send_from(line, e["answer_at"], size):
         return -1
-    count = receive_into(line)
+    is_silent = e["ends_in_pause"] and not wait_for(line, e["pause_ns"])
+    count = -1 if is_silent else receive_into(line)
     e["ended_ns"] = now_ns(line)
-    e["waited_ns"] = max(e["waited_ns"], e["ended_ns"] - began_ns)
+    waited_ns = e["ended_ns"] - began_ns
+    if waited_ns > e["pause_ns"]:
+        e["waited_ns"] += waited_ns
     if not _take(line[2], count, time_us, e, taking):
         return -1
     forget(line)

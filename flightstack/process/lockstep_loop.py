@@ -12,7 +12,7 @@ from flightstack.core.contract import FloatArray
 from flightstack.process.assembly import Stack
 from flightstack.process.connections import SimulatorPace
 from flightstack.process.quiet_block import QuietBlock, compiles
-from flightstack.process.quiet_exchange import ExchangedSteps
+from flightstack.process.quiet_exchange import ExchangedSteps, Span
 from flightstack.process.quiet_sensors import estimators_of
 from flightstack.transports import compiled_socket
 from flightstack.transports.tcp import LinkClosedError, TcpClient
@@ -61,7 +61,7 @@ class QuietLockstep:
 
     @property
     def waited_ns(self) -> int:
-        """Longest wait for a state in the last call."""
+        """Sum of the waits for a state in the last call that count as pauses of the simulator."""
         assert self._steps is not None
         return int(self._steps.record["waited_ns"][0])
 
@@ -77,23 +77,20 @@ class QuietLockstep:
         assert self._steps is not None
         return int(self._steps.record["ended_ns"][0])
 
-    def run(self, now_ns: int, deadline_ns: int, most: Callable[[int], int]) -> Ran:
-        """Run the tick of the newest state and those that follow, up to ``deadline_ns``.
-
-        ``most`` returns how many more may follow a number of them. Times are those of the monotonic clock.
-        """
+    def run(self, span: Span, most: Callable[[int], int]) -> Ran:
+        """Run the tick of the newest state and those that follow; ``most`` returns how many may follow a number."""
         steps, block = self._steps, self._block
         assert steps is not None
         assert block is not None
-        steps.begin(now_ns, deadline_ns)
+        steps.begin(span)
         link = self._stack.simulator
         stamp_us = link.stamp_us
         if self._autopilot.next_outer == 0 and self._lockstep.is_due:
             ticks = block.run_periods(most(0)) or 1  # 0: the outer tick alone, in Python
         else:
-            steps.commands[:] = self._lockstep.tick(now_ns)
+            steps.commands[:] = self._lockstep.tick(span.began_ns)
             ticks = 1
-        is_over = self._autopilot.next_outer == 0 and time.monotonic_ns() >= deadline_ns
+        is_over = self._autopilot.next_outer == 0 and time.monotonic_ns() >= span.deadline_ns
         if not is_over and steps.socket.sent < 0 and self._lockstep.is_quiet:
             count = min(block.count(runs_on=True), most(ticks))
             if count > 0:
@@ -124,17 +121,20 @@ class LockstepLoop:
         """True after the last state of an outer period, and at the start."""
         return self._answered % self._divisor == 0
 
-    def run(self, deadline_ns: int, next_log_us: int, may_run_on: bool) -> memoryview | None:
+    def run(
+        self, deadline_ns: int, next_log_us: int, may_run_on: bool, serves_pauses: bool = False
+    ) -> memoryview | None:
         """Run the tick of the newest state, which was received, and answer it.
 
         With ``may_run_on``, receive and answer more states up to ``deadline_ns`` of the monotonic clock, and up to the
-        end of the outer period after ``next_log_us`` of the vehicle's. Return bytes that were received besides; raise
-        LinkClosedError.
+        end of the outer period after ``next_log_us`` of the vehicle's; with ``serves_pauses``, up to the next pause of
+        the simulator if one is expected. Return bytes that were received besides; raise LinkClosedError.
         """
         began_ns = time.monotonic_ns()
         self.pace.note_tick(began_ns)
-        if may_run_on and not self.pace.may_pause() and self._quiet.is_ready():
-            return self._run_on(began_ns, deadline_ns, next_log_us)
+        if may_run_on and self._quiet.is_ready():
+            span = Span(began_ns, deadline_ns, serves_pauses and self.pace.may_pause())
+            return self._run_on(span, next_log_us)
         stack = self._stack
         commands = self._lockstep.tick(began_ns)
         self._simulator.send(stack.simulator.answer(commands, stack.now.status.armed))
@@ -143,9 +143,9 @@ class LockstepLoop:
         self.serves_ground = self.ends_period
         return None
 
-    def _run_on(self, began_ns: int, deadline_ns: int, next_log_us: int) -> memoryview | None:
+    def _run_on(self, span: Span, next_log_us: int) -> memoryview | None:
         stack, quiet = self._stack, self._quiet
-        ran = quiet.run(began_ns, deadline_ns, partial(self._most, next_log_us))
+        ran = quiet.run(span, partial(self._most, next_log_us))
         self._answered += ran.ticks
         self.serves_ground = True
         if ran.unsent is None:

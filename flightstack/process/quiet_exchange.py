@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from flightstack.core.contract import ByteArray, FloatArray, RecordArray, Single
 from flightstack.core.kernels.calls import address_of, as_bytes
 from flightstack.params.config import TRUTH, StackConfig
 from flightstack.process.assembly import Stack, build
+from flightstack.process.connections import PAUSE_NS
 from flightstack.process.exchange_kernel import EXCHANGE, Exchange, exchange
 from flightstack.process.quiet_block import QuietBlock, compiles
 from flightstack.process.quiet_sensors import estimators_of
@@ -30,6 +31,16 @@ from flightstack.transports.compiled_socket import CompiledSocket
 
 MOST = 1000
 """Exchanges of a call at most: two seconds of simulated time, which the deadline of the ground links cuts short."""
+
+
+class Span(NamedTuple):
+    """When the ticks of a call begin and end, by the monotonic clock."""
+
+    began_ns: int
+    deadline_ns: int
+    """Time after which the next outer tick ends them."""
+    ends_in_pause: bool = False
+    """True if they end where the simulator sends nothing for ``PAUSE_NS``."""
 
 
 class ExchangedSteps:
@@ -54,7 +65,7 @@ class ExchangedSteps:
         frame = as_bytes(answer.frame)
         self.record[0] = Exchange(
             frame.ctypes.data, answer.shape.size, answer.shape.extra, self._interval_us, int(ACCEL | GYRO),
-            int(MAG), int(BARO), False, 0, 0, stack.rates.divisor * self._interval_us, 0, 0, 0,
+            int(MAG), int(BARO), False, 0, 0, stack.rates.divisor * self._interval_us, 0, False, PAUSE_NS, 0, 0,
         )  # fmt: skip
         self._took_ns = np.zeros(MOST, np.int64)
         shapes = np.array([[plant.shape], [SENSOR_SHAPE], [GPS_SHAPE]], SHAPE)
@@ -63,13 +74,14 @@ class ExchangedSteps:
         self.world: tuple[Any, ...] = (self.socket.arguments, self.record, frame, self._took_ns, taking)
         self.step = address_of(exchange, self.world, 0, 0)
 
-    def begin(self, began_ns: int, deadline_ns: int) -> None:
-        """Prepare for ticks from ``began_ns`` on, up to the first outer tick after ``deadline_ns``."""
+    def begin(self, span: Span) -> None:
+        """Prepare for ticks in ``span``."""
         self.socket.clear()
         record = self.record
-        record["deadline_ns"], record["ended_ns"] = deadline_ns, began_ns
+        record["deadline_ns"], record["ended_ns"] = span.deadline_ns, span.began_ns
         record["outer_us"] = self._link.stamp_us + self._autopilot.next_outer * self._interval_us
         record["waited_ns"], record["began"] = 0, 0
+        record["ends_in_pause"] = span.ends_in_pause
         record["takes_fixes"] = self._estimation is not None and self._estimation.takes_fixes
 
     def room(self) -> int:

@@ -7,6 +7,7 @@ what it cannot do: a message that is not accepted whole, a timeout, a signal, a 
 from __future__ import annotations
 
 import ctypes
+import select
 import socket
 import sys
 import time
@@ -22,6 +23,7 @@ from flightstack.transports.tcp import BUFFER_SIZE
 
 IS_AVAILABLE = sys.platform == "linux" and sys.maxsize > 1 << 32 and not IS_DISABLED
 """True if the C library has the functions under the names and with the types of this module."""
+_POLLIN = getattr(select, "POLLIN", 0)
 _MONOTONIC = getattr(time, "CLOCK_MONOTONIC", 0)
 _NS_PER_S = 1_000_000_000
 
@@ -32,7 +34,9 @@ class Socket(NamedTuple):
     descriptor: int
     send: int
     receive: int
+    poll: int
     clock: int
+    poll_at: int
     time_at: int
     in_at: int
     sent: int
@@ -50,15 +54,16 @@ class CompiledSocket:
 
     def __init__(self, descriptor: int) -> None:
         library = ctypes.CDLL(None)
-        send, receive, clock = (
+        functions = (
             ctypes.cast(function, ctypes.c_void_p).value
-            for function in (library.send, library.recv, library.clock_gettime)
+            for function in (library.send, library.recv, library.ppoll, library.clock_gettime)
         )
         self.inbox = np.zeros(BUFFER_SIZE, np.uint8)
         """Received bytes."""
         self._time = np.zeros(2, np.int64)
-        addresses = send, receive, clock, self._time.ctypes.data, self.inbox.ctypes.data
-        self._record: RecordArray = np.array([(descriptor, *addresses, -1, -1)], SOCKET)
+        self._polled = np.array([descriptor, _POLLIN], np.int32)  # pollfd of the C library
+        buffers = (array.ctypes.data for array in (self._polled, self._time, self.inbox))
+        self._record: RecordArray = np.array([(descriptor, *functions, *buffers, -1, -1)], SOCKET)
         self.arguments: tuple[Any, ...] = (self._record, self._time, self.inbox)
         """Argument ``line`` of the compiled functions."""
 
@@ -99,6 +104,14 @@ def send_from(line: Any, address: int, size: int) -> bool:
     sent = call_c(record["send"], (record["descriptor"], address, size, _FLAGS))
     record["sent"] = max(sent, 0)
     return bool(sent == size)
+
+
+@compiled
+def wait_for(line: Any, timeout_ns: int) -> bool:
+    """Wait for bytes or the end of the connection; return False after ``timeout_ns`` or at a signal."""
+    record, time_array, _inbox = line
+    time_array[0], time_array[1] = timeout_ns // _NS_PER_S, timeout_ns % _NS_PER_S
+    return bool(call_c(record[0]["poll"], (record[0]["poll_at"], 1, record[0]["time_at"], 0)) > 0)
 
 
 @compiled

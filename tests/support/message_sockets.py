@@ -26,3 +26,10 @@ def messages(end: socket.socket) -> list[bytes]:
         while True:
             found.append(end.recv(4096))
     return found
+
+
+def fill(end: socket.socket) -> None:
+    """Send until nothing more is accepted."""
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            end.send(bytes(100_000), socket.MSG_DONTWAIT)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from flightstack.core.compiled import IS_DISABLED
+from flightstack.process.connections import MOST_NS
 from flightstack.process.lockstep_loop import LockstepLoop
 from flightstack.process.quiet_block import QuietBlock
 from flightstack.testing import World
@@ -87,6 +88,21 @@ def test_the_deadline_ends_ticks_after_one_call_of_the_kernel(
             simulator.apply(engine.actuators)
             assert stack.simulator.receive(memoryview(bytes(simulator.outgoing())))
     assert ran == [4, 5, 5]  # the first tick of all is run in Python
+
+
+def test_ticks_run_on_where_a_pause_is_expected(sockets: Any) -> None:
+    """As after each time slice of another program on the processor of the simulator."""
+    ours, others = sockets
+    with World(make_engine=BytesEngine, state="truth") as world:
+        stack, simulator, engine = world.engine.stack, world.engine.simulator, world.engine
+        loop = LockstepLoop(stack, Peer(ours))
+        loop.pace.note_wait(LATER_NS, MOST_NS)
+        for _ in range(4):
+            simulator.apply(engine.actuators)
+            others.send(bytes(simulator.outgoing()))
+        assert loop.run(LATER_NS, 0, may_run_on=True, serves_pauses=True) is None
+        assert loop.pace.may_pause()
+        assert len(messages(others)) == 5
 
 
 def test_a_tick_alone_is_run_where_more_may_not(sockets: Any) -> None:
