@@ -13,7 +13,7 @@ from flightstack.core.geodesy import GeoPoint
 from flightstack.core.periods import NEVER_US, next_due
 from flightstack.mavlink.frames import HEADER_V2
 from flightstack.params.vehicle import Vehicle
-from flightstack.simulator_link.battery_frame import BatteryReport, encode_battery
+from flightstack.simulator_link.battery_frame import BatteryReport, battery_buffer, encode_battery
 from flightstack.simulator_link.hot_frames import (
     GROUND_CONTACT_FLAG,
     ActuatorsFrame,
@@ -67,7 +67,8 @@ class Simulator:
         self._frame.set_rotor_count(len(vehicle.rotors))
         self.plant.output = np.frombuffer(self._frame.frame, OUTPUT, 1, _STATE_AT)
         self._flags = 0
-        self._battery_seq = 0
+        self.battery_buffer = battery_buffer(system_id, SIMULATOR_COMPONENT)
+        """Frame of BATTERY_STATUS with the newest sequence number, which compiled code completes."""
         self.battery_due_us = np.full(1, NEVER_US if self.plant.battery is None else 0)
         """Time of the next report of the battery [µs], which a kernel that notes it moves on."""
         self._battery_due = self.battery_due_us.data  # a number of an array takes four times as long to read
@@ -145,13 +146,13 @@ class Simulator:
         if self.time_us < self._battery_due[0] or battery is None or self.vehicle.battery is None:
             return b""
         self._battery_due[0] = next_due(self.time_us, BATTERY_INTERVAL_US)
-        seq = self._battery_seq
-        return encode_battery(self.battery_report(battery), seq, self._system_id, SIMULATOR_COMPONENT)
+        report = self.battery_report(battery)
+        return encode_battery(report, self.battery_buffer[4], self._system_id, SIMULATOR_COMPONENT)
 
     def battery_report(self, battery: BatteryState) -> BatteryReport:
         """Return the next report, of a vehicle with this battery."""
         assert self.vehicle.battery is not None
-        self._battery_seq = (self._battery_seq + 1) & 255
+        self.battery_buffer[4] = (self.battery_buffer[4] + 1) & 255
         return battery_report(battery, self.vehicle.battery.cells)
 
     @property

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from flightstack.core.arrays import copy_all
 from flightstack.core.compiled import compiled
 from flightstack.core.record_types import dtype_of
+from flightstack.simulator_link.battery_kernels import has_more_charge
 from flightstack.simulator_link.frame_kernels import (
     CHECKSUM,
     FIELDS_AT,
@@ -45,6 +46,8 @@ class Exchange(NamedTuple):
     baro_fields: int
     takes_fixes: bool
     """True if the filters take HIL_GPS."""
+    least_charge: float
+    """Charge up to which a report of the battery is left to Python."""
     deadline_ns: int
     """Time of the monotonic clock from which no exchange begins that would be followed by an outer tick."""
     outer_us: int
@@ -104,12 +107,38 @@ def _gps_size(inbox: Any, at: int, end: int, bits: Any, shape: Any) -> int:
 
 
 @compiled
+def _battery_size(inbox: Any, end: int, e: Any, shape: Any, reports: Any) -> int:
+    """Return the size of the frame of BATTERY_STATUS in front: 0 without one, −1 for one that Python takes."""
+    size = frame_size(inbox, 0, end, shape)
+    if size == 0:
+        return 0
+    rows, _times_us, count = reports
+    is_taken = count[0] < len(rows) and has_more_charge(inbox[HEADER : size - CHECKSUM], e["least_charge"])
+    return size if is_taken else -1
+
+
+@compiled
+def _note_battery(inbox: Any, size: int, time_us: int, reports: Any) -> None:
+    """Keep the payload of a frame of ``size`` bytes in front, if there is one."""
+    if size == 0:
+        return
+    rows, times_us, count = reports
+    row = rows[count[0]]
+    row[:] = 0  # the message lacks the zeros at its end
+    copy_all(inbox[HEADER : size - CHECKSUM], row)
+    times_us[count[0]] = time_us
+    count[0] += 1
+
+
+@compiled
 def _take(inbox: Any, end: int, time_us: int, bits: Any, taking: Any) -> bool:
     """Take the frames of a quiet step at ``time_us``, ``end`` bytes; return False, and take nothing, for any other."""
-    shapes, state, wires, values, news_array, gps, places = taking
-    at = frame_size(inbox, 0, end, shapes[0])
-    if at != len(state) or read_bytes(inbox, HEADER, 8) != time_us:
+    shapes, state, wires, values, news_array, gps, places, reports = taking
+    begin = _battery_size(inbox, end, bits, shapes[3], reports)
+    is_state = begin >= 0 and frame_size(inbox, begin, end, shapes[0]) == len(state)
+    if not is_state or read_bytes(inbox, begin + HEADER, 8) != time_us:
         return False
+    at = begin + len(state)
     others, gps_at = 0, at + HEADER
     gps_size = _gps_size(inbox, at, end, bits, shapes[2])
     if gps_size < 0:
@@ -126,7 +155,8 @@ def _take(inbox: Any, end: int, time_us: int, bits: Any, taking: Any) -> bool:
         at += size
     if at != end:
         return False
-    copy_all(inbox[: len(state)], state)
+    _note_battery(inbox, begin, time_us, reports)
+    copy_all(inbox[begin : begin + len(state)], state)
     for k in range(len(wires)):
         copy_all(inbox[places[k] : places[k] + len(wires[k])], wires[k])
     if len(wires) > 0:

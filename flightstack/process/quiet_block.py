@@ -7,6 +7,7 @@ simulator is in this process, or exchanges its messages with it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any, Protocol, TypeAlias
@@ -75,6 +76,18 @@ def compiles(stack: Stack) -> bool:
     """Return True if loops and filters are compiled Python in this process."""
     parts = [(stack.loops, PythonLoops), *((each.core, PythonCore) for each in estimators_of(stack))]
     return not IS_DISABLED and all(type(part) is kind for part, kind in parts)
+
+
+_CHARGE_ROUNDING = 0.01
+"""Of reports, which are in percent: with more charge than that the battery is not low."""
+
+
+def least_charge(stack: Stack) -> float:
+    """Return the charge up to which the vehicle may act on a report of the battery; infinity while it is low."""
+    if stack.parts.failsafes.battery_level > 0:  # the next report may end that
+        return math.inf
+    b = stack.now.behaviour
+    return max(b.battery_low, b.battery_critical, b.battery_emergency) + _CHARGE_ROUNDING
 
 
 class QuietBlock:

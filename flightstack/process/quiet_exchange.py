@@ -12,9 +12,10 @@ from flightstack.params.config import TRUTH, StackConfig
 from flightstack.process.assembly import Stack, build
 from flightstack.process.connections import PAUSE_NS
 from flightstack.process.exchange_kernel import EXCHANGE, Exchange, exchange
-from flightstack.process.quiet_block import QuietBlock, compiles
+from flightstack.process.quiet_block import QuietBlock, compiles, least_charge
 from flightstack.process.quiet_sensors import estimators_of
-from flightstack.simulator_link.battery_frame import BatteryReport
+from flightstack.simulator_link.battery_frame import BATTERY_SHAPE, BatteryReport, report_in
+from flightstack.simulator_link.battery_kernels import BATTERY_SIZE
 from flightstack.simulator_link.frame_kernels import SENSOR_NEWS, SHAPE
 from flightstack.simulator_link.gps_kernels import GPS_SIZE
 from flightstack.simulator_link.sensor_frames import (
@@ -33,6 +34,10 @@ MOST = 1000
 """Exchanges of a call at most: two seconds of simulated time, which the deadline of the ground links cuts short."""
 
 
+_MOST_REPORTS = 8
+"""Of the battery in one call."""
+
+
 class Span(NamedTuple):
     """When the ticks of a call begin and end, by the monotonic clock."""
 
@@ -48,7 +53,7 @@ class ExchangedSteps:
 
     def __init__(self, stack: Stack, descriptor: int) -> None:
         """``descriptor`` is that of the socket."""
-        link, inbox = stack.simulator, stack.simulator.sensors
+        self._stack, link, inbox = stack, stack.simulator, stack.simulator.sensors
         answer, plant = link.actuators, link.plant
         self.socket = CompiledSocket(descriptor)
         self.commands: FloatArray = answer.rotor_speed_rad_s
@@ -65,12 +70,17 @@ class ExchangedSteps:
         frame = as_bytes(answer.frame)
         self.record[0] = Exchange(
             frame.ctypes.data, answer.shape.size, answer.shape.extra, self._interval_us, int(ACCEL | GYRO),
-            int(MAG), int(BARO), False, 0, 0, stack.rates.divisor * self._interval_us, 0, False, PAUSE_NS, 0, 0,
+            int(MAG), int(BARO), False, 0.0, 0, 0, stack.rates.divisor * self._interval_us, 0, False, PAUSE_NS, 0, 0,
         )  # fmt: skip
         self._took_ns = np.zeros(MOST, np.int64)
-        shapes = np.array([[plant.shape], [SENSOR_SHAPE], [GPS_SHAPE]], SHAPE)
+        shapes = np.array([[plant.shape], [SENSOR_SHAPE], [GPS_SHAPE], [BATTERY_SHAPE]], SHAPE)
+        self._reports = np.zeros((_MOST_REPORTS, BATTERY_SIZE), np.uint8), np.zeros(_MOST_REPORTS, np.int64)
+        self._report_count = np.zeros(1, np.int64)
         values, wires = self.values.view(np.uint8), self.wires.view(np.uint8)
-        taking = shapes, as_bytes(plant.frame), wires, values, self.news, self.gps, np.zeros(count, np.int64)
+        taking = (
+            shapes, as_bytes(plant.frame), wires, values, self.news, self.gps, np.zeros(count, np.int64),
+            (*self._reports, self._report_count),
+        )  # fmt: skip
         self.world: tuple[Any, ...] = (self.socket.arguments, self.record, frame, self._took_ns, taking)
         self.step = address_of(exchange, self.world, 0, 0)
 
@@ -82,6 +92,7 @@ class ExchangedSteps:
         record["outer_us"] = self._link.stamp_us + self._autopilot.next_outer * self._interval_us
         record["waited_ns"], record["began"] = 0, 0
         record["ends_in_pause"] = span.ends_in_pause
+        record["least_charge"] = least_charge(self._stack)
         record["takes_fixes"] = self._estimation is not None and self._estimation.takes_fixes
 
     def room(self) -> int:
@@ -89,8 +100,10 @@ class ExchangedSteps:
         return MOST - int(self.record["began"][0])
 
     def take_reports(self) -> list[tuple[int, BatteryReport]]:
-        """Return no reports of the battery: they are messages, after which the exchanges go on in Python."""
-        return []
+        """Return the reports of the battery since the last call, with their times by the simulator's clock [µs]."""
+        count, (payloads, times_us) = int(self._report_count[0]), self._reports
+        self._report_count[0] = 0
+        return [(int(times_us[k]), report_in(payloads[k].tobytes())) for k in range(count)]
 
     def pass_by(self, count: int, result: int) -> None:
         """Count steps: the link has counted them."""

@@ -21,7 +21,8 @@ from flightstack.mavlink.dialect import FS_PLANT_STATE_ID, mavlink
 from flightstack.mavlink.frames import CHECKSUM_SIZE, HEADER_V2, MAGIC_V2, FrameFinder
 from flightstack.mavlink.link import Link, Message
 from flightstack.params.vehicle import Vehicle, system_type
-from flightstack.simulator_link.battery_frame import UNUSED_CELL, BatteryReport, decode_battery, report_of
+from flightstack.simulator_link.battery_frame import BatteryReport, decode_battery, report_of
+from flightstack.simulator_link.battery_kernels import UNUSED_CELL
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame, PlantStateFrame
 from flightstack.simulator_link.sensor_frames import HIL_SENSOR_ID, HilMeasurement
 from flightstack.simulator_link.sensor_inbox import SensorInbox

@@ -1,7 +1,7 @@
-"""The frames of the lockstep exchange in compiled code: FS_PLANT_STATE, FS_ACTUATORS, HIL_SENSOR and HIL_GPS.
+"""The frames of the lockstep exchange in compiled code.
 
-They are those of ``hot_frames`` and ``sensor_frames``: a frame that is not exactly as expected is left to them. A
-module of its own, with few imports: the key of a kernel in the cache depends on all of them.
+They are those of ``hot_frames``, ``sensor_frames`` and ``battery_frame``: a frame that is not exactly as expected is
+left to them. A module of its own, with few imports: the key of a kernel in the cache depends on all of them.
 """
 
 from __future__ import annotations
@@ -119,10 +119,16 @@ def frame_size(data: Any, at: int, end: int, shape: Any) -> int:
 
 
 @compiled
-def seal(frame: Any, time_us: int, size: int, extra: int) -> int:
-    """Complete the frame around a payload of ``size`` bytes that begins with the time; return the size of the frame."""
+def seal_payload(frame: Any, size: int, extra: int) -> int:
+    """Complete the frame around a payload of ``size`` bytes; return the size of the frame."""
     frame[1] = size
     frame[4] = (frame[4] + 1) & 0xFF
-    write_bytes(frame, HEADER, 8, time_us)
     write_bytes(frame, HEADER + size, CHECKSUM, checksum_of(frame, 1, HEADER + size, extra))
     return HEADER + size + CHECKSUM
+
+
+@compiled
+def seal(frame: Any, time_us: int, size: int, extra: int) -> int:
+    """Complete the frame around a payload of ``size`` bytes that begins with the time; return the size of the frame."""
+    write_bytes(frame, HEADER, 8, time_us)
+    return seal_payload(frame, size, extra)

@@ -6,11 +6,10 @@ three quarters of an inner tick. If all parts are compiled, one kernel runs a bl
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 from flightstack.process.assembly import Stack
-from flightstack.process.quiet_block import QuietBlock, compiles
+from flightstack.process.quiet_block import QuietBlock, compiles, least_charge
 from flightstack.process.quiet_outer import PassedTicks
 from flightstack.process.quiet_sensors import estimators_of
 from flightstack.simulator_link.hot_frames import VALID_FLAG, ActuatorsFrame
@@ -22,8 +21,6 @@ from sim_bridge.quiet_steps import QuietSteps
 from sim_bridge.simulator import Simulator
 
 assert (CONTACT, step_kernel.PAUSES) == (LARGEST_RESULT, PAUSES)
-_CHARGE_ROUNDING = 0.01
-"""Of reports, which are in percent: with more charge than that the battery is not low."""
 
 
 def _have_equal_sensors(stack: Stack, simulator: Simulator) -> bool:
@@ -39,9 +36,9 @@ class QuietTicks:
     def __init__(
         self, stack: Stack, lockstep: Lockstep, simulator: Simulator, actuators: ActuatorsFrame
     ) -> None:
-        self._link, self._lockstep = stack.simulator, lockstep
+        self._stack, self._link, self._lockstep = stack, stack.simulator, lockstep
         self._autopilot, self._estimation = stack.parts.autopilot, stack.estimation
-        self._failsafes, self._inbox = stack.parts.failsafes, stack.simulator.sensors
+        self._inbox = stack.simulator.sensors
         self._now, self._interval_us = stack.now, stack.rates.interval_us
         self.is_idle = False
         """True if all ticks of the last ``run_periods`` or ``run_on`` were compiled: the vehicle had no event."""
@@ -81,10 +78,7 @@ class QuietTicks:
         steps = self._steps
         if steps is None or not steps.fits(simulator, actuators.rotor_speed_rad_s):
             return None
-        is_low = self._failsafes.battery_level > 0  # the next report may end that
-        b = self._now.behaviour
-        limit = max(b.battery_low, b.battery_critical, b.battery_emergency)
-        steps.least_charge[0] = math.inf if is_low else limit + _CHARGE_ROUNDING
+        steps.least_charge[0] = least_charge(self._stack)
         return self._block
 
     def run_periods(self, simulator: Simulator, actuators: ActuatorsFrame, most: int) -> int:

@@ -20,7 +20,8 @@ from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Record, RecordArray
 from flightstack.mavlink.fields import int16, int32, whole
 from flightstack.params.battery import Battery
-from flightstack.simulator_link.battery_frame import EXTRA_PLACES, PLACES, UNUSED_CELL, BatteryReport
+from flightstack.simulator_link.battery_frame import BatteryReport
+from flightstack.simulator_link.battery_kernels import EXTRA_PLACES, PLACES, UNUSED_CELL
 
 INTERVAL_US = 500_000
 """Simulated time between two reports."""

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from flightstack.core.arrays import copy_all
 from flightstack.core.compiled import compiled
 from flightstack.core.record_types import dtype_of
+from flightstack.simulator_link.battery_kernels import write_battery
 from flightstack.simulator_link.frame_kernels import (
     FIELDS_AT,
     HEADER,
@@ -19,10 +20,11 @@ from flightstack.simulator_link.frame_kernels import (
     frame_size,
     read_bytes,
     seal,
+    seal_payload,
     write_bytes,
 )
 from flightstack.transports.compiled_socket import forget, receive_into, send_from
-from sim_bridge.step_kernel import simulate
+from sim_bridge.step_kernel import PAUSES, simulate
 
 
 class Exchanges(NamedTuple):
@@ -37,6 +39,9 @@ class Exchanges(NamedTuple):
     sensor_extra: int
     """CRC_EXTRA of HIL_SENSOR; then that of HIL_GPS."""
     gps_extra: int
+    battery_extra: int
+    """CRC_EXTRA of BATTERY_STATUS, and the number of the battery's cells."""
+    cells: int
     valid_flag: int
     """Flag of each state; then that of one that touches the ground."""
     contact_flag: int
@@ -89,14 +94,39 @@ def _write_sensors(e: Any, at: int, outbox: Any, frames: Any, wires: Any, news: 
 
 
 @compiled
-def _write_gps(e: Any, at: int, outbox: Any, frame: Any, payload: Any, time_us: int) -> int:
-    """Write HIL_GPS to the outbox, without the zeros at its end; return where it ends."""
+def _write_payload(at: int, outbox: Any, frame: Any, payload: Any, extra: int) -> int:
+    """Write a message to the outbox, without the zeros at the end of its payload; return where it ends."""
     size = len(payload)
     while size > 1 and payload[size - 1] == 0:
         size -= 1
     copy_all(payload, frame[HEADER:])
-    size = seal(frame, time_us, size, e["gps_extra"])
+    size = seal_payload(frame, size, extra)
     copy_all(frame[:size], outbox[at:])
+    return at + size
+
+
+@compiled
+def _write_battery(e: Any, outbox: Any, messages: Any, battery: Any) -> int:
+    """Write BATTERY_STATUS to the outbox if this step noted the battery; return where it ends.
+
+    ``messages`` are frame and payload, ``battery`` is what the kernel of the step notes.
+    """
+    _due_us, _period_us, _least_charge, rows, _times_us, count = battery
+    if count[0] == 0:
+        return 0
+    count[0] = 0
+    frame, payload = messages
+    write_battery(payload, rows[0], e["cells"])
+    return _write_payload(0, outbox, frame, payload, e["battery_extra"])
+
+
+@compiled
+def _write_state(e: Any, at: int, outbox: Any, state: Any, time_us: int) -> int:
+    """Write FS_PLANT_STATE to the outbox; return where it ends."""
+    flags_at = HEADER + e["state_size"] - 1
+    state[flags_at] = e["valid_flag"] | (e["contact_flag"] if e["result"] != 0 else 0)
+    size = seal(state, time_us, e["state_size"], e["state_extra"])
+    copy_all(state[:size], outbox[at:])
     return at + size
 
 
@@ -113,13 +143,14 @@ def _is_answer(line: Any, count: int, time_us: int, e: Any, shape: Any) -> bool:
 
 @compiled
 def serve_steps(
-    line: Any, exchanges: Any, answer: Any, shape: Any, state: Any, sensors: Any, outbox: Any, world: Any, count: int,
-    time_us: int,
+    line: Any, exchanges: Any, answer: Any, shape: Any, state: Any, sensors: Any, battery: Any, outbox: Any, world: Any,
+    count: int, time_us: int,
 ) -> None:  # fmt: skip
     """Receive up to ``count`` answers, the first to the state at ``time_us``; make a step after each, and send it.
 
     ``answer`` and ``state`` are frames, ``sensors`` the frames of HIL_SENSOR and the bytes of the measurements, of
-    which there are none without sensors, and the frame of HIL_GPS and its newest payload.
+    which there are none without sensors, and the frame of HIL_GPS and its newest payload. ``battery`` is the frame of
+    BATTERY_STATUS and a payload.
     """
     e, news = exchanges[0], world[4][0]
     frames, wires, gps_frame, gps = sensors
@@ -132,16 +163,14 @@ def serve_steps(
             answer[i] = line[2][i]
         forget(line)
         time_us += e["interval_us"]
-        e["result"] = simulate(world, time_us, int(answer[size - 3]))
+        e["result"] = simulate(world, time_us, int(answer[size - 3])) & ~PAUSES  # the message is sent
         e["steps"] += 1
         if e["result"] > e["largest_result"]:
             return
-        flags_at = HEADER + e["state_size"] - 1
-        state[flags_at] = e["valid_flag"] | (e["contact_flag"] if e["result"] != 0 else 0)
-        end = seal(state, time_us, e["state_size"], e["state_extra"])
-        copy_all(state[:end], outbox)
+        end = _write_battery(e, outbox, battery, world[5])
+        end = _write_state(e, end, outbox, state, time_us)
         if news["has_gnss"] != 0:
-            end = _write_gps(e, end, outbox, gps_frame, gps, time_us)
+            end = _write_payload(end, outbox, gps_frame, gps, e["gps_extra"])
         end = _write_sensors(e, end, outbox, frames, wires, news, time_us)
         e["size"] = end
         if not send_from(line, e["outbox_at"], end):

@@ -9,7 +9,10 @@ import numpy as np
 from flightstack.core.compiled import direct
 from flightstack.core.geodesy import GeoPoint
 from flightstack.core.kernels.calls import as_bytes
+from flightstack.mavlink.frames import HEADER_V2
 from flightstack.params.vehicle import Vehicle
+from flightstack.simulator_link.battery_frame import BATTERY_SHAPE
+from flightstack.simulator_link.battery_kernels import BATTERY_SIZE
 from flightstack.simulator_link.frame_kernels import SHAPE
 from flightstack.simulator_link.hot_frames import GROUND_CONTACT_FLAG, LOCKSTEP_FLAG, VALID_FLAG
 from flightstack.simulator_link.sensor_frames import ACCEL, BARO, GPS_SHAPE, GYRO, MAG, SENSOR_SHAPE
@@ -22,8 +25,8 @@ from sim_bridge.server.endpoint import FlightStackEndpoint
 from sim_bridge.server.exchange_kernel import EXCHANGES, Exchanges, serve_steps
 from sim_bridge.simulator import Simulator
 
-MOST = 250
-"""Steps of a call at most: a signal ends the process between two calls."""
+MOST = 1000
+"""Steps of a call at most: a signal ends the process between two calls, or in a wait."""
 _OUTBOX = 4096
 _NO_FRAME = np.zeros(0, np.uint8)
 
@@ -49,7 +52,7 @@ class QuietExchanges:
         link, simulator = self._link, self._simulator
         if not (self._is_possible and link.is_quiet):
             return 0
-        count = min(MOST, simulator.quiet_intervals(measures=True))
+        count = min(MOST, simulator.quiet_intervals(measures=True, reports=True))
         if count <= 0:
             return 0
         if self._steps is None or not self._steps.fits(simulator, link.actuators.rotor_speed_rad_s):
@@ -64,17 +67,19 @@ class QuietExchanges:
         link, simulator, sensors = self._link, self._simulator, self._simulator.sensors
         steps = self._steps = QuietSteps(simulator, link.actuators.rotor_speed_rad_s)
         state = simulator.frame
+        pack, battery = simulator.vehicle.battery, as_bytes(simulator.battery_buffer)
         self._record[0] = Exchanges(
             self._outbox.ctypes.data, state.shape.size, state.shape.extra, SENSOR_SHAPE.extra, GPS_SHAPE.extra,
-            VALID_FLAG, GROUND_CONTACT_FLAG, LOCKSTEP_FLAG, len(simulator.vehicle.rotors), simulator.interval_us,
-            int(ACCEL | GYRO), int(MAG), int(BARO), CONTACT, 0, 0, 0,
+            BATTERY_SHAPE.extra, 0 if pack is None else pack.cells, VALID_FLAG, GROUND_CONTACT_FLAG, LOCKSTEP_FLAG,
+            len(simulator.vehicle.rotors), simulator.interval_us, int(ACCEL | GYRO), int(MAG), int(BARO), CONTACT,
+            0, 0, 0,
         )  # fmt: skip
         frames = (_NO_FRAME,) if sensors is None else tuple(map(as_bytes, sensors.raw_frames))
         gps = _NO_FRAME if sensors is None else as_bytes(sensors.gps_frame), steps.gps
         self._arguments = (
             self._socket.arguments, self._record, as_bytes(link.actuators.frame),
             np.array([link.actuators.shape], SHAPE), as_bytes(state.frame), (frames, steps.wires.view(np.uint8), *gps),
-            self._outbox, steps.world,
+            (battery, battery[HEADER_V2:][:BATTERY_SIZE].copy()), self._outbox, steps.world,
         )  # fmt: skip
         self._serve = direct(serve_steps, *self._arguments, 0, 0)
 

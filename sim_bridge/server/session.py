@@ -166,7 +166,8 @@ class Session:
             link.step()  # PX4 takes its clock from the sensors, and zero is no time
         if not link.is_sent:
             connection.send(link.state())
-        if self._quiet is not None and self.exchanges and (count := self._quiet.room()) > 0:
+        most = self._move_at - self.exchanges - 1  # the next exchange may move the process
+        if self._quiet is not None and self.exchanges and (count := min(most, self._quiet.room())) > 0:
             self._run_quietly(self._quiet, count)
             if link.free_running or link.error is not None:
                 return

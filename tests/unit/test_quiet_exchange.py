@@ -20,6 +20,7 @@ from flightstack.mavlink.link import Link
 from flightstack.process.connections import PAUSE_NS
 from flightstack.process.exchange_kernel import exchange
 from flightstack.process.quiet_exchange import ExchangedSteps, Span
+from flightstack.simulator_link.battery_frame import BatteryReport, decode_battery, encode_battery
 from flightstack.simulator_link.hot_frames import ActuatorsFrame
 from flightstack.simulator_link.sensor_frames import BARO, HIL_GPS_ID, HIL_SENSOR_ID, MAG
 from flightstack.testing import World
@@ -223,6 +224,61 @@ def test_silence_a_closed_connection_and_a_deadline_are_left_to_python(sockets: 
         others.shutdown(socket.SHUT_WR)
         assert vehicle.exchange() == -1
         assert vehicle.steps.socket.received == b""
+
+
+@pytest.mark.parametrize("state", ["truth", "estimated"])
+def test_reports_of_the_battery_are_taken(state: Any, sockets: Any) -> None:
+    ours, others = sockets
+    with World(make_engine=BytesEngine, state=state) as world:
+        world.run_for(1.6)
+        vehicle, expected = Vehicle(world, ours), []
+        for _ in range(600):
+            data = vehicle.next_state()
+            others.send(data)
+            assert vehicle.exchange() == 0
+            messages(others)
+            if data[7] == mavlink.MAVLINK_MSG_ID_BATTERY_STATUS:
+                report = decode_battery(data[: HEADER_V2 + data[1] + CHECKSUM_SIZE])
+                expected.append((vehicle.simulator.time_us, report))
+        assert len(expected) > 1
+        assert vehicle.steps.take_reports() == expected
+        assert vehicle.steps.take_reports() == []
+
+
+REPORT = BatteryReport(0, (3900,) * 3 + (0xFFFF,) * 7 + (0,) * 4, 1250, 100, 4, 64)
+LEFT_REPORTS = {
+    "low": REPORT._replace(remaining_percent=31),
+    "unknown": REPORT._replace(remaining_percent=-1),
+    "another battery": REPORT._replace(number=1),
+}
+
+
+@pytest.mark.parametrize("how", LEFT_REPORTS)
+def test_reports_that_the_vehicle_may_act_on_are_left_to_python(how: str, sockets: Any) -> None:
+    ours, others = sockets
+    with World(make_engine=BytesEngine, state="truth") as world:
+        world.run_for(0.11)
+        vehicle = Vehicle(world, ours)
+        vehicle.steps.record["least_charge"] = 0.31
+        before = vehicle.taken()
+        data = encode_battery(LEFT_REPORTS[how], 0, 1, 200) + vehicle.next_state()
+        others.send(data)
+        assert vehicle.exchange() == -1
+        assert vehicle.steps.socket.received == data
+        assert vehicle.taken() == before
+        assert vehicle.steps.take_reports() == []
+
+
+def test_more_reports_than_a_call_keeps_are_left_to_python(sockets: Any) -> None:
+    ours, others = sockets
+    with World(make_engine=BytesEngine, state="truth") as world:
+        world.run_for(0.11)
+        vehicle, results = Vehicle(world, ours), []
+        for _ in range(10):
+            others.send(encode_battery(REPORT, 0, 1, 200) + vehicle.next_state())
+            results.append(vehicle.exchange())
+        assert results == [0] * 8 + [-1] * 2
+        assert [report for _, report in vehicle.steps.take_reports()] == [REPORT] * 8
 
 
 def test_silence_in_an_expected_pause_is_left_to_python(sockets: Any) -> None:
