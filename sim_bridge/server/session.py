@@ -168,8 +168,8 @@ class Session:
             connection.send(link.state())
         most = self._move_at - self.exchanges - 1  # the next exchange may move the process
         if self._quiet is not None and self.exchanges and (count := min(most, self._quiet.room())) > 0:
-            self._run_quietly(self._quiet, count)
-            if link.free_running or link.error is not None:
+            ran_all = self._run_quietly(self._quiet, count)
+            if ran_all or link.free_running or link.error is not None:
                 return
         while not link.answered:
             data = connection.receive_within(FREEWHEEL_S) if link.freewheels else connection.receive()
@@ -185,8 +185,8 @@ class Session:
         if self.pacer is not None:
             self.pacer.wait_until(link.simulator.time_us, LEAD_NS)
 
-    def _run_quietly(self, quiet: QuietExchanges, count: int) -> None:
-        """Run exchanges without Python, and take what was received besides."""
+    def _run_quietly(self, quiet: QuietExchanges, count: int) -> bool:
+        """Run ``count`` exchanges without Python; return False after fewer, and take what was received besides."""
         before = quiet.count
         try:
             quiet.run(count)
@@ -198,6 +198,7 @@ class Session:
             if not data:
                 raise PeerClosedError
             self._receive(data)
+        return quiet.count - before == count
 
     def _tick_on_wall_clock(self) -> None:
         link, connection = self.link, self._connection
