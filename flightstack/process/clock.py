@@ -98,7 +98,8 @@ class Durations:
 
     def add_all(self, nanoseconds: np.ndarray[Any, np.dtype[np.int64]]) -> None:
         """Record durations, the oldest first."""
-        for part in np.split(nanoseconds, [WINDOW - self._count % WINDOW]):
+        left = WINDOW - self._count % WINDOW
+        for part in (nanoseconds[:left], nanoseconds[left:]):
             at = self._count % WINDOW
             self._values[at : at + len(part)] = part
             self._count += len(part)
@@ -135,7 +136,7 @@ class LoopTiming:
         """Record the durations of ticks, the oldest first."""
         self.execution.add_all(took_ns)
         self.ticks += len(took_ns)
-        self.overruns += int((took_ns > self.period_ns).sum())
+        self.overruns += int(np.count_nonzero(took_ns > self.period_ns))
 
 
 class DeadlineScheduler:
