@@ -114,7 +114,7 @@ class LockstepLoop:
         self.pace = SimulatorPace()
         """Recognises a simulator that waits between states."""
         self.serves_ground = False
-        """True if the last call of ``run`` ended an outer period, or ran on: ground links may be due."""
+        """True if the last call of ``run`` ended an outer period: ground links may be due."""
 
     @property
     def ends_period(self) -> bool:
@@ -147,7 +147,7 @@ class LockstepLoop:
         stack, quiet = self._stack, self._quiet
         ran = quiet.run(span, partial(self._most, next_log_us))
         self._answered += ran.ticks
-        self.serves_ground = True
+        self.serves_ground = self.ends_period
         if ran.unsent is None:
             self._simulator.send(stack.simulator.answer(quiet.commands, stack.now.status.armed))
         elif ran.unsent:
