@@ -14,7 +14,7 @@ from typing import Any, Protocol, TypeVar
 from flightstack.process.supervised import PreparedPrograms, supervised
 
 _TAIL_BYTES = 4096
-_POLL_S = 0.02
+_POLL_S = 0.005
 _NOTICE = re.compile(r"\S+: (warning: |compiling )|.*\wWarning: ")
 """A line to show in flight: a warning of the child or of one of its libraries, or progress of compilation."""
 _BLAME = ("lost at", "lost:", "was shut down")  # in the last line of simulator or flight stack

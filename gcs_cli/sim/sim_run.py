@@ -41,9 +41,9 @@ from gcs_cli.sim.sim_vehicles import (
 )
 from gcs_cli.vehicle_link import open_signing
 
-_STEP_S, _START_STEP_S = 0.1, 0.02
+_STEP_S, _START_STEP_S = 0.1, 0.005
 """Pause between two looks at the processes, when all vehicles are ready and before."""
-_REQUEST_S = 0.05
+_REQUEST_S = 0.02
 """Pause between two requests for the vehicle's state before it is ready."""
 _END_TIMEOUT_S = 10.0
 

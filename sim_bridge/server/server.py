@@ -59,6 +59,11 @@ class ServerOptions(NamedTuple):
     faults: tuple[Fault, ...] = ()
     view: LiveView | None = None
 
+    @property
+    def hastens(self) -> bool:
+        """True if simulated time passes at full speed, always or at the start."""
+        return math.isinf(self.speed) or self.head_start_s > 0.0
+
 
 def serve(options: ServerOptions) -> int:
     """Run the simulator for one client; return the exit code."""
@@ -98,7 +103,7 @@ def _simulate(options: ServerOptions, listener: socket.socket) -> int:
     view = contextlib.nullcontext() if options.view is None else options.view.watching(simulator)
     with client, view:
         connection = Connection(client, stop, timeout_s)
-        quiet = None if math.isfinite(options.speed) else _quiet_exchanges(link, client.fileno())
+        quiet = _quiet_exchanges(link, client.fileno()) if options.hastens else None
         pace = Pace(options.speed, round(options.head_start_s * 1e6))
         return _run(Session(link, connection, pace, stop, quiet), connection, timeout_s)
 
@@ -139,7 +144,7 @@ def _make_simulator(options: ServerOptions) -> Simulator:
 
 def _compile_exchanges(options: ServerOptions, flown: Simulator) -> None:
     """Compile what exchanges at full speed need, or load it from the cache, with a simulator that is not flown."""
-    if not (math.isinf(options.speed) and type(flown.plant) is CompiledPlant):
+    if not (options.hastens and type(flown.plant) is CompiledPlant):
         return
     from sim_bridge.server.quiet_exchanges import compile_exchanges
 

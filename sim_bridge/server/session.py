@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
@@ -123,7 +124,7 @@ class Session:
         stop: StopSignal,
         quiet: QuietExchanges | None = None,
     ) -> None:
-        """``quiet`` runs exchanges at full speed; at a limited one the process sleeps between two exchanges."""
+        """``quiet`` runs exchanges at full speed; where the speed is held, the process sleeps between two."""
         self.link = link
         self.exchanges = 0
         self.wall_s = 0.0
@@ -131,7 +132,8 @@ class Session:
         self.pacer = None if math.isinf(pace.speed) else Pacer(pace.speed, stop.is_set, pace.from_us)
         # at a limited speed the process sleeps, and the scheduler chooses the processor
         self._leader = AffinityLeader() if self.pacer is None else None
-        self._move_at = 1
+        self._move_at = sys.maxsize if self._leader is None else 1
+        self._held_from_us = sys.maxsize if self.pacer is None else pace.from_us
         self._connection = connection
         self._stop = stop
         self._quiet = quiet
@@ -166,8 +168,7 @@ class Session:
             link.step()  # PX4 takes its clock from the sensors, and zero is no time
         if not link.is_sent:
             connection.send(link.state())
-        most = self._move_at - self.exchanges - 1  # the next exchange may move the process
-        if self._quiet is not None and self.exchanges and (count := min(most, self._quiet.room())) > 0:
+        if self._quiet is not None and self.exchanges and (count := min(self._most(), self._quiet.room())) > 0:
             ran_all = self._run_quietly(self._quiet, count)
             if ran_all or link.free_running or link.error is not None:
                 return
@@ -184,6 +185,12 @@ class Session:
             self._move_at = self.exchanges + self._leader.update()
         if self.pacer is not None:
             self.pacer.wait_until(link.simulator.time_us, LEAD_NS)
+
+    def _most(self) -> int:
+        """Return how many exchanges are before the one that may move the process, and before the speed is held."""
+        simulator = self.link.simulator
+        hasty = (self._held_from_us - simulator.time_us - 1) // simulator.interval_us
+        return min(self._move_at - self.exchanges - 1, hasty)
 
     def _run_quietly(self, quiet: QuietExchanges, count: int) -> bool:
         """Run ``count`` exchanges without Python; return False after fewer, and take what was received besides."""
