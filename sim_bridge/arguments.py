@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from importlib.util import find_spec
+from numbers import Real
 
 from flightstack.core.contract import Vector3
 from flightstack.core.errors import INSTALL_MULTIBODY, plain
@@ -72,7 +73,9 @@ def parse_wind(flag: str, text: str) -> Vector3:
 
 
 def check_range(flag: str, value: float, low: float, high: float) -> float:
-    """Return ``value`` if it is in [low, high]."""
+    """Return ``value`` if it is a number in [low, high]."""
+    if not isinstance(value, Real):
+        raise UsageProblemError(f"{flag}: {value!r} is not a number")
     if not math.isfinite(value) or not low <= value <= high:
         raise UsageProblemError(
             f"{flag}: {plain(value)} is outside the allowed range {plain(low)} to {plain(high)}"

@@ -102,6 +102,15 @@ class Flight:
     caused: tuple[Event, ...] = ()
     """Faults and changes of links that the test caused."""
 
+    def __repr__(self) -> str:
+        """Return the outcome, which is what a failed assertion of pytest has room for."""
+        said = (
+            self.outcome
+            if self.outcome_text in ("", self.outcome)
+            else f"{self.outcome}: {self.outcome_text}"
+        )
+        return f"Flight({said or 'without an outcome'})"
+
     @property
     def data(self) -> FlightData:
         """The flight as ``gcs`` reads it from its log; empty if the vehicle was never armed."""

@@ -6,6 +6,7 @@ import difflib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from numbers import Integral
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -41,6 +42,7 @@ Built = TypeVar("Built")
 
 OPTION_KEYS = {"--param": "params"}
 """Conditions by the option of ``flightstack`` that sets them, where the names differ."""
+_LARGEST_SEED = 2**63
 _MOST_WIND_M_S, _MOST_GUST_M_S, _MOST_TORQUE_GUST_N_M = 200.0, 50.0, 100.0
 
 
@@ -188,7 +190,7 @@ class Setup:
         try:
             if self.drag:
                 vehicle = vehicle.with_drag(self.plant)
-            disturbance = self._disturbance()
+            disturbance, seed = self._disturbance(), self._seed()
             check_wind(vehicle, check_plant(self.plant), disturbance)
             battery = check_battery(
                 vehicle, self.battery_percent, self.battery_capacity_mah, self.battery_drain
@@ -199,15 +201,18 @@ class Setup:
             name, _, problem = str(error).partition(": ")
             name = name.removeprefix("--").replace("-", "_")
             raise ConfigError(name, "", with_keys(problem)) from None
-        options = PlantOptions(
-            disturbance, self.seed, battery=battery, slope_rad=slope_rad, boat_ned_m_s=boat
-        )
+        options = PlantOptions(disturbance, seed, battery=battery, slope_rad=slope_rad, boat_ned_m_s=boat)
         return vehicle, options
 
     def simulator(self, vehicle: Vehicle) -> Simulator:
         """Return the simulator of ``vehicle``; raise ConfigError for conditions that it cannot simulate."""
         flown, options = self.plant_options(vehicle)
         return Simulator(flown, self.plant, options)
+
+    def _seed(self) -> int:
+        if not isinstance(self.seed, Integral):
+            raise UsageProblemError(f"seed: {self.seed!r} is not a whole number")
+        return int(check_range("seed", int(self.seed), 0, _LARGEST_SEED))
 
     def _disturbance(self) -> Disturbance:
         wind = _vector("wind", self.wind, fewest=2)

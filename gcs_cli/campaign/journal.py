@@ -236,9 +236,10 @@ def _difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     for name in sorted({*before["files"], *now["files"]}):
         if before["files"].get(name) != now["files"].get(name):
             return f"{name} has changed"
+    plan = "--flights" if now["kind"] == "seek" else "the plan of the flights"
     words = {
         "version": f"flightstack has changed from {before['version']} to {now['version']}",
         "sources": "the source code of flightstack has changed",
-        "flights": "the plan of the flights has changed",
+        "flights": f"{plan} has changed",
     }
     return next((text for name, text in words.items() if before[name] != now[name]), "")

@@ -137,11 +137,13 @@ def _sentences(
     closest = f"{100.0 * worst['robustness']:.1f} % of its limit, {worst['closest'] or worst['outcome']}"
     yield f"least margin: {closest}, with {inputs_text(worst)} (flight {worst['flight']})"
     if found.smallest is None:
-        yield f"no flight of {len(found.flown)} fails"
+        seed = f"seed {worst['seed']}"
+        yield f"no flight of {len(found.flown)} fails, all with {seed}: other gusts and noise may be worse"
         return
     row = journal.rows[found.smallest.number]
     size = f"{100.0 * found.size(found.smallest):.0f} % of the range"
     yield f"smallest variation that fails: {size}, with {inputs_text(row)}: {'; '.join(row['failed'])}"
+    yield f"all flights have seed {row['seed']}: with other gusts and noise less may fail"
     yield f"repeat: {only_command(options, row['flight'])}"
 
 

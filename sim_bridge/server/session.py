@@ -168,7 +168,11 @@ class Session:
             link.step()  # PX4 takes its clock from the sensors, and zero is no time
         if not link.is_sent:
             connection.send(link.state())
-        if self._quiet is not None and self.exchanges and (count := min(self._most(), self._quiet.room())) > 0:
+        if (
+            self._quiet is not None
+            and self.exchanges
+            and (count := min(self._most(), self._quiet.room())) > 0
+        ):
             ran_all = self._run_quietly(self._quiet, count)
             if ran_all or link.free_running or link.error is not None:
                 return

@@ -183,6 +183,9 @@ def test_a_search_continues_and_its_flights_fly_alone(folder: Path) -> None:
     smallest = rows[found["smallest"]]
     assert smallest["inputs"]["wind.gust_m_s"] == min(failing)
     assert rows[found["worst"]]["robustness"] == min(row["robustness"] for row in rows.values())
+    assert f"all flights have seed {rows[1]['seed']}:" in Path("found/report.html").read_text()
+    more = gcs("campaign", "s.toml", "--seek", "worst", "--flights", 30, "--out", "found")
+    assert more.stderr.startswith("gcs: found: --flights has changed since its flights: ")
     table = Path("found/flights.parquet").read_bytes()
     journal = Path("found/flights.jsonl").read_bytes().splitlines(keepends=True)
     Path("found/flights.jsonl").write_bytes(b"".join(journal[:-3]))  # as after SIGKILL

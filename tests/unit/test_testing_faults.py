@@ -111,9 +111,13 @@ def test_wind_without_drag_names_the_keyword_to_set(conditions: dict[str, Any], 
         ({"boat": (1.0, 2.0, 0.0)}, "boat: (1.0, 2.0, 0.0) must be 2 numbers"),
         ({"force": (1.0, 2.0)}, "force: (1.0, 2.0) must be 3 numbers"),
         ({"torque": ("a", "b", "c")}, "torque: ('a', 'b', 'c') must be 3 numbers"),
+        ({"gust": "x"}, "gust: 'x' is not a number"),
+        ({"seed": 1.5}, "seed: 1.5 is not a whole number"),
+        ({"seed": "x"}, "seed: 'x' is not a whole number"),
+        ({"seed": -1}, "seed: -1 is outside the allowed range 0 to 9.22337e+18"),
     ],
 )
-def test_vector_of_other_values_is_refused(conditions: dict[str, Any], problem: str) -> None:
+def test_condition_of_another_kind_is_refused(conditions: dict[str, Any], problem: str) -> None:
     with pytest.raises(ConfigError) as caught:
         World(vehicle="x_quad", **conditions)
     assert str(caught.value) == problem

@@ -43,6 +43,12 @@ def flight() -> Flight:
         return made.fly("square")
 
 
+def test_flight_is_shown_as_its_outcome(flight: Flight) -> None:
+    """pytest has room for that in the message of a failed assertion."""
+    assert repr(flight) == "Flight(completed: the mission was flown to its end)"
+    assert repr(replace(flight, result=None)) == "Flight(without an outcome)"
+
+
 # ---------------------------------------------------------------------- flights
 
 
