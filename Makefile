@@ -64,6 +64,8 @@ nightly: $(READY) ## Run every test with all its samples, seeds and combinations
 	@$(MAKE) --no-print-directory oldest
 
 oldest: ## Run the quick tests with the oldest libraries that pyproject.toml admits, in an environment of their own
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info >= (3, 13))' || \
+		{ echo "the oldest libraries have no packages for Python 3.13: run make with PYTHON=/path/to/python3.11" >&2; exit 1; }
 	@mkdir -p build
 	@$(PYTHON) -m tools.oldest_versions > build/oldest.txt
 	@PIP_CONSTRAINT=$(CURDIR)/build/oldest.txt $(MAKE) --no-print-directory VENV=.venv-oldest test

@@ -38,13 +38,13 @@ def record_of(
 ) -> dict[str, Any]:
     """Return the record of the campaign in the file ``path``. ``kind``: ``plan`` or ``seek``.
 
-    Records that are equal but for the path fly equal flights.
+    Records that are equal but for the name of that file fly equal flights.
     """
     inputs = json.dumps([[flight.number, flight.seed, dict(flight.inputs)] for flight in flights])
     return {
         "form": _FORM,
         "kind": kind,
-        "campaign": str(path.resolve()),
+        "campaign": path.name,
         "version": __version__,
         "sources": sources_digest(FLYING),
         "flights": hashlib.sha256(inputs.encode()).hexdigest(),
@@ -161,7 +161,8 @@ def check_search(folder: Path, record: Mapping[str, Any]) -> None:
     """Raise CliError (usage) if ``folder`` holds another campaign than the search with ``record``."""
     held = ""
     with contextlib.suppress(OSError, *_DAMAGED):  # no record, or a damaged one
-        held = _held(json.loads((folder / RECORD).read_text(encoding="utf-8")), record)
+        before = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        held = _held(before, record) if before["form"] == record["form"] else ""
     if held:
         raise CliError(f"{folder}: {held}: give the --out of the search", USAGE)
 
@@ -218,24 +219,34 @@ def _check_record(folder: Path, record: Mapping[str, Any]) -> None:
 def _held(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     """Return which other campaign the record ``before`` is of, as the beginning of a sentence; empty for the same.
 
-    A file that has moved with its content is the same campaign.
+    A file of another name with the same content is the same campaign.
     """
     if before["form"] != now["form"]:
         return "the directory holds the campaign of another version of flightstack"
-    name = Path(now["campaign"]).name
-    if before["campaign"] != now["campaign"] and before["files"].get(name) != now["files"].get(name):
-        return f"the directory holds the campaign of {before['campaign']}"
+    own, name = before["campaign"], now["campaign"]
+    if own != name and before["files"].get(own) != now["files"].get(name):
+        return f"the directory holds the campaign of {own}"
     if before["kind"] != now["kind"]:
         kind = "a search with --seek" if before["kind"] == "seek" else "a campaign without --seek"
         return f"the directory holds {kind}"
     return ""
 
 
+def _files(record: Mapping[str, Any], own: str) -> dict[str, str]:
+    """Return the digests of the files by name, that of the campaign itself, which is named ``own``, by an empty one."""
+    return {"" if name == own else name: digest for name, digest in record["files"].items()}
+
+
 def _difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     """Return what differs between two records, as the beginning of a sentence; empty if nothing does."""
-    for name in sorted({*before["files"], *now["files"]}):
-        if before["files"].get(name) != now["files"].get(name):
-            return f"{name} has changed"
+    name = now["campaign"]
+    then, files = (
+        _files(before, before.get("campaign", name)),
+        _files(now, name),
+    )  # the first form had no name
+    for file in sorted({*then, *files}):
+        if then.get(file) != files.get(file):
+            return f"{file or name} has changed"
     plan = "--flights" if now["kind"] == "seek" else "the plan of the flights"
     words = {
         "version": f"flightstack has changed from {before['version']} to {now['version']}",

@@ -207,5 +207,5 @@ def test_a_search_continues_and_its_flights_fly_alone(folder: Path) -> None:
     assert (other.returncode, other.stdout, other.stderr) == (
         2,
         "",
-        f"gcs: found: the directory holds the campaign of {folder / 's.toml'}: give the --out of the search\n",
+        "gcs: found: the directory holds the campaign of s.toml: give the --out of the search\n",
     )

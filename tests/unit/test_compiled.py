@@ -9,10 +9,12 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numba
 import numpy as np
 import pytest
+from numba.core.errors import TypingError
 
 from flightstack.control.mixer import mix
 from flightstack.core import compiled as module
@@ -378,3 +380,14 @@ print("scipy.linalg" in sys.modules)
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"
+
+
+@compiled
+def _first(array: Any) -> Any:
+    return array[0]
+
+
+@pytest.mark.parametrize("kind", [">f8", np.longdouble])
+def test_array_that_numba_does_not_know_is_reported_with_its_argument(kind: Any) -> None:
+    with pytest.raises(TypingError, match=r"(?s)pyobject.*argument"):
+        _first(np.ones(3, kind))

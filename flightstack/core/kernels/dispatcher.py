@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cached_property
 from types import FunctionType
 from typing import Any
@@ -12,6 +13,7 @@ import numba
 import numpy as np
 from numba.core.caching import FunctionCache
 from numba.core.compiler import Compiler
+from numba.core.errors import NumbaNotImplementedError, NumbaValueError
 from numba.core.registry import CPUDispatcher
 from numpy.typing import NDArray
 
@@ -78,11 +80,13 @@ def _type_of(example: Any, key: Any) -> numba.types.Type:
 
 def _type_of_array(example: NDArray[Any]) -> numba.types.Type:
     """Return Numba's type of an array; ``numba.typeof`` imports ``numpy.ma`` for it, which takes 10 ms."""
+    try:
+        item = numba.from_dtype(example.dtype)
+    except NumbaNotImplementedError:  # it raises another error, with the reason
+        return numba.typeof(example)
     flags = example.flags
     layout = "C" if flags.c_contiguous else "F" if flags.f_contiguous else "A"
-    return numba.types.Array(
-        numba.from_dtype(example.dtype), example.ndim, layout, readonly=not flags.writeable
-    )
+    return numba.types.Array(item, example.ndim, layout, readonly=not flags.writeable)
 
 
 def _enable_cache(dispatcher: CPUDispatcher, modules: frozenset[str], cache: type[FunctionCache]) -> None:
@@ -138,8 +142,12 @@ class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]  # Numba has no typ
 
     def typeof_pyval(self, val: Any) -> numba.types.Type:
         """Return the type of an argument of a call that is the first one of its types."""
-        is_array = type(val) is np.ndarray and not val.dtype.hasobject
-        return _type_of(val, _key_of(val)) if is_array else super().typeof_pyval(val)
+        if type(val) is np.ndarray and not val.dtype.hasobject:
+            with suppress(
+                NumbaValueError
+            ):  # of an array that Numba does not know, which it reports with its place
+                return _type_of(val, _key_of(val))
+        return super().typeof_pyval(val)
 
     def compile(self, sig: Any) -> Any:
         """Compile without garbage collection, which would take a tenth of the time."""
